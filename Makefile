@@ -1,0 +1,28 @@
+# AirTouch. `make demo` and `make test` do all the set-up they need.
+PYTHON ?= python3
+BIN := .venv/bin
+SOURCES := $(wildcard firmware/kernels/*.[ch] gap8/kernels/*.[ch] host/airtouch/kernels/*.[ch])
+
+.PHONY: help setup demo test bench model clean
+
+help:  ## this list
+	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+setup: .venv/.kernels  ## make .venv with everything in it
+
+.venv/.packages: pyproject.toml tools/constraints.txt tools/setup.sh
+	PYTHON=$(PYTHON) sh tools/setup.sh
+	@touch $@
+
+.venv/.kernels: .venv/.packages $(SOURCES)
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+demo: setup  ## the main job: train, prune, export, detect through the C kernels, report
+	$(BIN)/airtouch demo
+
+test: setup  ## every test, sanitizers included
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
+
+clean:  ## remove what was built
+	rm -rf .venv build out host/*.egg-info host/airtouch/kernels/*.so

@@ -1,0 +1,56 @@
+"""The `airtouch` command: parse, call, print. Each sub-command loads only when it is called."""
+
+import importlib
+import sys
+
+import click
+
+from airtouch import __version__
+from airtouch.errors import AirTouchError
+
+#: command -> (module in this package, one line of help)
+COMMANDS = {
+    "logs": ("logs", "Look at, convert and check flight logs."),
+    "train": ("train", "Train a detector on recorded flights."),
+    "export": ("export", "Write a trained network as C sources for the GAP8."),
+    "evaluate": ("evaluate", "Score a detector on flights with known edges."),
+    "crossval": ("crossval", "Cross-validate a detector by flight."),
+    "demo": ("demo", "Run the whole pipeline and write an HTML report."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"airtouch.cli.{COMMANDS[name][0]}")
+        return module.command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="airtouch")
+def airtouch() -> None:
+    """AirTouch feels edges below a nano-quadcopter with the air under its rotors.
+
+    Start with `airtouch demo`, or `airtouch logs info FLIGHT.csv`.
+    """
+
+
+def main() -> None:
+    """Entry point: one clear line and exit code 2 for bad input."""
+    try:
+        airtouch()
+    except AirTouchError as error:
+        click.echo(f"airtouch: {error}", err=True)
+        sys.exit(2)
+    except BrokenPipeError:
+        sys.exit(141)

@@ -1,0 +1,2 @@
+#include <stdint.h>
+int32_t airtouchAbi(void) { return 1; }

@@ -1,0 +1,98 @@
+"""A vehicle: mass, geometry, thrust curve and noise, read from a TOML file."""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """What is declared about a nominal vehicle; SI units in the names.
+
+    thrust_of_pwm_n: (c0, c1, c2), newtons per motor, c0 + c1 p + c2 p^2 for PWM p > 0.
+    nominal_voltage_v: battery voltage at which that curve holds; None where unknown.
+    """
+
+    name: str
+    mass_kg: float
+    arm_m: float
+    inertia_kg_m2: tuple[float, float, float]
+    thrust_of_pwm_n: tuple[float, float, float]
+    yaw_torque_over_thrust_m: float
+    motor_time_constant_s: float
+    rotor_radius_m: float
+    rotor_drag_kg_per_rad: float = 0.0
+    acc_noise_rms_mps2: float = 0.06
+    gyro_noise_rms_radps: float = 0.006
+    range_noise_rms_m: float = 0.002
+    gravity_mps2: float = 9.81
+    nominal_voltage_v: float | None = None
+
+    def thrust(self, pwm: np.ndarray) -> np.ndarray:
+        """Thrust of each motor in newtons for PWM of any shape; 0 where PWM <= 0."""
+        c0, c1, c2 = self.thrust_of_pwm_n
+        pwm = np.asarray(pwm, dtype=np.float64)
+        return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
+
+
+def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
+    """A built-in vehicle by name, or a TOML file by path.
+
+    Raises AirTouchError that names the file and the missing or unknown key.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise AirTouchError(f"{path}: no such vehicle file")
+        text = path.read_text(encoding="utf-8", errors="replace")
+    else:
+        folder = resources.files("airtouch") / "vehicles"
+        file = folder / f"{name_or_path}.toml"
+        if not file.is_file():
+            known = sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
+            raise AirTouchError(f"no vehicle {str(name_or_path)!r}; known: {', '.join(known)}, or a .toml file")
+        text = file.read_text(encoding="utf-8")
+    return parse(text, str(name_or_path))
+
+
+def parse(text: str, source: str) -> Vehicle:
+    """A vehicle from TOML text; `source` names it in messages."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise AirTouchError(f"{source}: not valid TOML: {error}") from None
+    fields = Vehicle.__dataclass_fields__
+    unknown = sorted(set(table) - set(fields))
+    if unknown:
+        raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(fields)}")
+    values = {}
+    for name, value in table.items():
+        if name in ("inertia_kg_m2", "thrust_of_pwm_n"):
+            if not (isinstance(value, list) and len(value) == 3 and all(_is_number(v) for v in value)):
+                raise AirTouchError(f"{source}: {name} must be three numbers")
+            values[name] = tuple(float(v) for v in value)
+        elif name == "name":
+            values[name] = str(value)
+        elif _is_number(value):
+            values[name] = float(value)
+        else:
+            raise AirTouchError(f"{source}: {name} must be a number")
+    try:
+        vehicle = Vehicle(**values)
+    except TypeError:
+        required = [n for n in ("name", "mass_kg", "arm_m", "inertia_kg_m2", "thrust_of_pwm_n",
+                                "yaw_torque_over_thrust_m", "motor_time_constant_s", "rotor_radius_m")
+                    if n not in values]
+        raise AirTouchError(f"{source}: missing {', '.join(required)}") from None
+    if vehicle.mass_kg <= 0 or min(vehicle.inertia_kg_m2) <= 0:
+        raise AirTouchError(f"{source}: mass and inertia must be positive")
+    return vehicle
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)

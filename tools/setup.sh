@@ -1,0 +1,22 @@
+#!/bin/sh
+# Makes .venv with every pinned package. Called by `make setup`.
+set -eu
+python=${PYTHON:-python3}
+"$python" - <<'PY' || exit 1
+import sys
+if not (3, 11) <= sys.version_info[:2] <= (3, 13):
+    sys.exit("AirTouch needs Python 3.11, 3.12 or 3.13 (TensorFlow has no newer wheel); "
+             f"this is {sys.version.split()[0]}. Try: make setup PYTHON=python3.12")
+PY
+if ! "$python" -m venv .venv 2>/dev/null; then
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+        apt-get update -qq && apt-get install -y -qq python3-venv >/dev/null
+        "$python" -m venv .venv
+    else
+        echo "python3 cannot make a virtual environment: apt-get install python3-venv, then again" >&2
+        exit 1
+    fi
+fi
+echo "Installing pinned packages into .venv (about 2 GB, a minute or two)..."
+.venv/bin/python -m pip install --quiet --disable-pip-version-check -c tools/constraints.txt "setuptools>=80,<83" wheel
+.venv/bin/python -m pip install --quiet --disable-pip-version-check -c tools/constraints.txt --no-build-isolation --editable ".[parquet,train,dataset,map,test,bench]"
