@@ -1,0 +1,40 @@
+"""`airtouch dataset`: the authors' public flights, hashes checked."""
+
+from pathlib import Path
+
+import click
+from rich.progress import Progress
+
+from airtouch.errors import AirTouchError
+from airtouch.logs import public
+
+
+@click.group("dataset")
+def command() -> None:
+    """Public flights to train and score on."""
+
+
+@command.command("fetch")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("flights/airtouch"), show_default=True,
+              help="Folder to fill; what is already there and right stays.")
+@click.option("--from", "source", type=click.Path(path_type=Path),
+              help="Take the files from this folder instead of the network.")
+@click.option("--base-url", default=public.BASE_URL, show_default=False, help="Another mirror of the CSV files.")
+def fetch(out: Path, source: Path | None, base_url: str) -> None:
+    """Fetch the paper's authors' flights, with their manifest.
+
+    \b
+    airtouch dataset fetch
+    airtouch dataset fetch --from ~/crazyflie_filter_constant/control/data
+    airtouch crossval flights/airtouch
+    """
+    with Progress(transient=True) as bar:
+        task = bar.add_task("flights", total=len(public.registry()))
+        states = public.fetch(out, source=source, base_url=base_url,
+                              progress=lambda name, state: bar.update(task, advance=1, description=name))
+    click.echo(f"{out}: {len(states['new'])} new, {len(states['present'])} already there, "
+               f"{len(states['failed'])} failed")
+    if states["failed"]:
+        shown = ", ".join(states["failed"][:3]) + (", ..." if len(states["failed"]) > 3 else "")
+        raise AirTouchError(f"not found, or not the bytes that were published: {shown}; "
+                            "check the network, or name another folder with --from")

@@ -1,0 +1,119 @@
+"""The paper's authors' public flights: fetched or taken from a folder, every hash checked."""
+
+import csv
+import gzip
+import hashlib
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+
+from airtouch.errors import AirTouchError
+
+REPOSITORY = "ChenyuZhaoTHU/crazyflie_filter_constant"
+COMMIT = "b4c403e620fbce96d1539665b2fb342955ccf9ee"
+BASE_URL = f"https://raw.githubusercontent.com/{REPOSITORY}/{COMMIT}/control/data/"
+
+Progress = Callable[[str, str], None]
+
+
+def registry() -> list[dict[str, str]]:
+    """One row a flight: `sha256` of the uncompressed CSV and the columns of manifest.csv."""
+    text = (resources.files("airtouch") / "logs" / "authors_flights.csv").read_text()
+    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+
+
+def fetch(
+    out: Path, *, source: Path | None = None, base_url: str = BASE_URL, progress: Progress | None = None
+) -> dict[str, list[str]]:
+    """Put the flights and their manifest.csv into `out`, as `.csv.gz`.
+
+    source: a folder that holds them already (`.csv` or `.csv.gz`), instead of the network.
+    progress: called with (file, state) after each; state is one of the keys returned.
+
+    Returns the file names by state: "present" (already there, hash right), "new" and "failed"
+    (not found, or its bytes are not those that were published; it is not written).
+    Raises AirTouchError if `source` is no folder or pooch is not installed.
+    """
+    if source is not None and not source.is_dir():
+        raise AirTouchError(f"{source}: no such folder; --from takes the folder that holds the CSV files")
+    read = _from_folder(source) if source is not None else _from_network(base_url)
+    out.mkdir(parents=True, exist_ok=True)
+    states: dict[str, list[str]] = {"present": [], "new": [], "failed": []}
+    for row in registry():
+        target = out / row["file"]
+        state = "present" if _has(target, row["sha256"]) else _place(read, row, target)
+        states[state].append(row["file"])
+        if progress:
+            progress(row["file"], state)
+    _write_manifest(out / "manifest.csv", set(states["present"] + states["new"]))
+    return states
+
+
+def _has(path: Path, sha256: str) -> bool:
+    """Whether the file is there, can be unpacked and has this hash."""
+    try:
+        return hashlib.sha256(gzip.decompress(path.read_bytes())).hexdigest() == sha256
+    except (OSError, EOFError, ValueError):
+        return False
+
+
+def _place(read: Callable[[str, str], bytes | None], row: dict[str, str], target: Path) -> str:
+    content = read(row["file"], row["sha256"])
+    if content is None or hashlib.sha256(content).hexdigest() != row["sha256"]:
+        return "failed"
+    _replace(target, gzip.compress(content, 6, mtime=0))
+    return "new"
+
+
+def _from_folder(folder: Path) -> Callable[[str, str], bytes | None]:
+    def read(name: str, sha256: str) -> bytes | None:
+        for path in (folder / name, folder / name.removesuffix(".gz")):
+            try:
+                content = path.read_bytes()
+                return gzip.decompress(content) if path.suffix == ".gz" else content
+            except (OSError, EOFError, ValueError):
+                continue
+        return None
+
+    return read
+
+
+def _from_network(base_url: str) -> Callable[[str, str], bytes | None]:
+    try:
+        import pooch
+    except ImportError:
+        raise AirTouchError("fetching needs pooch: pip install 'airtouch[dataset]', or use --from DIR") from None
+    import requests
+
+    pooch.get_logger().setLevel("ERROR")
+    cache = pooch.os_cache("airtouch")
+
+    def read(name: str, sha256: str) -> bytes | None:
+        plain = name.removesuffix(".gz")
+        url = base_url + plain.replace("+", "%2B")
+        try:
+            return Path(pooch.retrieve(url, known_hash=f"sha256:{sha256}", fname=plain, path=cache)).read_bytes()
+        except (OSError, ValueError, requests.RequestException):
+            return None
+
+    return read
+
+
+def _write_manifest(path: Path, present: set[str]) -> None:
+    """manifest.csv of the flights that are there."""
+    rows = [row for row in registry() if row["file"] in present]
+    columns = [name for name in registry()[0] if name != "sha256"]
+    lines = [",".join(columns)]
+    lines += [",".join(_quoted(row[name]) for name in columns) for row in rows]
+    _replace(path, ("\n".join(lines) + "\n").encode())
+
+
+def _quoted(cell: str) -> str:
+    return f'"{cell}"' if "," in cell else cell
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write to a temporary file beside it, then rename: never a half-written file."""
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_bytes(content)
+    temporary.replace(path)
