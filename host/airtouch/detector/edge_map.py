@@ -1,0 +1,176 @@
+"""Detected edges in the plane: points, polylines and fitted polygons, with their uncertainty.
+
+A pass is one stretch over a platform: an entry and the exit after it. In a zig-zag flight the
+ends of successive passes that lie beside each other belong to one platform; joined, they are
+its outline. Everything is in metres, in the frame of the positions given.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, MultiPoint, Point, Polygon, mapping
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+
+ASSUMED_SIGMA_S = 0.1  #: timing error of a detection where the model does not state one
+MIN_SPEED_MPS = 0.05  #: below it a timing error is not turned into less than this much distance
+
+
+@dataclass(frozen=True)
+class EdgePoint:
+    """Where an edge was felt: position, kind ("entry", "exit", "edge") and 1-sigma along the track."""
+
+    sample: int
+    kind: str
+    x_m: float
+    y_m: float
+    sigma_m: float
+
+
+@dataclass(frozen=True)
+class Platform:
+    """One platform: its two polylines, its outline, the rectangle around it and 1-sigma of the outline.
+
+    outline is None where a single pass crossed it: two points span no area.
+    """
+
+    near: LineString | Point
+    far: LineString | Point
+    outline: Polygon | None
+    rectangle: Polygon | None
+    sigma_m: float
+
+
+def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0.0) -> tuple[np.ndarray, bool]:
+    """The flown track, shape (n, 2), metres, and whether it was measured.
+
+    Logged x_m, y_m where there are any; else dead reckoning at constant speed along one heading,
+    which places edges relative to each other along the track, and nowhere else.
+    Raises AirTouchError if there is neither.
+    """
+    if log.has("x_m", "y_m"):
+        return log.stack(("x_m", "y_m")), True
+    if speed_mps is None:
+        raise AirTouchError(f"{log.source}: no position (x_m, y_m) in this log; give the speed: --speed 0.2")
+    period = float(log.meta.get("sample_period_s", 0.01))
+    along = np.arange(len(log)) * period * speed_mps
+    heading = np.radians(heading_deg)
+    return np.column_stack((along * np.cos(heading), along * np.sin(heading))), False
+
+
+def edge_points(
+    xy: np.ndarray, samples: np.ndarray, kinds: list[str], *, period_s: float = 0.01,
+    sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
+) -> list[EdgePoint]:
+    """Detections as points of the track.
+
+    xy: track, (n, 2), metres. samples: where each detection came, and lag_s the constant lag of the
+    detector, which is taken back. sigma_s: its timing error; times the speed there it is sigma_m.
+    """
+    points = []
+    half = max(1, round(0.1 / period_s))
+    for sample, kind in zip(samples, kinds, strict=True):
+        at = int(np.clip(round(sample - lag_s / period_s), 0, len(xy) - 1))
+        low, high = max(0, at - half), min(len(xy) - 1, at + half)
+        if not np.isfinite(xy[[low, at, high]]).all() or high == low:
+            continue
+        speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
+        points.append(EdgePoint(int(sample), kind, *map(float, xy[at]), sigma_s * max(speed, MIN_SPEED_MPS)))
+    return points
+
+
+def passes(points: list[EdgePoint]) -> list[tuple[EdgePoint, EdgePoint]]:
+    """Entry and the exit that follows it; an entry without an exit, or the reverse, is left out."""
+    ordered = sorted(points, key=lambda p: p.sample)
+    return [(a, b) for a, b in zip(ordered, ordered[1:]) if a.kind == "entry" and b.kind == "exit"]
+
+
+def platforms(points: list[EdgePoint]) -> list[Platform]:
+    """Group the passes into platforms and fit each one's outline.
+
+    Two passes belong together where they overlap along the direction of flight and lie, across it,
+    no further apart than four times the usual distance between successive rows.
+    """
+    crossed = passes(points)
+    groups: list[list[tuple[EdgePoint, EdgePoint]]] = []
+    gaps = np.array([_apart(a, b) for a, b in zip(crossed, crossed[1:])])
+    rows = gaps[gaps > 0.3 * np.quantile(gaps, 0.9)] if len(gaps) else gaps
+    reach = 4.0 * float(np.median(rows)) if len(rows) else 0.0
+    for crossing in crossed:
+        for group in groups:
+            if any(_beside(other, crossing, reach) for other in group[-2:]):
+                group.append(crossing)
+                break
+        else:
+            groups.append([crossing])
+    return [_fit(group) for group in groups]
+
+
+def _apart(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint]) -> float:
+    """Distance between two passes across the direction of the first, metres."""
+    a, b = _ends(one), _ends(other)
+    direction, between = a[1] - a[0], (b - a).mean(axis=0)
+    length = float(np.hypot(*direction))
+    return abs(float(direction[0] * between[1] - direction[1] * between[0])) / length if length else 0.0
+
+
+def _ends(crossing: tuple[EdgePoint, EdgePoint]) -> np.ndarray:
+    return np.array([[p.x_m, p.y_m] for p in crossing])
+
+
+def _beside(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint], reach: float) -> bool:
+    a, b = _ends(one), _ends(other)
+    direction = a[1] - a[0]
+    length = float(np.hypot(*direction))
+    if length == 0.0:
+        return False
+    shadow = np.sort((b - a[0]) @ direction / length)
+    return bool(shadow[0] < length and shadow[1] > 0 and _apart(one, other) <= reach)
+
+
+def _fit(group: list[tuple[EdgePoint, EdgePoint]]) -> Platform:
+    """Join the ends of the passes on either side, close the ring, simplify within the uncertainty."""
+    ends = [_ends(crossing) for crossing in group]
+    direction = ends[0][1] - ends[0][0]
+    aligned = [pair if (pair[1] - pair[0]) @ direction >= 0 else pair[::-1] for pair in ends]
+    across = np.array([-direction[1], direction[0]])
+    aligned.sort(key=lambda pair: float(pair.mean(axis=0) @ across))
+    near, far = (np.array([pair[side] for pair in aligned]) for side in (0, 1))
+    sigma = float(np.sqrt(np.mean([p.sigma_m**2 for crossing in group for p in crossing])))
+    if len(group) == 1:
+        return Platform(Point(near[0]), Point(far[0]), None, None, sigma)
+    ring = Polygon(np.vstack((near, far[::-1])))
+    if not ring.is_valid:
+        ring = shapely.make_valid(ring)
+        ring = max(getattr(ring, "geoms", [ring]), key=lambda part: part.area)
+    outline = ring.simplify(sigma) if isinstance(ring, Polygon) and ring.area > 0 else None
+    box = MultiPoint(np.vstack((near, far))).minimum_rotated_rectangle
+    rectangle = box if isinstance(box, Polygon) else None
+    return Platform(LineString(near), LineString(far), outline, rectangle, sigma)
+
+
+def geojson(points: list[EdgePoint], found: list[Platform], properties: dict) -> dict:
+    """A GeoJSON FeatureCollection in a local metric plane (not longitude and latitude; it says so)."""
+    features = [
+        _feature(Point(p.x_m, p.y_m), role="edge", kind=p.kind, sample=p.sample, sigma_m=round(p.sigma_m, 4))
+        for p in points
+    ]
+    for number, platform in enumerate(found):
+        shared = {"platform": number, "sigma_m": round(platform.sigma_m, 4)}
+        features += [_feature(line, role=role, **shared)
+                     for role, line in (("near side", platform.near), ("far side", platform.far))
+                     if isinstance(line, LineString)]
+        for role, polygon in (("outline", platform.outline), ("rectangle", platform.rectangle)):
+            if polygon is not None:
+                band = polygon.boundary.buffer(2 * platform.sigma_m)
+                features.append(_feature(polygon, role=role, area_m2=round(polygon.area, 4), **shared))
+                if role == "outline":
+                    features.append(_feature(band, role="95 % band of the outline", **shared))
+    return {"type": "FeatureCollection", "properties": {"axes": "local plane, metres", **properties},
+            "features": features}
+
+
+def _feature(geometry: shapely.Geometry, **properties: object) -> dict:
+    return {"type": "Feature", "geometry": mapping(geometry), "properties": properties}
