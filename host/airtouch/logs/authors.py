@@ -1,0 +1,97 @@
+"""The paper's authors' headerless CSV logs, told apart by their number of columns."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
+from airtouch.logs.quaternion import decompress, euler, to_body
+from airtouch.logs.table import parse_table
+
+GRAVITY = 9.81  #: m/s^2 in one g, as the Crazyflie firmware counts it
+GYRO_LSB = np.deg2rad(2000 * 2 / 65536)  #: rad/s in one LSB of `gyro.xRaw`
+INVALID_RANGE_MM = 32767
+
+#: columns in a row -> its channels; those of the world frame are in mm/s^2, gravity included
+LAYOUTS = {
+    6: ("qx", "qy", "qz", "qw", "quat", "t"),
+    8: ("acc_g",) * 3 + ("gyro_dps",) * 3 + ("t", "zrange"),
+    9: ("gyro_lsb",) * 3 + ("pwm",) * 4 + ("t", "zrange"),
+    12: ("acc_world",) * 3 + ("gyro_lsb",) * 3 + ("pwm",) * 4 + ("t", "zrange"),
+    13: ("acc_world",) * 3 + ("gyro_lsb",) * 3 + ("pwm",) * 4 + ("quat", "t", "zrange"),
+    14: ("acc_world",) * 3 + ("gyro_lsb",) * 3 + ("pwm",) * 4 + ("left", "right", "t", "zrange"),
+}
+
+
+def read(text: bytes, source: str) -> FlightLog:
+    """A FlightLog from the bytes of an authors' CSV.
+
+    12, 13 and 14 columns give `acc_world_*`; with the quaternion of the 13-column
+    layout `acc_*` are in the body frame, otherwise they repeat the world values and
+    meta["acc_frame"] and a warning say so. Raises AirTouchError for other widths
+    and for rows that are not numbers.
+    """
+    first = text.lstrip().split(b"\n", 1)[0]
+    width = first.count(b",") + 1
+    if width not in LAYOUTS:
+        known = ", ".join(str(n) for n in LAYOUTS)
+        raise AirTouchError(f"{source}:1: {width} columns without a header; known layouts have {known}; "
+                            "add a header with column names as `airtouch logs convert` writes them")
+    warnings: list[str] = []
+    rows = parse_table(text, source, width, 1, warnings)
+    layout = LAYOUTS[width]
+    raw = {kind: rows[:, [i for i, k in enumerate(layout) if k == kind]] for kind in set(layout)}
+    columns = {"t_s": raw["t"][:, 0]}
+    meta = {"source": source, "format": f"authors-{width}", "vehicle": "crazyflie-2.1-flow",
+            "condition": _condition(source), "sample_period_s": 0.01, "warnings": warnings}
+    if "quat" in raw:
+        q = rows[:, :4] if width == 6 else decompress(raw["quat"][:, 0])
+        columns |= dict(zip(ATTITUDE, euler(q), strict=True))
+    if "acc_g" in raw:
+        columns |= dict(zip(ACC, raw["acc_g"].T * GRAVITY, strict=True))
+        columns |= dict(zip(GYRO, np.deg2rad(raw["gyro_dps"].T), strict=True))
+        meta["acc_frame"] = "body"
+    if "acc_world" in raw:
+        world = raw["acc_world"] * 1e-3
+        columns |= dict(zip(ACC_WORLD, world.T, strict=True))
+        columns |= dict(zip(ACC, _body(world, columns, meta).T, strict=True))
+        if len(rows) > 1 and np.array_equal(raw["acc_world"], raw["gyro_lsb"]):
+            warnings.append("the gyro columns repeat the accelerations; the rates were not logged")
+    if "gyro_lsb" in raw:
+        columns |= dict(zip(GYRO, raw["gyro_lsb"].T * GYRO_LSB, strict=True))
+        columns |= dict(zip(PWM, raw["pwm"].T, strict=True))
+    for kind, name in (("left", "range_left_m"), ("right", "range_right_m")):
+        if kind in raw:
+            columns[name] = range_m(raw[kind][:, 0], zero_is_invalid=True)
+    if "zrange" in raw:
+        columns["zrange_m"] = range_m(raw["zrange"][:, 0])
+    return FlightLog(columns, meta)
+
+
+def range_m(millimetres: np.ndarray, zero_is_invalid: bool = False) -> np.ndarray:
+    """A range in metres, NaN where it is invalid.
+
+    0 of the down range is a surface too near to measure and stays; 0 of the
+    Multi-ranger means that the deck or the sensor did not answer.
+    """
+    invalid = (millimetres >= INVALID_RANGE_MM) | (millimetres < 0)
+    if zero_is_invalid:
+        invalid |= millimetres == 0
+    return np.where(invalid, np.nan, millimetres * 1e-3)
+
+
+def _body(world: np.ndarray, columns: dict[str, np.ndarray], meta: dict) -> np.ndarray:
+    if ATTITUDE[0] in columns:
+        meta["acc_frame"] = "body"
+        return to_body(world, *(columns[name] for name in ATTITUDE))
+    meta["acc_frame"] = "world"
+    meta["warnings"].append("no attitude logged: acc_* are in the world frame, not in the body's")
+    return world
+
+
+def _condition(source: str) -> str:
+    """What follows date and time in the file's name: `h79`, `+10d`, `windR`, or nothing."""
+    match = re.match(r"imu_data_\d{4}-\d{4}_?(.*?)\.csv", Path(source).name)
+    return match.group(1) if match else ""

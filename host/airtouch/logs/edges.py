@@ -1,0 +1,75 @@
+"""True edges, from the steps of the down range. Truth only: never an input of a detector."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.segments import airborne, sample_period
+
+STEP_M = 0.30  #: change of the down range within two samples that makes an edge
+ROUNDING_M = 1e-6  #: so that a step of exactly 0.30 m, in floats, is none
+SETTLING_S = 0.10  #: the 24 to 40 Hz sensor may need two or three readings to settle
+LEVEL_S = 0.10  #: stretch over which the height before and after an edge is taken
+IN_FLIGHT_S = 0.25  #: motors on for this long on both sides
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One crossing of an edge: `entry` where the down range falls, `exit` where it rises."""
+
+    sample: int
+    kind: str
+    height_before_m: float
+    height_after_m: float
+
+
+def true_edges(log: FlightLog) -> list[Edge]:
+    """Edges in order of time.
+
+    An edge is the first sample at which the down range falls (entry) or rises
+    (exit) by more than 0.30 m within two samples, in flight. Steps within 0.1 s of
+    it are the sensor settling and belong to it; a step from which the range comes
+    back within that time is a glitch and no edge. Raises AirTouchError when the log
+    has no `zrange_m` column.
+    """
+    height = _held(log["zrange_m"])
+    steps = np.flatnonzero(_largest_step(height) & _in_flight(log))
+    period = sample_period(log)
+    settling = max(int(round(SETTLING_S / period)), 2)
+    level = max(int(round(LEVEL_S / period)), 1)
+    edges: list[Edge] = []
+    settled = 0
+    for sample in steps:
+        if sample < settled:
+            continue
+        settled = sample + settling
+        before = float(np.median(height[max(sample - level, 0):max(sample - 1, 1)]))
+        after = float(np.median(height[settled:settled + level])) if settled < len(height) else float(height[-1])
+        if abs(after - before) > STEP_M:
+            edges.append(Edge(int(sample), "entry" if after < before else "exit", before, after))
+    return edges
+
+
+def _largest_step(height: np.ndarray) -> np.ndarray:
+    """Whether the range moved by more than STEP_M over the last one or two samples."""
+    moved = np.zeros(len(height), dtype=bool)
+    for lag in (1, 2):
+        moved[lag:] |= np.abs(height[lag:] - height[:-lag]) > STEP_M + ROUNDING_M
+    return moved
+
+
+def _in_flight(log: FlightLog) -> np.ndarray:
+    """Airborne now and for IN_FLIGHT_S before and after."""
+    margin = max(int(round(IN_FLIGHT_S / sample_period(log))), 1)
+    grounded = np.convolve(~airborne(log), np.ones(2 * margin + 1), mode="same") if len(log) > 2 * margin else None
+    return grounded < 0.5 if grounded is not None else np.zeros(len(log), dtype=bool)
+
+
+def _held(values: np.ndarray) -> np.ndarray:
+    """Invalid readings replaced by the last valid one (the first valid one at the start)."""
+    valid = np.isfinite(values)
+    if valid.all() or not valid.any():
+        return np.where(valid, values, 0.0)
+    last = np.maximum.accumulate(np.where(valid, np.arange(len(values)), -1))
+    return values[np.where(last < 0, np.flatnonzero(valid)[0], last)]

@@ -1,0 +1,130 @@
+"""`read` and `write`: one entry point for every format, told apart by content."""
+
+import os
+import tempfile
+import zlib
+from pathlib import Path
+
+from airtouch.errors import AirTouchError
+from airtouch.logs import authors, canonical
+from airtouch.logs.flight_log import COLUMNS, FlightLog
+
+LARGEST_BYTES = 1 << 30  #: unpacked; more than this is no flight log
+
+
+def read(path: str | Path) -> FlightLog:
+    """A flight log from any known file, `.gz` or not; the content decides, not the name.
+
+    Raises AirTouchError with file, place and remedy when it cannot be read.
+    """
+    source = str(path)
+    try:
+        size = os.stat(path).st_size
+        if size > LARGEST_BYTES:
+            raise AirTouchError(f"{source}: {size / 2**30:.1f} GiB is too large for a flight log; split it")
+        data = Path(path).read_bytes()
+    except (OSError, ValueError) as error:
+        if isinstance(error, AirTouchError):
+            raise
+        raise AirTouchError(f"{source}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    return parse(data, source)
+
+
+def parse(data: bytes, source: str) -> FlightLog:
+    """A flight log from a file's bytes; `source` names it in messages."""
+    notes: list[str] = []
+    if data[:2] == b"\x1f\x8b":
+        data = _unzipped(data, source, notes)
+    log = _by_content(data, source)
+    log.meta["warnings"] = notes + list(log.meta.get("warnings", []))
+    return log
+
+
+def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
+    """Write as the name ends: `.csv`, `.csv.gz` (canonical) or `.parquet`.
+
+    The file appears whole or not at all. Raises AirTouchError for another ending,
+    an existing file without `force`, and a place that cannot be written.
+    """
+    name = Path(path).name
+    if name.endswith((".csv", ".csv.gz")):
+        data = canonical.to_bytes(log, compress=name.endswith(".gz"))
+    elif name.endswith(".parquet"):
+        from airtouch.logs import parquet
+
+        data = parquet.to_bytes(log)
+    else:
+        raise AirTouchError(f"{path}: unknown kind of file; end the name in .csv, .csv.gz or .parquet")
+    write_bytes(data, Path(path), force)
+
+
+def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
+    """Bytes into a file through a temporary one beside it."""
+    if path.exists() and not force:
+        raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    temporary = None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary and os.path.exists(temporary):
+            os.unlink(temporary)
+        raise AirTouchError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _by_content(data: bytes, source: str) -> FlightLog:
+    if not data.strip():
+        raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
+    if data[:4] == b"PAR1":
+        from airtouch.logs import parquet
+
+        return parquet.read(data, source)
+    if data[0] == 0xBC:
+        from airtouch.logs import usd
+
+        return usd.read(data, source)
+    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b"\x00" in text:
+        raise AirTouchError(f"{source}: binary data of no known kind; known are uSD logs, Parquet and CSV")
+    return _by_header(text, source)
+
+
+def _by_header(text: bytes, source: str) -> FlightLog:
+    first = next(line for line in text.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#"))
+    names = [cell.strip() for cell in first.decode("utf-8", "replace").split(",")]
+    if _numeric(names[0]):
+        return authors.read(text, source)
+    if any(name in COLUMNS for name in names):
+        return canonical.read(text, source)
+    raise AirTouchError(f"{source}:1: unknown header {first[:60].decode('ascii', 'replace')!r}")
+
+
+def _numeric(cell: str) -> bool:
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
+    """gzip members joined; a file that is cut off gives what can be read."""
+    parts: list[bytes] = []
+    total = 0
+    while data[:2] == b"\x1f\x8b":
+        stream = zlib.decompressobj(wbits=31)
+        try:
+            parts.append(stream.decompress(data, LARGEST_BYTES - total + 1))
+        except zlib.error as error:
+            raise AirTouchError(f"{source}: the gzip data is damaged ({error}); copy the file again") from None
+        total += len(parts[-1])
+        if total > LARGEST_BYTES:
+            raise AirTouchError(f"{source}: unpacks to more than 1 GiB; no flight log is that large")
+        if not stream.eof:
+            notes.append("the gzip file is cut off; what could be unpacked was read")
+            break
+        data = stream.unused_data
+    return b"".join(parts)
