@@ -1,0 +1,113 @@
+"""Which flights, under which conditions: `manifest.csv` beside them."""
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from airtouch.errors import AirTouchError
+
+MANIFEST = "manifest.csv"
+
+
+@dataclass(frozen=True)
+class Condition:
+    """How a flight was flown; None where it is not known.
+
+    use: "clean" or "messy". fold: cross-validation fold. height: class of height
+    over the platform. angle_deg: between the path and the edge's normal. wind:
+    where a fan blew. speed_mps: commanded speed, turns seconds into metres.
+    """
+
+    use: str | None = None
+    fold: int | None = None
+    height: str | None = None
+    angle_deg: float | None = None
+    wind: str | None = None
+    speed_mps: float | None = None
+
+
+@dataclass(frozen=True)
+class FlightFile:
+    """A log and its condition."""
+
+    path: Path
+    condition: Condition
+
+
+def read_manifest(path: Path) -> dict[str, Condition]:
+    """File name -> condition, in the manifest's order.
+
+    Columns used: file (needed), use, fold, height, angle_deg, wind, speed_mps; others
+    are ignored, empty cells are None. Raises AirTouchError with file, line and remedy.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as handle:
+            reader = csv.DictReader(handle)
+            if "file" not in (reader.fieldnames or ()):
+                raise AirTouchError(f"{path}:1: no column 'file' in the header; the first line must name the columns")
+            conditions: dict[str, Condition] = {}
+            for row in reader:
+                place = f"{path}:{reader.line_num}"
+                name = (row["file"] or "").strip()
+                if not name:
+                    raise AirTouchError(f"{place}: empty file name")
+                if name in conditions:
+                    raise AirTouchError(f"{place}: {name} is listed twice")
+                conditions[name] = _condition(row, place)
+            return conditions
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise AirTouchError(f"{path}: cannot be read as a manifest: {error}") from None
+
+
+def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list[FlightFile]:
+    """Every flight named by files and folders, each once, with its condition.
+
+    A folder with a manifest gives the flights whose use is clean (or that say no use), without
+    one every log in it. `speed_mps` fills in where the manifest says none. Raises AirTouchError for
+    what does not exist and for a folder without flights.
+    """
+    manifests: dict[Path, dict[str, Condition]] = {}
+    found: dict[Path, FlightFile] = {}
+    for path in map(Path, paths):
+        if not path.exists():
+            raise AirTouchError(f"{path}: no such file or folder")
+        folder = path if path.is_dir() else path.parent
+        if folder not in manifests:
+            manifest = folder / MANIFEST
+            manifests[folder] = read_manifest(manifest) if manifest.is_file() else {}
+        listed = manifests[folder]
+        files = _flights_of(path, listed) if path.is_dir() else [path]
+        for file in files:
+            condition = listed.get(file.name, Condition())
+            if condition.speed_mps is None and speed_mps is not None:
+                condition = replace(condition, speed_mps=speed_mps)
+            found.setdefault(file.resolve(), FlightFile(file, condition))
+    return list(found.values())
+
+
+def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
+    if listed:
+        files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
+    else:
+        files = sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith((".csv", ".csv.gz", ".parquet")))
+    if not files:
+        raise AirTouchError(f"{folder}: no flights in this folder (.csv, .csv.gz or .parquet, clean in its manifest)")
+    return files
+
+
+def _condition(row: dict[str, str | None], place: str) -> Condition:
+    def text(name: str) -> str | None:
+        return (row.get(name) or "").strip() or None
+
+    def number(name: str, kind: type = float):
+        value = text(name)
+        try:
+            return None if value is None else kind(value)
+        except ValueError:
+            raise AirTouchError(f"{place}: {name} is {value!r}, a number is needed") from None
+
+    speed = number("speed_mps")
+    if speed is not None and not 0 < speed < 100:
+        raise AirTouchError(f"{place}: speed_mps is {speed:g}, it must be above 0 and below 100")
+    return Condition(text("use"), number("fold", int), text("height"), number("angle_deg"), text("wind"), speed)
