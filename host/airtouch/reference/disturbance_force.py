@@ -1,0 +1,60 @@
+"""The force on the vehicle that neither gravity nor its motors explain (paper, equation 3)."""
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.reference.finite import hold_finite
+from airtouch.vehicle import Vehicle
+
+PWM_MAX = 65535.0
+
+
+def disturbance_force(
+    acc_world: np.ndarray,
+    pwm: np.ndarray,
+    vehicle: Vehicle,
+    *,
+    vbat_v: np.ndarray | float | None = None,
+    thrust_axis: np.ndarray | None = None,
+) -> np.ndarray:
+    """f_w = m a - m g - R f_u in newtons, world axes, shape (n, 3).
+
+    acc_world: (n, 3) specific force a - g in world axes, m/s^2 (+g along z at rest).
+    pwm: (n, 4), clamped to 0..65535. vbat_v: battery voltage, (n,) or one value,
+    V; thrust scales with (vbat / nominal)^2 where both are known, not at all
+    elsewhere; gaps hold the last known voltage. thrust_axis: (n, 3) or (3,), R e_z, default
+    (0, 0, 1). Other non-finite samples: `hold_finite`.
+    Raises AirTouchError when the shapes disagree.
+    """
+    acc_world, pwm = np.asarray(acc_world, dtype=np.float64), np.asarray(pwm, dtype=np.float64)
+    n = len(acc_world)
+    if acc_world.shape != (n, 3) or pwm.shape != (n, 4):
+        raise AirTouchError(f"disturbance force: needs (n, 3) accelerations and (n, 4) PWM, "
+                            f"not {acc_world.shape} and {pwm.shape}")
+    acc = hold_finite(acc_world)[0]
+    thrust = total_thrust(pwm, vehicle, vbat_v)
+    axis = np.array([0.0, 0.0, 1.0])
+    if thrust_axis is not None:
+        axis = hold_finite(np.broadcast_to(thrust_axis, (n, 3)), initial=axis)[0]
+    return vehicle.mass_kg * acc - thrust[:, None] * axis
+
+
+def total_thrust(pwm: np.ndarray, vehicle: Vehicle, vbat_v: np.ndarray | float | None = None) -> np.ndarray:
+    """Psi = H_0 W(m): the four motors' thrust in newtons, (n,), for PWM (n, 4)."""
+    held = np.clip(hold_finite(pwm)[0], 0.0, PWM_MAX)
+    return vehicle.thrust(held).sum(axis=1) * voltage_factor(len(held), vehicle, vbat_v)
+
+
+def voltage_factor(n: int, vehicle: Vehicle, vbat_v: np.ndarray | float | None) -> np.ndarray:
+    """(vbat / nominal)^2, (n,); 1 where either is unknown, the last known voltage held."""
+    if vbat_v is None or vehicle.nominal_voltage_v is None:
+        return np.ones(n)
+    volts = np.broadcast_to(np.asarray(vbat_v, dtype=np.float64), (n,))
+    known = np.where(np.isfinite(volts) & (volts > 0), volts, np.nan)
+    held = hold_finite(known, initial=vehicle.nominal_voltage_v)[0]
+    return np.square(held / vehicle.nominal_voltage_v)
+
+
+def force_norm(force: np.ndarray) -> np.ndarray:
+    """||f_w|| in newtons, (n,), for forces (n, 3)."""
+    return np.sqrt(np.square(force).sum(axis=1))
