@@ -49,7 +49,7 @@ def read(text: bytes, source: str) -> FlightLog:
 
 def to_bytes(log: FlightLog, compress: bool = False) -> bytes:
     """The file's bytes; every value is written so that it is read back exactly."""
-    lines = [f"# {key}: {json.dumps(value, default=_plain)}" for key, value in stored_meta(log).items()]
+    lines = [f"# {key}: {json.dumps(value, default=plain)}" for key, value in stored_meta(log).items()]
     names = ordered_names(log)
     lines.append(",".join(names))
     cells = [[_shortest(v) for v in log.columns[name].tolist()] for name in names]
@@ -95,5 +95,6 @@ def _value(text: str) -> Any:
         return text
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """What JSON lacks, as something that it has."""
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)

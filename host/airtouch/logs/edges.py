@@ -24,17 +24,18 @@ class Edge:
     height_after_m: float
 
 
-def true_edges(log: FlightLog) -> list[Edge]:
+def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
     """Edges in order of time.
 
     An edge is the first sample at which the down range falls (entry) or rises
     (exit) by more than 0.30 m within two samples, in flight. Steps within 0.1 s of
     it are the sensor settling and belong to it; a step from which the range comes
-    back within that time is a glitch and no edge. Raises AirTouchError when the log
+    back within that time is a glitch and no edge. `step_m` below 0.30
+    serves low platforms. Raises AirTouchError when the log
     has no `zrange_m` column.
     """
     height = _held(log["zrange_m"])
-    steps = np.flatnonzero(_largest_step(height) & _in_flight(log))
+    steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log))
     period = sample_period(log)
     settling = max(int(round(SETTLING_S / period)), 2)
     level = max(int(round(LEVEL_S / period)), 1)
@@ -46,16 +47,16 @@ def true_edges(log: FlightLog) -> list[Edge]:
         settled = sample + settling
         before = float(np.median(height[max(sample - level, 0):max(sample - 1, 1)]))
         after = float(np.median(height[settled:settled + level])) if settled < len(height) else float(height[-1])
-        if abs(after - before) > STEP_M:
+        if abs(after - before) > step_m:
             edges.append(Edge(int(sample), "entry" if after < before else "exit", before, after))
     return edges
 
 
-def _largest_step(height: np.ndarray) -> np.ndarray:
-    """Whether the range moved by more than STEP_M over the last one or two samples."""
+def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
+    """Whether the range moved by more than step_m over the last one or two samples."""
     moved = np.zeros(len(height), dtype=bool)
     for lag in (1, 2):
-        moved[lag:] |= np.abs(height[lag:] - height[:-lag]) > STEP_M + ROUNDING_M
+        moved[lag:] |= np.abs(height[lag:] - height[:-lag]) > step_m + ROUNDING_M
     return moved
 
 

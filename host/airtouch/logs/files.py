@@ -6,7 +6,7 @@ import zlib
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
-from airtouch.logs import authors, canonical
+from airtouch.logs import authors, canonical, crazypad, imrclab, usd
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 LARGEST_BYTES = 1 << 30  #: unpacked; more than this is no flight log
@@ -76,15 +76,13 @@ def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
 
 
 def _by_content(data: bytes, source: str) -> FlightLog:
-    if not data.strip():
+    if not data.strip(b" \t\r\n"):
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
     if data[:4] == b"PAR1":
         from airtouch.logs import parquet
 
         return parquet.read(data, source)
-    if data[0] == 0xBC:
-        from airtouch.logs import usd
-
+    if data[0] == usd.MAGIC:
         return usd.read(data, source)
     text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"\x00" in text:
@@ -99,7 +97,14 @@ def _by_header(text: bytes, source: str) -> FlightLog:
         return authors.read(text, source)
     if any(name in COLUMNS for name in names):
         return canonical.read(text, source)
-    raise AirTouchError(f"{source}:1: unknown header {first[:60].decode('ascii', 'replace')!r}")
+    if crazypad.matches(names):
+        return crazypad.read(text, source)
+    if imrclab.matches(names):
+        return imrclab.read(text, source)
+    if imrclab.is_thrust_stand(names):
+        raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
+    shown = first[:60].decode("ascii", "replace")
+    raise AirTouchError(f"{source}:1: unknown header {shown!r}; name the columns as in the table of columns")
 
 
 def _numeric(cell: str) -> bool:

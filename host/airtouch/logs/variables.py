@@ -1,0 +1,93 @@
+"""Crazyflie log variables (`acc.x`, `stateEstimate.vz`, ...) as columns of the schema.
+
+Units and frames: crazyflie-firmware's logging variables (acc in g, gyro in deg/s,
+`stateEstimate.pitch` with the legacy, inverted sign, `stateEstimate.a*` in g in the
+world frame without gravity, `stateEstimateZ.*` in mm with gravity).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from airtouch.logs.authors import GRAVITY, GYRO_LSB, range_m
+from airtouch.logs.flight_log import (
+    ACC, ACC_WORLD, ATTITUDE, AXES, GYRO, POSITION, PWM, RANGES, RPM, VELOCITY,
+)
+from airtouch.logs.quaternion import decompress, euler, to_body
+
+_DEGREE = np.pi / 180.0
+_MOTORS = (1, 2, 3, 4)
+
+#: groups of (variables, columns, factor); the first whose variables are all there is used
+_GROUPS = (
+    (tuple(f"acc.{a}" for a in AXES), ACC, GRAVITY),
+    (tuple(f"gyro.{a}" for a in AXES), GYRO, _DEGREE),
+    (tuple(f"gyro.{a}Raw" for a in AXES), GYRO, GYRO_LSB),
+    (tuple(f"pwm.m{i}_pwm" for i in _MOTORS), PWM, 1.0),
+    (tuple(f"motor.m{i}" for i in _MOTORS), PWM, 1.0),
+    (tuple(f"rpm.m{i}" for i in _MOTORS), RPM, 1.0),
+    (tuple(f"stateEstimate.{a}" for a in AXES), POSITION, 1.0),
+    (tuple(f"stateEstimateZ.{a}" for a in AXES), POSITION, 1e-3),
+    (tuple(f"stateEstimate.v{a}" for a in AXES), VELOCITY, 1.0),
+    (tuple(f"stateEstimateZ.v{a}" for a in AXES), VELOCITY, 1e-3),
+)
+_SINGLE = (
+    ("pm.vbat", "vbat_V", 1.0),
+    ("pm.vbatMV", "vbat_V", 1e-3),
+    ("stateEstimate.roll", ATTITUDE[0], _DEGREE),
+    ("stateEstimate.pitch", ATTITUDE[1], -_DEGREE),
+    ("stateEstimate.yaw", ATTITUDE[2], _DEGREE),
+)
+
+
+def to_columns(table: Mapping[str, np.ndarray], meta: dict[str, Any]) -> dict[str, np.ndarray]:
+    """The schema's columns from a table of variables, arrays (n,) float64.
+
+    Sets meta["acc_frame"] where there is an acceleration; variables that the schema
+    has no column for are left out.
+    """
+    columns: dict[str, np.ndarray] = {}
+    for variables, names, factor in _GROUPS:
+        if names[0] not in columns and all(v in table for v in variables):
+            columns |= {name: table[v] * factor for v, name in zip(variables, names, strict=True)}
+    for variable, name, factor in _SINGLE:
+        if variable in table and name not in columns:
+            columns[name] = table[variable] * factor
+    if "range.zrange" in table:
+        columns["zrange_m"] = range_m(table["range.zrange"])
+    for name in RANGES:
+        variable = f"range.{name.split('_')[1]}"
+        if variable in table:
+            columns[name] = range_m(table[variable], zero_is_invalid=True)
+    _attitude(table, columns)
+    _acceleration(table, columns, meta)
+    return columns
+
+
+def _attitude(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray]) -> None:
+    quaternion = [f"stateEstimate.q{a}" for a in ("x", "y", "z", "w")]
+    if all(v in table for v in quaternion):
+        columns |= dict(zip(ATTITUDE, euler(np.column_stack([table[v] for v in quaternion])), strict=True))
+    elif "stateEstimateZ.quat" in table and not all(name in columns for name in ATTITUDE):
+        columns |= dict(zip(ATTITUDE, euler(decompress(table["stateEstimateZ.quat"])), strict=True))
+
+
+def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    """World accelerations where the estimate is logged, and body ones from them where no IMU is."""
+    world = None
+    if all(f"stateEstimate.a{a}" in table for a in AXES):
+        world = np.column_stack([table[f"stateEstimate.a{a}"] for a in AXES]) * GRAVITY + (0, 0, GRAVITY)
+    elif all(f"stateEstimateZ.a{a}" in table for a in AXES):
+        world = np.column_stack([table[f"stateEstimateZ.a{a}"] for a in AXES]) * 1e-3
+    if world is not None:
+        columns |= dict(zip(ACC_WORLD, world.T, strict=True))
+    if ACC[0] in columns:
+        meta["acc_frame"] = "body"
+    elif world is not None and all(name in columns for name in ATTITUDE):
+        meta["acc_frame"] = "body"
+        columns |= dict(zip(ACC, to_body(world, *(columns[name] for name in ATTITUDE)).T, strict=True))
+    elif world is not None:
+        meta["acc_frame"] = "world"
+        meta["warnings"].append("attitude not fully logged: acc_* are in the world frame, not in the body's")
+        columns |= dict(zip(ACC, world.T, strict=True))
