@@ -1,0 +1,136 @@
+"""The paper's baseline (section 7.1): STFT power, Pearson correlations, second derivative.
+
+The raw channels go through the STFT, the power is accumulated over the whole
+spectrum at every timestamp, the correlations between the channels' powers are
+summed, and an edge is where the second derivative of that sum is zero.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch import kernels, logs
+from airtouch.detector import tuning
+from airtouch.detector.channels import nine_channels
+from airtouch.detector.score import SAMPLE_PERIOD_S
+from airtouch.detector.trace import Detection, Trace
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT, Parameters
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Settings; the paper names none of them, so threshold and lag are chosen on training flights.
+
+    correlation_window: samples over which channels are correlated. smoothing: samples
+    of the two means whose difference is the derivative. threshold: first derivative,
+    correlation sum per second, from which a zero of the second one counts:
+    noise alone crosses zero several times a second. lag_s: median delay in training.
+    """
+
+    correlation_window: int = 100
+    smoothing: int = 25
+    threshold: float = 12.0
+    lag_s: float = 0.0
+
+
+def run(log: FlightLog, model: Baseline | None = None) -> Trace:
+    """Edges of unknown kind ("edge") and no probability. Causal; power through the C kernels."""
+    settings = model or Baseline()
+    correlation = correlation_sum(spectrum_power(log), settings.correlation_window)
+    slope = derivative(correlation, settings.smoothing)
+    edges = [Detection(int(s), "edge") for s in extrema(slope, settings.threshold)]
+    return Trace(np.full(len(log), np.nan), edges, {"correlation sum": correlation, "derivative": slope})
+
+
+def fit(flights: Sequence[FlightLog], seed: int = 0, **_: Any) -> Baseline:
+    """Threshold, smoothing and lag for the best timed F1 over the training flights. Nothing is random."""
+    truth = [logs.true_edges(log) for log in flights]
+    correlations = [correlation_sum(spectrum_power(log), Baseline.correlation_window) for log in flights]
+    slopes = {s: [derivative(c, s) for c in correlations] for s in (25, 50, 100)}
+    candidates = [
+        Baseline(smoothing=smoothing, threshold=float(np.quantile(np.abs(np.concatenate(found)), q)))
+        for smoothing, found in ((s, [np.nan_to_num(x) for x in xs]) for s, xs in slopes.items())
+        for q in (0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)
+    ]
+
+    def detect(settings: Baseline, i: int) -> list[Detection]:
+        return [Detection(int(s), "edge") for s in extrema(slopes[settings.smoothing][i], settings.threshold)]
+
+    chosen, lag_s, _score = tuning.choose(candidates, truth, detect)
+    return replace(chosen, lag_s=lag_s)
+
+
+def load(path: Path) -> Baseline:
+    """Settings from an `.npz` written by `save`; raises AirTouchError for anything else."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if str(file["detector"]) != "baseline":
+                raise KeyError("detector")
+            return Baseline(int(file["correlation_window"]), int(file["smoothing"]), float(file["threshold"]),
+                            float(file["lag_s"]))
+    except (OSError, KeyError, ValueError, EOFError) as error:
+        raise AirTouchError(f"{path}: not a baseline model ({error})") from None
+
+
+def parameters(model: Baseline | None) -> dict[str, Any]:
+    """What a report prints."""
+    return asdict(model or Baseline())
+
+
+def spectrum_power(log: FlightLog, pipeline: Parameters = DEFAULT) -> np.ndarray:
+    """(n, 9) power of the nine raw channels over the whole spectrum but zero frequency."""
+    bin_hz = pipeline.sample_rate_hz / pipeline.band_window
+    return kernels.band_power(nine_channels(log), sample_rate_hz=pipeline.sample_rate_hz,
+                              window=pipeline.band_window, band_hz=(bin_hz, pipeline.sample_rate_hz / 2))
+
+
+def correlation_sum(power: np.ndarray, window: int) -> np.ndarray:
+    """(n,) sum of Pearson's r over all pairs of columns of power (n, c), last `window` samples, causal.
+
+    NaN before the window is full; a column that is constant in it correlates with none.
+    """
+    result = np.full(len(power), np.nan)
+    known = np.isfinite(power).all(axis=1)
+    first = int(np.argmax(known)) if known.any() else len(power)
+    if len(power) - first < window:
+        return result
+    # sum over pairs of z_a . z_b = (|sum of z|^2 - number of columns that vary) / 2
+    windows = np.lib.stride_tricks.sliding_window_view(power[first:].astype(np.float64), window, axis=0)
+    centred = windows - windows.mean(axis=-1, keepdims=True)
+    norm = np.sqrt(np.square(centred).sum(axis=-1, keepdims=True))
+    varies = norm > 1e-9 * np.abs(windows).max(axis=-1, keepdims=True)
+    z = np.divide(centred, norm, out=np.zeros_like(centred), where=varies)
+    result[first + window - 1:] = 0.5 * (np.square(z.sum(axis=1)).sum(axis=-1) - varies.sum(axis=(1, 2)))
+    return result
+
+
+def derivative(values: np.ndarray, smoothing: int) -> np.ndarray:
+    """(n,) causal derivative per second: difference of the means of the last two `smoothing` samples.
+
+    NaN until 2 * smoothing finite samples are there.
+    """
+    result = np.full(len(values), np.nan)
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known) < 2 * smoothing:
+        return result
+    first = int(known[0])
+    total = np.concatenate([[0.0], np.cumsum(values[first:])])
+    means = (total[smoothing:] - total[:-smoothing]) / smoothing
+    result[first + 2 * smoothing - 1:] = (means[smoothing:] - means[:-smoothing]) / (smoothing * SAMPLE_PERIOD_S)
+    return result
+
+
+def extrema(slope: np.ndarray, threshold: float) -> np.ndarray:
+    """Samples at which the second derivative is seen to cross zero while |slope| is above the threshold.
+
+    One sample after the extremum: the first at which it is known. Rising and falling alike.
+    """
+    step = np.sign(np.diff(slope))  # NaN where unknown: compares as no crossing
+    with np.errstate(invalid="ignore"):
+        crossing = (step[1:] != step[:-1]) & (step[:-1] * slope[1:-1] > 0) & np.isfinite(step[1:])
+        return np.flatnonzero(crossing & (np.abs(slope[1:-1]) >= threshold)) + 2

@@ -1,0 +1,72 @@
+"""The baseline's parts against SciPy, NumPy and closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import ShortTimeFFT
+from scipy.signal.windows import hann
+
+from airtouch.detector.baseline import Baseline, correlation_sum, derivative, extrema, load, run, spectrum_power
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog
+
+
+def noisy_log(seed=0, n=900):
+    rng = np.random.default_rng(seed)
+    columns = {name: rng.normal(size=n) for name in ACC_WORLD + GYRO}
+    columns |= {name: 45000 + 800 * rng.normal(size=n) for name in PWM}
+    return FlightLog(columns, {"source": "noise", "sample_period_s": 0.01})
+
+
+def test_power_is_the_whole_stft_spectrum():
+    log = noisy_log()
+    power = spectrum_power(log)
+    gyro = log["gyro_y_radps"]
+    stft = ShortTimeFFT(hann(200, sym=False), 1, 100.0, fft_mode="onesided2X", scale_to="psd")
+    last = gyro[-200:] - gyro[-200:].mean()
+    psd = np.abs(stft.stft_detrend(last, None, p0=100, p1=101)) ** 2
+    psd[-1] /= 2  # onesided2X doubles the bin at half the sample rate, too
+    assert power[-1, 4] == pytest.approx(psd[1:].sum() * stft.delta_f, rel=1e-4)
+
+
+def test_correlation_sum_is_the_sum_over_pairs():
+    power = np.random.default_rng(3).exponential(size=(160, 9))
+    power[:20] = np.nan
+    found = correlation_sum(power, 60)
+    assert np.isnan(found[:79]).all() and np.isfinite(found[79:]).all()
+    matrix = np.corrcoef(power[100:160].T)
+    assert found[-1] == pytest.approx(matrix[np.triu_indices(9, 1)].sum(), abs=1e-9)
+
+
+def test_a_constant_channel_correlates_with_none():
+    power = np.random.default_rng(4).exponential(size=(80, 3))
+    power[:, 2] = 7.0
+    assert correlation_sum(power, 80)[-1] == pytest.approx(np.corrcoef(power[:, 0], power[:, 1])[0, 1])
+
+
+def test_derivative_of_a_ramp_is_its_slope():
+    found = derivative(np.r_[np.full(5, np.nan), 3.0 * 0.01 * np.arange(200)], 25)
+    assert np.isnan(found[:54]).all()
+    assert found[54:] == pytest.approx(3.0)
+
+
+@given(st.integers(30, 60), st.sampled_from([-1.0, 1.0]))
+def test_a_bump_in_the_derivative_is_one_edge_one_sample_late(centre, sign):
+    slope = sign * 10 * np.exp(-0.5 * ((np.arange(100) - centre) / 5.0) ** 2)
+    assert extrema(slope, 5.0).tolist() == [centre + 1]
+    assert extrema(slope, 11.0).tolist() == []
+
+
+def test_run_is_causal():
+    log = noisy_log(5)
+    model = Baseline(threshold=2.0)
+    whole = run(log, model).edges
+    assert whole and [e.sample for e in run(log.slice(0, 600), model).edges] == [
+        e.sample for e in whole if e.sample < 600]
+
+
+def test_a_foreign_model_is_refused(tmp_path):
+    np.savez(tmp_path / "m.npz", detector="paper")
+    with pytest.raises(AirTouchError, match="not a baseline model"):
+        load(tmp_path / "m.npz")
