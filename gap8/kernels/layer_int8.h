@@ -1,0 +1,39 @@
+// One layer of an int8 network, and the shapes that every kernel here shares.
+//
+// Activations lie as rows, columns, channels (HWC), channels innermost.
+// r = scale * (q - zero point); weights are symmetric (zero point 0), one scale
+// per output channel, in [-127, 127]. The zero point of the input is folded into
+// the bias by whoever makes the layer:
+//   bias'[o] = bias[o] - inputZeroPoint * sum(weights of o)
+// so that the inner loops are plain dot products of int8.
+#pragma once
+
+#include <stdint.h>
+
+typedef enum {
+  LAYER_CONV = 0,          // convInt8: stride 1, no padding
+  LAYER_MAX_POOL = 1,      // maxPoolInt8: stride = kernel, no padding, remainder dropped
+  LAYER_DENSE = 2,         // denseInt8: input taken as one vector
+  LAYER_SPARSE_DENSE = 3,  // sparseDenseInt8: dense layer whose weights are blocks of four
+} layerKind_t;
+
+typedef struct {
+  int32_t kind;  // a layerKind_t
+  int32_t inRows;
+  int32_t inColumns;
+  int32_t inChannels;
+  int32_t outRows;
+  int32_t outColumns;
+  int32_t outChannels;
+  int32_t kernelRows;     // conv, pool; else 1
+  int32_t kernelColumns;  // conv, pool; else 1
+  int32_t outputZeroPoint;
+  int32_t outputMin;  // clamp of the output; a ReLU is outputMin = outputZeroPoint
+  int32_t outputMax;
+  const int8_t *weights;        // conv: [out][row][column][in]; dense: [out][in]; sparse: [block][4]
+  const int32_t *bias;          // [out], input zero point folded in
+  const int32_t *multiplier;    // [out], Q31 mantissa of inputScale * weightScale / outputScale
+  const int8_t *shift;          // [out], its exponent: positive is a shift to the left
+  const uint16_t *blockCounts;  // sparse: blocks of each output channel
+  const uint8_t *blockSkips;    // sparse: blocks of four inputs to skip before each block
+} layerInt8_t;

@@ -1,0 +1,97 @@
+#include "network_int8.h"
+
+#include <math.h>
+
+#include "conv_int8.h"
+#include "dense_int8.h"
+#include "max_pool_int8.h"
+#include "sparse_dense_int8.h"
+
+static int32_t inputSize(const layerInt8_t *layer) {
+  return layer->inRows * layer->inColumns * layer->inChannels;
+}
+
+static int32_t outputSize(const layerInt8_t *layer) {
+  return layer->outRows * layer->outColumns * layer->outChannels;
+}
+
+// Room that so many activations take in the arena, where each tensor is aligned to 4 bytes.
+static int32_t aligned(int32_t bytes) {
+  return (bytes + 3) & ~3;
+}
+
+int32_t networkInt8ArenaBytes(const networkInt8_t *network) {
+  int32_t largest = 0;
+  for (int32_t i = 0; i < network->layerCount; i++) {
+    const layerInt8_t *layer = &network->layers[i];
+    const int32_t bytes = (i > 0 ? aligned(inputSize(layer)) : 0) + aligned(outputSize(layer));
+    largest = bytes > largest ? bytes : largest;
+  }
+  return largest;
+}
+
+static int layerFits(const layerInt8_t *layer) {
+  if (layer->inRows < 1 || layer->inColumns < 1 || layer->inChannels < 1 || layer->outChannels < 1 ||
+      layer->kernelRows < 1 || layer->kernelColumns < 1) {
+    return 0;
+  }
+  switch (layer->kind) {
+    case LAYER_CONV:
+      return layer->outRows >= 1 && layer->outRows == layer->inRows - layer->kernelRows + 1 &&
+             layer->outColumns >= 1 && layer->outColumns == layer->inColumns - layer->kernelColumns + 1;
+    case LAYER_MAX_POOL:
+      return layer->outRows >= 1 && layer->outRows == layer->inRows / layer->kernelRows &&
+             layer->outColumns >= 1 && layer->outColumns == layer->inColumns / layer->kernelColumns &&
+             layer->outChannels == layer->inChannels;
+    case LAYER_DENSE:
+      return layer->outRows == 1 && layer->outColumns == 1;
+    case LAYER_SPARSE_DENSE:
+      return layer->outRows == 1 && layer->outColumns == 1 && inputSize(layer) % 4 == 0;
+    default:
+      return 0;
+  }
+}
+
+int32_t networkInt8Check(const networkInt8_t *network) {
+  for (int32_t i = 0; i < network->layerCount; i++) {
+    const layerInt8_t *layer = &network->layers[i];
+    if (!layerFits(layer) || (i > 0 && inputSize(layer) != outputSize(layer - 1))) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+void networkInt8Quantise(const networkInt8_t *network, const float *x, int32_t count, int8_t *q) {
+  for (int32_t i = 0; i < count; i++) {
+    const float zeroPoint = (float)network->inputZeroPoint;
+    float value = floorf(x[i] / network->inputScale + 0.5f) + zeroPoint;
+    value = value == value ? value : zeroPoint;
+    value = value < -128.0f ? -128.0f : value;
+    value = value > 127.0f ? 127.0f : value;
+    q[i] = (int8_t)value;
+  }
+}
+
+static void runLayer(const layerInt8_t *layer, const int8_t *input, int8_t *output) {
+  switch (layer->kind) {
+    case LAYER_CONV: convInt8(layer, input, output); break;
+    case LAYER_MAX_POOL: maxPoolInt8(layer, input, output); break;
+    case LAYER_DENSE: denseInt8(layer, input, output); break;
+    default: sparseDenseInt8(layer, input, output); break;
+  }
+}
+
+const int8_t *networkInt8Run(const networkInt8_t *network, const int8_t *input, int8_t *arena) {
+  // Outputs alternate between the start and the end of the arena, so that a layer
+  // never writes over its own input.
+  const int32_t bytes = networkInt8ArenaBytes(network);
+  const int8_t *x = input;
+  for (int32_t i = 0; i < network->layerCount; i++) {
+    const layerInt8_t *layer = &network->layers[i];
+    int8_t *y = i % 2 == 0 ? arena : arena + bytes - aligned(outputSize(layer));
+    runLayer(layer, x, y);
+    x = y;
+  }
+  return x;
+}

@@ -1,0 +1,39 @@
+// From an int32 accumulator to an int8 activation: the one rounding of this project.
+//
+// gemmlowp's double rounding, as TensorFlow Lite Micro does it: a saturating,
+// rounding, doubling high multiplication (ties away from zero), then a rounding
+// shift to the right (ties away from zero). Equal to tflite-micro to the last bit.
+#pragma once
+
+#include <stdint.h>
+
+// round(a * b / 2^31), saturated. Ties away from zero.
+static inline int32_t roundingDoublingHighMultiply(int32_t a, int32_t b) {
+  if (a == INT32_MIN && b == INT32_MIN) {
+    return INT32_MAX;
+  }
+  const int64_t product = (int64_t)a * (int64_t)b;
+  const int64_t nudge = product >= 0 ? (1LL << 30) : 1LL - (1LL << 30);
+  return (int32_t)((product + nudge) / (1LL << 31));
+}
+
+// round(x / 2^exponent) for exponent 0 to 31. Ties away from zero.
+// Needs >> of a negative number to be arithmetic, as on every target here.
+static inline int32_t roundingShiftRight(int32_t x, int32_t exponent) {
+  const int32_t mask = (int32_t)((1LL << exponent) - 1);
+  const int32_t threshold = (mask >> 1) + (x < 0 ? 1 : 0);
+  return (x >> exponent) + ((x & mask) > threshold ? 1 : 0);
+}
+
+// The activation of an accumulator. The product accumulator * 2^shift must fit
+// in int32 for a positive shift, as it does for every layer that training makes.
+static inline int8_t requantise(int32_t accumulator, int32_t multiplier, int32_t shift,
+                                int32_t zeroPoint, int32_t min, int32_t max) {
+  const int32_t left = shift > 0 ? shift : 0;
+  const int32_t right = shift > 0 ? 0 : -shift;
+  const int32_t scaled = (int32_t)((uint32_t)accumulator << left);
+  int32_t value = roundingShiftRight(roundingDoublingHighMultiply(scaled, multiplier), right) + zeroPoint;
+  value = value < min ? min : value;
+  value = value > max ? max : value;
+  return (int8_t)value;
+}

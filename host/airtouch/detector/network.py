@@ -1,0 +1,91 @@
+"""The paper's network (section 5.2): its shapes, its weights, and Keras and C views of them.
+
+Input (100, 3, 1); 16 filters of 3 x 1, ReLU, pool 2 x 1; 32 filters of 3 x 1, ReLU, pool
+2 x 1; dense 16, ReLU; dense 2. It gives logits: softmax comes after, outside the network.
+36,944 weights and 66 biases.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from airtouch.kernels.network import FloatLayer
+
+if TYPE_CHECKING:
+    import keras
+
+INPUT_SHAPE = (100, 3, 1)  #: rows (samples), columns (sensors), channels
+WEIGHTED = ("conv1", "conv2", "dense1", "dense2")
+#: Keras kernels: convolutions (rows, columns, in, out), dense (in, out).
+KERNEL_SHAPES = {"conv1": (3, 1, 1, 16), "conv2": (3, 1, 16, 32), "dense1": (2208, 16), "dense2": (16, 2)}
+#: kind, weights, input shape, output shape, kernel, ReLU: what every view is made of.
+GRAPH = (
+    ("conv", "conv1", (100, 3, 1), (98, 3, 16), (3, 1), True),
+    ("max_pool", None, (98, 3, 16), (49, 3, 16), (2, 1), False),
+    ("conv", "conv2", (49, 3, 16), (47, 3, 32), (3, 1), True),
+    ("max_pool", None, (47, 3, 32), (23, 3, 32), (2, 1), False),
+    ("dense", "dense1", (23, 3, 32), (1, 1, 16), (1, 1), True),
+    ("dense", "dense2", (1, 1, 16), (1, 1, 2), (1, 1), False),
+)
+
+Weights = Mapping[str, np.ndarray]  #: "conv1.kernel", "conv1.bias", ... float32, as Keras lays them out
+
+
+def weight_shapes() -> dict[str, tuple[int, ...]]:
+    """Name and shape of each float array of the network."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    for name, shape in KERNEL_SHAPES.items():
+        shapes[f"{name}.kernel"] = shape
+        shapes[f"{name}.bias"] = shape[-1:]
+    return shapes
+
+
+def float_layers(weights: Weights) -> list[FloatLayer]:
+    """The network for `airtouch.kernels.network.infer_float`."""
+    return [FloatLayer(kind, before, after, kernel, relu) if name is None else
+            FloatLayer(kind, before, after, kernel, relu, kernel_of_c(weights[f"{name}.kernel"]),
+                       weights[f"{name}.bias"])
+            for kind, name, before, after, kernel, relu in GRAPH]
+
+
+def kernel_of_c(kernel: np.ndarray) -> np.ndarray:
+    """A Keras kernel with its output channel first, as the C kernels and TFLite lay it out."""
+    return np.ascontiguousarray(np.moveaxis(kernel, -1, 0))
+
+
+def build_keras(constraints: Mapping[str, object] | None = None) -> "keras.Model":
+    """The network in Keras, with a kernel constraint for each layer named."""
+    import keras
+
+    constraints = constraints or {}
+
+    def conv(name: str) -> keras.Layer:
+        rows, columns, _, filters = KERNEL_SHAPES[name]
+        return keras.layers.Conv2D(filters, (rows, columns), activation="relu", name=name,
+                                   kernel_constraint=constraints.get(name))
+
+    def dense(name: str, activation: str | None) -> keras.Layer:
+        return keras.layers.Dense(KERNEL_SHAPES[name][1], activation=activation, name=name,
+                                  kernel_constraint=constraints.get(name))
+
+    return keras.Sequential([
+        keras.Input(INPUT_SHAPE), conv("conv1"), keras.layers.MaxPooling2D((2, 1)),
+        conv("conv2"), keras.layers.MaxPooling2D((2, 1)), keras.layers.Flatten(),
+        dense("dense1", "relu"), dense("dense2", None),
+    ], name="airtouch_paper")
+
+
+def weights_of_keras(model: "keras.Model") -> dict[str, np.ndarray]:
+    """The arrays of `weight_shapes` out of a Keras model."""
+    arrays = {}
+    for name in WEIGHTED:
+        kernel, bias = model.get_layer(name).get_weights()
+        arrays[f"{name}.kernel"], arrays[f"{name}.bias"] = kernel, bias
+    return arrays
+
+
+def set_weights_of_keras(model: "keras.Model", weights: Weights) -> None:
+    """The inverse of `weights_of_keras`."""
+    for name in WEIGHTED:
+        model.get_layer(name).set_weights([weights[f"{name}.kernel"], weights[f"{name}.bias"]])

@@ -1,0 +1,181 @@
+"""The int8 and float network of gap8/kernels, whole batches and whole flights in one call."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.kernels.library import ffi, lib
+from airtouch.reference.int8_network import Int8Layer, Int8Network, runs_sparse, sparse_blocks
+
+_KIND = {"conv": 0, "max_pool": 1, "dense": 2}
+_SPARSE_DENSE = 3
+
+
+class Model(Protocol):
+    """What these functions need of a trained model."""
+
+    int8: Int8Network
+
+
+@dataclass(frozen=True)
+class FloatLayer:
+    """One layer in float; shapes and weights laid out as `Int8Layer` does, a pool has no weights."""
+
+    kind: str
+    input_shape: tuple[int, int, int]
+    output_shape: tuple[int, int, int]
+    kernel: tuple[int, int]
+    relu: bool = False
+    weights: np.ndarray | None = None
+    bias: np.ndarray | None = None
+
+
+def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
+    """int8 logits (n, 2) of normalised windows (n, 100, 3), float32. Reference: `int8_network.infer_int8`.
+
+    Raises AirTouchError for windows of another shape than the model takes.
+    """
+    flat, keep = _flat_int8(model.int8)
+    x = np.ascontiguousarray(_windows(model.int8.input_shape, windows), dtype=np.float32)
+    quantised = np.empty(x.shape, dtype=np.int8)
+    lib.networkInt8BatchQuantise(flat, _pointer("float", x), x.size, _pointer("int8_t", quantised))
+    return run_int8(model.int8, quantised)
+
+
+def run_int8(network: Int8Network, quantised: np.ndarray) -> np.ndarray:
+    """int8 outputs (n, outputs) of quantised inputs (n, ...). Reference: `int8_network.run`."""
+    flat, keep = _flat_int8(network)
+    x = np.ascontiguousarray(_windows(network.input_shape, quantised), dtype=np.int8)
+    outputs = np.empty((len(x), network.outputs), dtype=np.int8)
+    lib.networkInt8Batch(flat, _pointer("int8_t", x), len(x), _arena(flat), _pointer("int8_t", outputs))
+    return outputs
+
+
+def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray:
+    """float32 outputs (n, outputs) of normalised windows, through the float kernels.
+
+    Raises AirTouchError for windows of another shape and for layers that do not fit each other.
+    """
+    x = np.ascontiguousarray(_windows(layers[0].input_shape, windows), dtype=np.float32)
+    shapes = np.array([[_KIND[layer.kind], *layer.input_shape, *layer.output_shape, *layer.kernel,
+                        layer.relu, 0, 0] for layer in layers], dtype=np.int32)
+    weighted = [layer for layer in layers if layer.kind != "max_pool"]
+    weights = _joined([layer.weights for layer in weighted], np.float32)
+    bias = _joined([layer.bias for layer in weighted], np.float32)
+    flat = ffi.new("flatNetworkFloat_t *", {
+        "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
+        "shapes": _pointer("int32_t", shapes), "weights": _pointer("float", weights),
+        "bias": _pointer("float", bias)})
+    size = _checked(lib.networkFloatBatchArena(flat))
+    outputs = np.empty((len(x), int(np.prod(layers[-1].output_shape))), dtype=np.float32)
+    lib.networkFloatBatch(flat, _pointer("float", x), len(x), ffi.new("float[]", size), _pointer("float", outputs))
+    return outputs
+
+
+def probability(model: Model, windows: np.ndarray) -> np.ndarray:
+    """P(over a platform), (n,), of normalised windows (n, 100, 3): softmax of the int8 logits."""
+    return _softmax(model.int8, infer_int8(model, windows))
+
+
+def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
+    """P(over a platform) at each sample of a flight, (n,), from its fused features (n, 3).
+
+    Row i: the window of features i - 99 to i, z-scored by itself, quantised, through the
+    network, all in C. NaN where that window is not full or holds a value that is not finite.
+    """
+    network = model.int8
+    rows, columns, channels = network.input_shape
+    x = np.ascontiguousarray(features, dtype=np.float32)
+    if x.ndim != 2 or x.shape[1] != columns * channels:
+        raise AirTouchError(f"network: needs features (n, {columns * channels}), not {x.shape}")
+    flat, keep = _flat_int8(network)
+    window, quantised = np.empty(rows * x.shape[1], np.float32), np.empty(rows * x.shape[1], np.int8)
+    logits, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
+    lib.networkInt8Flight(flat, _pointer("float", x), len(x), x.shape[1], rows, _pointer("float", window),
+                          _pointer("int8_t", quantised), _arena(flat), _pointer("int8_t", logits),
+                          _pointer("uint8_t", valid))
+    return np.where(valid, _softmax(network, logits), np.nan)
+
+
+def parameter_bytes(network: Int8Network) -> int:
+    """Bytes that the network's constants take on the GAP8: weights, block skips and counts, bias,
+    multiplier and shift."""
+    total = 0
+    for layer in network.layers:
+        if layer.kind != "max_pool":
+            weights, counts, skips = packed_weights(layer)
+            total += weights.size + 2 * counts.size + skips.size + 9 * len(layer.bias)
+    return total
+
+
+def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A layer's weights, block counts and block skips as the C kernels take them; the last two are
+    empty where the layer keeps all its weights."""
+    if runs_sparse(layer):
+        return sparse_blocks(layer.weights)
+    return layer.weights, np.zeros(0, np.uint16), np.zeros(0, np.uint8)
+
+
+def layer_shape(layer: Int8Layer) -> list[int]:
+    """The twelve integers of `flatNetworkInt8_t.shapes`."""
+    kind = _SPARSE_DENSE if runs_sparse(layer) else _KIND[layer.kind]
+    return [kind, *layer.input_shape, *layer.output_shape, *layer.kernel,
+            layer.output_zero_point, layer.output_min, 127]
+
+
+def _flat_int8(network: Int8Network) -> tuple[object, list[np.ndarray]]:
+    """The C view of a network, and the arrays that must outlive it."""
+    weighted = [layer for layer in network.layers if layer.kind != "max_pool"]
+    packed = [packed_weights(layer) for layer in weighted]
+    multipliers = [layer.multipliers() for layer in weighted]
+    weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
+                              zip(zip(*packed), (np.int8, np.uint16, np.uint8)))
+    bias = _joined([layer.folded_bias() for layer in weighted], np.int32)
+    multiplier, shift = (_joined(parts, dtype) for parts, dtype in zip(zip(*multipliers), (np.int32, np.int8)))
+    shapes = np.array([layer_shape(layer) for layer in network.layers], dtype=np.int32)
+    flat = ffi.new("flatNetworkInt8_t *", {
+        "layerCount": len(network.layers), "weightCount": weights.size, "channelCount": bias.size,
+        "blockCount": skips.size, "shapes": _pointer("int32_t", shapes), "weights": _pointer("int8_t", weights),
+        "bias": _pointer("int32_t", bias), "multiplier": _pointer("int32_t", multiplier),
+        "shift": _pointer("int8_t", shift), "blockCounts": _pointer("uint16_t", counts),
+        "blockSkips": _pointer("uint8_t", skips), "inputScale": network.layers[0].input_scale,
+        "inputZeroPoint": network.layers[0].input_zero_point})
+    _checked(lib.networkInt8BatchArena(flat))
+    return flat, [shapes, weights, bias, multiplier, shift, counts, skips]
+
+
+def _checked(size: int) -> int:
+    if size < 0:
+        raise AirTouchError(f"network: layer {-size - 1} does not fit its weights or its neighbours")
+    return size
+
+
+def _windows(shape: tuple[int, int, int], windows: np.ndarray) -> np.ndarray:
+    """(n, inputs) from (n, rows, columns) or anything with as many values a row."""
+    windows = np.asarray(windows)
+    size = int(np.prod(shape))
+    if windows.ndim < 2 or int(np.prod(windows.shape[1:])) != size:
+        raise AirTouchError(f"network: needs windows (n, {shape[0]}, {shape[1] * shape[2]}), not {windows.shape}")
+    return windows.reshape(len(windows), size)
+
+
+def _softmax(network: Int8Network, logits: np.ndarray) -> np.ndarray:
+    difference = logits[:, 1].astype(np.float64) - logits[:, 0]
+    return 1.0 / (1.0 + np.exp(-network.layers[-1].output_scale * difference))
+
+
+def _arena(flat: object) -> object:
+    return ffi.new("int8_t[]", lib.networkInt8BatchArena(flat))
+
+
+def _pointer(kind: str, array: np.ndarray) -> object:
+    return ffi.cast(f"{kind} *", array.ctypes.data)
+
+
+def _joined(parts: list[np.ndarray], dtype: type) -> np.ndarray:
+    """One flat array; never empty, so that its pointer is valid."""
+    joined = np.concatenate([np.ravel(part) for part in parts] + [np.zeros(0)])
+    return np.ascontiguousarray(joined if joined.size else np.zeros(1), dtype=dtype)

@@ -1,0 +1,203 @@
+#include "network_batch.h"
+
+#include <math.h>
+
+#include "network_float.h"
+#include "network_int8.h"
+
+enum { MAX_LAYERS = 32, SHAPE_COLUMNS = 12 };
+
+static int32_t inputs(const int32_t *shape) {
+  return shape[1] * shape[2] * shape[3];
+}
+
+// Weights of a layer that keeps all of them; 0 for a pool.
+static int32_t weights(const int32_t *shape) {
+  if (shape[0] == LAYER_CONV) {
+    return shape[6] * shape[7] * shape[8] * shape[3];
+  }
+  return shape[0] == LAYER_DENSE ? shape[6] * inputs(shape) : 0;
+}
+
+// The layers with pointers into the flat arrays; -1, or the first layer that does not fit.
+static int32_t unpackInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers, networkInt8_t *network) {
+  int32_t weight = 0, channel = 0, sparseChannel = 0, block = 0;
+  if (flat->layerCount < 1 || flat->layerCount > MAX_LAYERS) {
+    return 0;
+  }
+  *network = (networkInt8_t){.layers = layers, .layerCount = flat->layerCount,
+                             .inputScale = flat->inputScale, .inputZeroPoint = flat->inputZeroPoint};
+  for (int32_t i = 0; i < flat->layerCount; i++) {
+    const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
+    layers[i] = (layerInt8_t){.kind = s[0], .inRows = s[1], .inColumns = s[2], .inChannels = s[3],
+                              .outRows = s[4], .outColumns = s[5], .outChannels = s[6],
+                              .kernelRows = s[7], .kernelColumns = s[8], .outputZeroPoint = s[9],
+                              .outputMin = s[10], .outputMax = s[11],
+                              .weights = flat->weights + weight, .bias = flat->bias + channel,
+                              .multiplier = flat->multiplier + channel, .shift = flat->shift + channel,
+                              .blockCounts = flat->blockCounts + sparseChannel,
+                              .blockSkips = flat->blockSkips + block};
+    if (s[0] != LAYER_MAX_POOL) {
+      channel += s[6];
+    }
+    if (channel > flat->channelCount) {
+      return i;
+    }
+    if (s[0] == LAYER_SPARSE_DENSE) {
+      for (int32_t o = 0; o < s[6]; o++) {
+        int32_t reached = 0;  // blocks of input passed over or used
+        for (int32_t b = flat->blockCounts[sparseChannel++]; b > 0; b--) {
+          if (block >= flat->blockCount) {
+            return i;
+          }
+          reached += flat->blockSkips[block++] + 1;
+          weight += 4;
+        }
+        if (4 * reached > inputs(s)) {
+          return i;
+        }
+      }
+    }
+    weight += weights(s);
+    if (weight > flat->weightCount) {
+      return i;
+    }
+  }
+  return networkInt8Check(network);
+}
+
+static void unpackFloat(const flatNetworkFloat_t *flat, layerFloat_t *layers, networkFloat_t *network) {
+  const float *weight = flat->weights;
+  const float *bias = flat->bias;
+  for (int32_t i = 0; i < flat->layerCount; i++) {
+    const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
+    layers[i] = (layerFloat_t){.kind = s[0], .inRows = s[1], .inColumns = s[2], .inChannels = s[3],
+                               .outRows = s[4], .outColumns = s[5], .outChannels = s[6],
+                               .kernelRows = s[7], .kernelColumns = s[8], .relu = s[9],
+                               .weights = weight, .bias = bias};
+    weight += weights(s);
+    bias += s[0] == LAYER_MAX_POOL ? 0 : s[6];
+  }
+  *network = (networkFloat_t){.layers = layers, .layerCount = flat->layerCount};
+}
+
+int32_t networkInt8BatchArena(const flatNetworkInt8_t *flat) {
+  layerInt8_t layers[MAX_LAYERS];
+  networkInt8_t network;
+  const int32_t wrong = unpackInt8(flat, layers, &network);
+  return wrong < 0 ? networkInt8ArenaBytes(&network) : -1 - wrong;
+}
+
+int32_t networkFloatBatchArena(const flatNetworkFloat_t *flat) {
+  layerFloat_t layers[MAX_LAYERS];
+  networkFloat_t network;
+  int32_t weight = 0, channel = 0;
+  if (flat->layerCount < 1 || flat->layerCount > MAX_LAYERS) {
+    return -1;
+  }
+  for (int32_t i = 0; i < flat->layerCount; i++) {
+    const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
+    weight += weights(s);
+    channel += s[0] == LAYER_MAX_POOL ? 0 : s[6];
+    if (s[0] == LAYER_SPARSE_DENSE || weight > flat->weightCount || channel > flat->channelCount) {
+      return -1 - i;
+    }
+  }
+  unpackFloat(flat, layers, &network);
+  return networkFloatArenaSize(&network);
+}
+
+void networkInt8Batch(const flatNetworkInt8_t *flat, const int8_t *rows, int32_t count,
+                      int8_t *arena, int8_t *outputs) {
+  layerInt8_t layers[MAX_LAYERS];
+  networkInt8_t network;
+  if (unpackInt8(flat, layers, &network) >= 0) {
+    return;
+  }
+  const int32_t inputCount = inputs(flat->shapes);
+  const layerInt8_t *last = &layers[flat->layerCount - 1];
+  const int32_t outputCount = last->outRows * last->outColumns * last->outChannels;
+  for (int32_t i = 0; i < count; i++) {
+    const int8_t *result = networkInt8Run(&network, rows + (int64_t)i * inputCount, arena);
+    for (int32_t j = 0; j < outputCount; j++) {
+      *outputs++ = result[j];
+    }
+  }
+}
+
+void networkFloatBatch(const flatNetworkFloat_t *flat, const float *rows, int32_t count,
+                       float *arena, float *outputs) {
+  layerFloat_t layers[MAX_LAYERS];
+  networkFloat_t network;
+  unpackFloat(flat, layers, &network);
+  const int32_t inputCount = inputs(flat->shapes);
+  const layerFloat_t *last = &layers[flat->layerCount - 1];
+  const int32_t outputCount = last->outRows * last->outColumns * last->outChannels;
+  for (int32_t i = 0; i < count; i++) {
+    const float *result = networkFloatRun(&network, rows + (int64_t)i * inputCount, arena);
+    for (int32_t j = 0; j < outputCount; j++) {
+      *outputs++ = result[j];
+    }
+  }
+}
+
+void networkInt8BatchQuantise(const flatNetworkInt8_t *flat, const float *x, int32_t count, int8_t *q) {
+  const networkInt8_t network = {.inputScale = flat->inputScale, .inputZeroPoint = flat->inputZeroPoint};
+  networkInt8Quantise(&network, x, count, q);
+}
+
+// Each column to mean 0 and population standard deviation 1; a constant column to 0.
+static void zScore(const float *features, int32_t rows, int32_t columns, float *window) {
+  for (int32_t c = 0; c < columns; c++) {
+    const float first = features[c];
+    float span = 0.0f;
+    for (int32_t r = 0; r < rows; r++) {
+      span = fmaxf(span, fabsf(features[r * columns + c] - first));
+    }
+    const float scale = span > 0.0f ? 1.0f / span : 0.0f;
+    float mean = 0.0f;
+    for (int32_t r = 0; r < rows; r++) {
+      window[r * columns + c] = (features[r * columns + c] - first) * scale;
+      mean += window[r * columns + c];
+    }
+    mean /= (float)rows;
+    float variance = 0.0f;
+    for (int32_t r = 0; r < rows; r++) {
+      window[r * columns + c] -= mean;
+      variance += window[r * columns + c] * window[r * columns + c];
+    }
+    const float gain = span > 0.0f ? 1.0f / sqrtf(variance / (float)rows) : 0.0f;
+    for (int32_t r = 0; r < rows; r++) {
+      window[r * columns + c] *= gain;
+    }
+  }
+}
+
+void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int32_t samples,
+                       int32_t columns, int32_t rows, float *window, int8_t *quantised,
+                       int8_t *arena, int8_t *outputs, uint8_t *valid) {
+  layerInt8_t layers[MAX_LAYERS];
+  networkInt8_t network;
+  if (unpackInt8(flat, layers, &network) >= 0) {
+    return;
+  }
+  const layerInt8_t *last = &layers[flat->layerCount - 1];
+  const int32_t outputCount = last->outRows * last->outColumns * last->outChannels;
+  int32_t finite = 0;  // finite rows in a row, up to this one
+  for (int32_t i = 0; i < samples; i++) {
+    int32_t usable = 1;
+    for (int32_t c = 0; c < columns; c++) {
+      usable = usable && isfinite(features[i * columns + c]);
+    }
+    finite = usable ? finite + 1 : 0;
+    valid[i] = finite >= rows;
+    if (valid[i]) {
+      zScore(features + (i - rows + 1) * columns, rows, columns, window);
+      networkInt8Quantise(&network, window, rows * columns, quantised);
+      const int8_t *result = networkInt8Run(&network, quantised, arena);
+      for (int32_t j = 0; j < outputCount; j++) {
+        outputs[i * outputCount + j] = result[j];
+      }
+    }
+  }
+}
