@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import math
 import re
 from typing import Any
 
@@ -33,7 +34,8 @@ def read(text: bytes, source: str) -> FlightLog:
     header, _, body = rest.partition(b"\n")
     names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
     if len(set(names)) < len(names) or "" in names:
-        raise AirTouchError(f"{source}:{line_number}: a column name is empty or repeated; give each its own name")
+        raise AirTouchError(f"{source}:{line_number}: a column name is empty or repeated; "
+                            "give each its own name")
     stored = meta.get("warnings")
     warnings = [str(w) for w in stored] if isinstance(stored, list) else []
     unknown = [name for name in names if name not in COLUMNS]
@@ -80,12 +82,15 @@ def stored_meta(log: FlightLog) -> dict[str, Any]:
             meta.setdefault(name, log.meta[key])
     for key in meta:
         if not _KEY.fullmatch(str(key)) or str(key) != str(key).strip():
-            raise AirTouchError(f"{log.source}: metadata key {key!r} cannot be written; use letters, digits and _")
+            raise AirTouchError(f"{log.source}: metadata key {key!r} cannot be written; "
+                                "use letters, digits and _")
     return meta
 
 
 def _shortest(value: float) -> str:
-    return str(int(value)) if value.is_integer() and 0 < abs(value) < 1e15 else repr(value)
+    if value.is_integer() and abs(value) < 1e15:
+        return "-0" if value == 0 and math.copysign(1, value) < 0 else str(int(value))
+    return repr(value)
 
 
 def _value(text: str) -> Any:

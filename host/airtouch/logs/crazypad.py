@@ -17,7 +17,8 @@ def matches(names: list[str]) -> bool:
 
 def read(text: bytes, source: str) -> FlightLog:
     """A FlightLog; `m*_pwm` are the values after battery compensation, as the motors got them."""
-    meta = {"source": source, "format": "crazypad", "vehicle": "crazyflie-2.1", "condition": "", "warnings": []}
+    meta = {"source": source, "format": "crazypad", "vehicle": "crazyflie-2.1", "condition": "",
+            "warnings": []}
     match = re.match(r"pad_(.*)_(E\d+)_log\d+", Path(source).name)
     if match:
         meta["condition"], meta["drone"] = match.groups()

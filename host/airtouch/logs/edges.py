@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.logs.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
-from airtouch.logs.segments import airborne, sample_period
+from airtouch.logs.in_flight import airborne
 
 STEP_M = 0.30  #: change of the down range within two samples that makes an edge
 ROUNDING_M = 1e-6  #: so that a step of exactly 0.30 m, in floats, is none
@@ -46,7 +47,8 @@ def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
             continue
         settled = sample + settling
         before = float(np.median(height[max(sample - level, 0):max(sample - 1, 1)]))
-        after = float(np.median(height[settled:settled + level])) if settled < len(height) else float(height[-1])
+        later = height[settled:settled + level]
+        after = float(np.median(later)) if len(later) else float(height[-1])
         if abs(after - before) > step_m:
             edges.append(Edge(int(sample), "entry" if after < before else "exit", before, after))
     return edges
@@ -63,8 +65,9 @@ def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
 def _in_flight(log: FlightLog) -> np.ndarray:
     """Airborne now and for IN_FLIGHT_S before and after."""
     margin = max(int(round(IN_FLIGHT_S / sample_period(log))), 1)
-    grounded = np.convolve(~airborne(log), np.ones(2 * margin + 1), mode="same") if len(log) > 2 * margin else None
-    return grounded < 0.5 if grounded is not None else np.zeros(len(log), dtype=bool)
+    if len(log) <= 2 * margin:
+        return np.zeros(len(log), dtype=bool)
+    return np.convolve(~airborne(log), np.ones(2 * margin + 1), mode="same") < 0.5
 
 
 def _held(values: np.ndarray) -> np.ndarray:

@@ -17,27 +17,20 @@ def read(path: str | Path) -> FlightLog:
 
     Raises AirTouchError with file, place and remedy when it cannot be read.
     """
-    source = str(path)
-    try:
-        size = os.stat(path).st_size
-        if size > LARGEST_BYTES:
-            raise AirTouchError(f"{source}: {size / 2**30:.1f} GiB is too large for a flight log; split it")
-        data = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        if isinstance(error, AirTouchError):
-            raise
-        raise AirTouchError(f"{source}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    return parse(data, source)
+    return parse(_bytes(path), str(path))
 
 
 def parse(data: bytes, source: str) -> FlightLog:
     """A flight log from a file's bytes; `source` names it in messages."""
     notes: list[str] = []
-    if data[:2] == b"\x1f\x8b":
-        data = _unzipped(data, source, notes)
-    log = _by_content(data, source)
+    log = _by_content(_unzipped(data, source, notes), source)
     log.meta["warnings"] = notes + list(log.meta.get("warnings", []))
     return log
+
+
+def load_text(path: str | Path) -> bytes:
+    """A text file's bytes, unzipped, line ends LF."""
+    return _text(_unzipped(_bytes(path), str(path), []))
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
@@ -84,14 +77,33 @@ def _by_content(data: bytes, source: str) -> FlightLog:
         return parquet.read(data, source)
     if data[0] == usd.MAGIC:
         return usd.read(data, source)
-    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    text = _text(data)
     if b"\x00" in text:
         raise AirTouchError(f"{source}: binary data of no known kind; known are uSD logs, Parquet and CSV")
     return _by_header(text, source)
 
 
+def _text(data: bytes) -> bytes:
+    return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _bytes(path: str | Path) -> bytes:
+    try:
+        size = os.stat(path).st_size
+        data = Path(path).read_bytes() if size <= LARGEST_BYTES else b""
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise AirTouchError(f"{path}: cannot be read: {reason}") from None
+    if size > LARGEST_BYTES:
+        raise AirTouchError(f"{path}: {size / 2**30:.1f} GiB is too large for a flight log; split it")
+    return data
+
+
 def _by_header(text: bytes, source: str) -> FlightLog:
-    first = next(line for line in text.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#"))
+    lines = (line for line in text.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#"))
+    first = next(lines, None)
+    if first is None:
+        raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
     names = [cell.strip() for cell in first.decode("utf-8", "replace").split(",")]
     if _numeric(names[0]):
         return authors.read(text, source)
@@ -101,7 +113,7 @@ def _by_header(text: bytes, source: str) -> FlightLog:
         return crazypad.read(text, source)
     if imrclab.matches(names):
         return imrclab.read(text, source)
-    if imrclab.is_thrust_stand(names):
+    if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
     shown = first[:60].decode("ascii", "replace")
     raise AirTouchError(f"{source}:1: unknown header {shown!r}; name the columns as in the table of columns")
@@ -116,7 +128,9 @@ def _numeric(cell: str) -> bool:
 
 
 def _unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
-    """gzip members joined; a file that is cut off gives what can be read."""
+    """Data as it is, or its gzip members joined; a file that is cut off gives what can be read."""
+    if data[:2] != b"\x1f\x8b":
+        return data
     parts: list[bytes] = []
     total = 0
     while data[:2] == b"\x1f\x8b":
@@ -124,7 +138,8 @@ def _unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
         try:
             parts.append(stream.decompress(data, LARGEST_BYTES - total + 1))
         except zlib.error as error:
-            raise AirTouchError(f"{source}: the gzip data is damaged ({error}); copy the file again") from None
+            raise AirTouchError(f"{source}: the gzip data is damaged ({error}); "
+                                "copy the file again") from None
         total += len(parts[-1])
         if total > LARGEST_BYTES:
             raise AirTouchError(f"{source}: unpacks to more than 1 GiB; no flight log is that large")

@@ -28,7 +28,8 @@ def read(data: bytes, source: str) -> FlightLog:
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise AirTouchError(f"{source}: damaged or unsuitable Parquet file: {first[:120]}") from None
     if not any(name in COLUMNS for name in columns) or not table.num_rows:
-        raise AirTouchError(f"{source}: no known column or no row in this Parquet file; see the table of columns")
+        raise AirTouchError(f"{source}: no known column or no row in this Parquet file; "
+                            "see the table of columns")
     meta = meta if isinstance(meta, dict) else {}
     stored = meta.get("warnings")
     meta["warnings"] = [str(w) for w in stored] if isinstance(stored, list) else []

@@ -1,39 +1,113 @@
-"""Phases of a flight: in the air or not, and ground, take-off, hover, cruise, platform, landing."""
+"""Phases of a flight: ground, take-off, hover, cruise, platform, landing."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.logs.flight_log import PWM, FlightLog
+from airtouch.logs.clock import sample_period
+from airtouch.logs.edges import Edge, true_edges
+from airtouch.logs.flight_log import VELOCITY, FlightLog
+from airtouch.logs.in_flight import airborne
 
-AIRBORNE_PWM = 15000.0  #: mean PWM above which the drone is in the air
-AIRBORNE_RANGE_M = 0.10  #: where no PWM is logged: down range that only a flying drone shows
-
-
-def sample_period(log: FlightLog) -> float:
-    """Seconds between samples: meta["sample_period_s"], else the clock's median step, else 0.01."""
-    known = log.meta.get("sample_period_s")
-    if isinstance(known, (int, float)) and np.isfinite(known) and known > 0:
-        return float(known)
-    if log.has("t_s") and len(log) > 1:
-        with np.errstate(invalid="ignore", over="ignore"):
-            steps = np.diff(log["t_s"])
-        steps = steps[np.isfinite(steps) & (steps > 0)]
-        if len(steps):
-            return float(np.median(steps))
-    return 0.01
+CRUISE_MPS = 0.1  #: horizontal speed above which level flight is a cruise
+LEAST_HEIGHT_M = 0.05  #: motors that run below it never took off
+LEVEL_PART = 0.85  #: part of the median height at which take-off ends and landing starts
+PLATFORM_STEP_M = 0.12  #: step of the down range at a platform, low ones included
+KINDS = ("ground", "take-off", "hover", "cruise", "over platform", "landing")
 
 
-def airborne(log: FlightLog) -> np.ndarray:
-    """Whether the drone flies, bool (n,): mean PWM > 15000.
+@dataclass(frozen=True)
+class Segment:
+    """Samples start to stop - 1 of one phase of a flight."""
 
-    Without PWM: from the first to the last sample with a down range (or height)
-    above 0.10 m. Raises AirTouchError when the log has neither.
+    kind: str  #: one of KINDS
+    start: int
+    stop: int
+
+
+def segments(log: FlightLog) -> list[Segment]:
+    """The phases of a flight in order, without holes.
+
+    Ground: motors below the airborne level, or never higher than 5 cm. Take-off: until
+    85 % of the median height in the air; landing: from the last time at that height. Over platform: between an
+    entry and an exit of the down range. Between them cruise where the speed is above
+    0.1 m/s, else hover; without velocity the whole level part counts as cruise when it
+    crosses an edge, else as hover. Raises AirTouchError when neither PWM nor any
+    height is logged.
     """
-    if log.has(*PWM):
-        with np.errstate(invalid="ignore", over="ignore"):
-            return log.stack(PWM).mean(axis=1) > AIRBORNE_PWM
-    high = log["z_m" if log.has("z_m") and not log.has("zrange_m") else "zrange_m"] > AIRBORNE_RANGE_M
-    flying = np.zeros(len(log), dtype=bool)
-    where = np.flatnonzero(high)
-    if len(where):
-        flying[where[0]:where[-1] + 1] = True
-    return flying
+    period = sample_period(log)
+    flying = _without_short_runs(airborne(log), int(0.5 / period))
+    kinds = np.zeros(len(log), dtype=np.int8)
+    edges = true_edges(log, PLATFORM_STEP_M) if log.has("zrange_m") else []
+    edges = [e for e in edges if flying[e.sample]]
+    ground_height = _height(log, edges)
+    for start, stop in _runs(flying):
+        here = slice(start, stop)
+        crossing = [e for e in edges if start <= e.sample < stop]
+        kinds[here] = KINDS.index("cruise" if crossing and not log.has(*VELOCITY[:2]) else "hover")
+        if log.has(*VELOCITY[:2]):
+            speed = np.hypot(log[VELOCITY[0]][here], log[VELOCITY[1]][here])
+            moving = _without_short_runs(_smooth(speed, int(0.5 / period)) > CRUISE_MPS, int(0.3 / period))
+            kinds[here][moving] = KINDS.index("cruise")
+        if ground_height is not None and not np.any(ground_height[here] > LEAST_HEIGHT_M):
+            kinds[here] = KINDS.index("ground")
+        elif ground_height is not None:
+            _ends(kinds[here], ground_height[here])
+        _over_platforms(kinds, crossing, start, stop)
+    return [Segment(KINDS[kinds[start]], start, stop) for start, stop in _constant_runs(kinds)]
+
+
+def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray | None:
+    """Height above the ground, the platform's own height added while over it."""
+    if log.has("zrange_m"):
+        height = log["zrange_m"].copy()
+        for i, edge in enumerate(edges):
+            if edge.kind == "entry":
+                stop = next((e.sample for e in edges[i + 1:] if e.kind == "exit"), len(height))
+                height[edge.sample:stop] += edge.height_before_m - edge.height_after_m
+        return height
+    return log["z_m"] if log.has("z_m") else None
+
+
+def _ends(kinds: np.ndarray, height: np.ndarray) -> None:
+    """Mark take-off and landing in one flight's kinds, in place."""
+    level = np.flatnonzero(height >= LEVEL_PART * np.nanmedian(height)) if np.isfinite(height).any() else []
+    if len(level):
+        kinds[:level[0]] = KINDS.index("take-off")
+        kinds[level[-1] + 1:] = KINDS.index("landing")
+
+
+def _over_platforms(kinds: np.ndarray, edges: list, start: int, stop: int) -> None:
+    for i, edge in enumerate(edges):
+        if edge.kind == "entry":
+            end = next((e.sample for e in edges[i + 1:]), stop)
+            kinds[edge.sample:end] = KINDS.index("over platform")
+
+
+def _smooth(values: np.ndarray, width: int) -> np.ndarray:
+    width = max(min(width, len(values)), 1)
+    finite = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
+    return np.convolve(finite, np.full(width, 1.0 / width), mode="same")
+
+
+def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Start and stop of each stretch of True."""
+    return [(a, b) for a, b in _constant_runs(mask) if mask[a]]
+
+
+def _constant_runs(values: np.ndarray) -> list[tuple[int, int]]:
+    if not len(values):
+        return []
+    bounds = np.r_[0, np.flatnonzero(values[1:] != values[:-1]) + 1, len(values)]
+    return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+
+
+def _without_short_runs(mask: np.ndarray, shortest: int) -> np.ndarray:
+    """The mask with gaps, then stretches, shorter than `shortest` samples removed (ends of the log stay)."""
+    mask = mask.copy()
+    for value in (False, True):
+        for start, stop in _constant_runs(mask):
+            inner = start > 0 and stop < len(mask)
+            if mask[start] == value and stop - start < shortest and (inner or value):
+                mask[start:stop] = not value
+    return mask

@@ -20,8 +20,8 @@ from airtouch.logs.variables import to_columns
 
 MAGIC = 0xBC
 MAIN_EVENT = "fixedFrequency"
-_TYPES = {"b": "i1", "B": "u1", "?": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "l": "<i4", "L": "<u4",
-          "q": "<i8", "Q": "<u8", "e": "<f2", "f": "<f4", "d": "<f8"}
+_TYPES = {"b": "i1", "B": "u1", "?": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "l": "<i4",
+          "L": "<u4", "q": "<i8", "Q": "<u8", "e": "<f2", "f": "<f4", "d": "<f8"}
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ def read(data: bytes, source: str) -> FlightLog:
     version, events, start = _header(data, source)
     end = len(data) - 4
     if end < start or zlib.crc32(data[:end]) != struct.unpack_from("<I", data, end)[0]:
-        warnings.append("the checksum is wrong or missing: the log is cut off or damaged; check its last values")
+        warnings.append("the checksum is wrong or missing: the log is cut off or damaged; "
+                        "check its last values")
         end = len(data)
     offsets, stopped = _offsets(data, start, end, events)
     if end - stopped > 4 or (end - stopped and end < len(data)):
@@ -81,7 +82,8 @@ def _header(data: bytes, source: str) -> tuple[int, dict[int, Event], int]:
                 declared.append(text)
             events[number] = _event(name, declared, version, source)
     except (struct.error, IndexError):
-        raise AirTouchError(f"{source}: the uSD log ends within its header; copy it from the card again") from None
+        raise AirTouchError(f"{source}: the uSD log ends within its header; "
+                            "copy it from the card again") from None
     return version, events, place
 
 

@@ -73,7 +73,8 @@ def _attitude(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray]) -
         columns |= dict(zip(ATTITUDE, euler(decompress(table["stateEstimateZ.quat"])), strict=True))
 
 
-def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray],
+                  meta: dict[str, Any]) -> None:
     """World accelerations where the estimate is logged, and body ones from them where no IMU is."""
     world = None
     if all(f"stateEstimate.a{a}" in table for a in AXES):

@@ -1,0 +1,221 @@
+"""`airtouch logs`: look at, check and convert flight logs."""
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+
+ENDINGS = (".csv", ".csv.gz", ".parquet")
+FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
+#: what the table calls a group of channels -> the column that tells whether it is there
+GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
+          "position": "x_m", "velocity": "vx_mps", "attitude": "roll_rad", "rpm": "rpm_1"}
+
+
+@click.group(name="logs")
+def command() -> None:
+    """Look at, check and convert flight logs.
+
+    Every known format is told apart by its content: the paper's authors' CSV,
+    Bitcraze uSD-card logs, CrazyPAD, IMRCLab, AirTouch's own CSV and Parquet,
+    gzipped or not. FILES may be folders.
+
+    \b
+    Example:
+      airtouch logs info flights/
+      airtouch logs check flights/imu_data_0201-2204_h79.csv.gz
+      airtouch logs convert log00 --out converted --format parquet --rate 100
+    """
+
+
+@command.command()
+@FILES
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+def info(files: tuple[str, ...], as_json: bool) -> None:
+    """One table: format, length, rate, channels and true edges of each flight.
+
+    \b
+    Example:
+      airtouch logs info flights/*.csv.gz
+    """
+    found, left_out = _each(files, _summary)
+    if as_json:
+        _print_json(found, left_out)
+    else:
+        _print_table(found)
+    _finish(len(found), left_out, "read")
+
+
+@command.command()
+@FILES
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+def check(files: tuple[str, ...], as_json: bool) -> None:
+    """The quality report of each flight: rate, gaps, channels, segments.
+
+    Exit code 2 when a file could not be read; the others are still reported.
+
+    \b
+    Example:
+      airtouch logs check flights/ --json > quality.json
+    """
+    found, left_out = _each(files, lambda path: logs.check(logs.read(path)).as_dict())
+    if as_json:
+        _print_json(found, left_out)
+    else:
+        for report in found:
+            _print_report(report)
+    _finish(len(found), left_out, "checked")
+
+
+@command.command()
+@FILES
+@click.option("--out", required=True, type=click.Path(),
+              help="Folder for the converted files; made when missing.")
+@click.option("--format", "ending", type=click.Choice([e[1:] for e in ENDINGS]), default="csv.gz",
+              show_default=True, help="Kind of file to write.")
+@click.option("--rate", type=float, help="Resample to exactly this rate in Hz (else samples stay as logged).")
+@click.option("--force", is_flag=True, help="Replace files that exist.")
+def convert(files: tuple[str, ...], out: str, ending: str, rate: float | None, force: bool) -> None:
+    """Write flights in the canonical schema, SI units in the column names.
+
+    Nothing is resampled unless --rate is given: then a low-pass comes first when
+    going down, and gaps of more than 0.1 s become NaN.
+
+    \b
+    Example:
+      airtouch logs convert log00 log01 --out converted --rate 100
+    """
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AirTouchError(f"{folder}: cannot be made: {error.strerror}") from None
+    written: set[Path] = set()
+
+    def one(path: Path) -> Path:
+        target = folder / f"{_stem(path)}.{ending}"
+        if target in written:
+            raise AirTouchError(f"{path}: another file of this call is {target} already; rename one of them")
+        if target.exists() and path.exists() and target.samefile(path):
+            raise AirTouchError(f"{path}: would be replaced by its own conversion; choose another --out")
+        log = logs.read(path)
+        logs.write(log if rate is None else logs.resample(log, rate), target, force)
+        written.add(target)
+        return target
+
+    found, left_out = _each(files, one)
+    _finish(len(found), left_out, f"written to {folder}")
+
+
+def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], list[dict[str, str]]]:
+    """`act` on every file; what fails is left out with its reason, the others go on."""
+    paths = list(_expand(files))
+    found, left_out = [], []
+    for path in _progress(paths):
+        try:
+            found.append(act(path))
+        except AirTouchError as error:
+            left_out.append({"file": str(path), "reason": str(error)})
+    return found, left_out
+
+
+def _expand(files: Iterable[str]) -> Iterator[Path]:
+    for name in files:
+        path = Path(name)
+        if path.is_dir():
+            yield from sorted(p for p in path.iterdir()
+                              if p.name.endswith(ENDINGS) and p.name != "manifest.csv")
+        else:
+            yield path
+
+
+def _progress(paths: list[Path]) -> Iterable[Path]:
+    if len(paths) < 5 or not sys.stderr.isatty():
+        return paths
+    from rich.console import Console
+    from rich.progress import track
+
+    return track(paths, description="flights", console=Console(stderr=True), transient=True)
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    log = logs.read(path)
+    report = logs.check(log)
+    return {
+        "source": log.source, "format": report.format, "samples": report.samples,
+        "duration_s": report.duration_s, "rate_hz": report.rate_hz,
+        "channels": [name for name, column in GROUPS.items() if log.has(column)],
+        "entries": sum(edge.kind == "entry" for edge in report.edges),
+        "exits": sum(edge.kind == "exit" for edge in report.edges),
+        "condition": str(log.meta.get("condition", "")), "warnings": len(report.warnings),
+    }
+
+
+def _print_table(rows: list[dict[str, Any]]) -> None:
+    if not rows:
+        return
+    titles = ("flight", "format", "samples", "s", "Hz", "entries", "exits", "warnings", "channels",
+              "condition")
+    cells = [titles] + [
+        (Path(r["source"]).name, r["format"], str(r["samples"]), f"{r['duration_s']:.1f}",
+         _hertz(r["rate_hz"]), str(r["entries"]), str(r["exits"]), str(r["warnings"]), " ".join(r["channels"]), r["condition"])
+        for r in rows
+    ]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(titles))]
+    for row in cells:
+        padded = [c.rjust(w) if 2 <= i <= 7 else c.ljust(w)
+                  for i, (c, w) in enumerate(zip(row, widths, strict=True))]
+        click.echo("  ".join(padded).rstrip())
+
+
+def _print_report(report: dict[str, Any]) -> None:
+    click.echo(f"{report['source']}: {report['format']}, {report['samples']} samples, "
+               f"{report['duration_s']:.1f} s at {_hertz(report['rate_hz'])} Hz, {report['lost']} lost")
+    phases = ", ".join(f"{s['kind']} {s['start']}-{s['stop']}" for s in report["segments"])
+    click.echo(f"  segments: {phases or 'none'}")
+    edges = ", ".join(
+        f"{e['kind']} at {e['sample']} ({e['height_before_m']:.2f} to {e['height_after_m']:.2f} m)"
+        for e in report["edges"])
+    click.echo(f"  edges: {edges or 'none'}")
+    for warning in report["warnings"]:
+        click.echo(f"  warning: {warning}")
+    if not report["warnings"]:
+        click.echo("  no faults found")
+
+
+def _hertz(rate: float | None) -> str:
+    return "?" if rate is None else f"{rate:.2f}"
+
+
+def _print_json(found: list[dict[str, Any]], left_out: list[dict[str, str]]) -> None:
+    click.echo(json.dumps(_finite({"flights": found, "left_out": left_out}), indent=1))
+
+
+def _finite(value: Any) -> Any:
+    """The same data with NaN and infinities as null, as JSON has it."""
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _finish(done: int, left_out: list[dict[str, str]], verb: str) -> None:
+    """Say what was left out and why; exit code 2 then."""
+    for item in left_out:
+        click.echo(f"airtouch: {item['reason']}", err=True)
+    click.echo(f"{done} {'flight' if done == 1 else 'flights'} {verb}, {len(left_out)} left out", err=True)
+    if left_out:
+        sys.exit(2)
+
+
+def _stem(path: Path) -> str:
+    endings = (".csv.gz", ".csv", ".parquet", ".gz")
+    return next((path.name.removesuffix(e) for e in endings if path.name.endswith(e)), path.name)

@@ -1,0 +1,108 @@
+"""Faults of single channels: repeated, stuck, saturated, spiky."""
+
+import numpy as np
+
+from airtouch.logs.clock import sample_period
+from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, AXES, GYRO, PWM, RANGES, FlightLog
+
+STUCK_S = 0.5  #: no sensor or motor value in flight stays the same for longer
+GYRO_LIMIT = np.deg2rad(2000.0)  #: full scale of the BMI088's gyro as configured
+ACC_LIMIT = 24 * 9.81  #: full scale of its accelerometer
+INT16_LIMIT = 32.767  #: where accelerations logged as int16 mm/s^2 end
+PWM_LIMIT = 65535.0
+#: least height of a spike: far above noise and manoeuvres, in the channel's unit
+SPIKE_FLOOR = {**dict.fromkeys(ACC + ACC_WORLD, 5.0), **dict.fromkeys(GYRO, 3.0),
+               **dict.fromkeys(("zrange_m", *RANGES), 0.3), **dict.fromkeys(ATTITUDE[:2], 0.3),
+               **dict.fromkeys((f"{a}_m" for a in AXES), 0.3), "vbat_V": 0.3}
+SPIKE_NOISE = 12.0  #: and this many times the channel's own sample-to-sample noise
+
+
+def duplicates(log: FlightLog) -> list[tuple[str, str]]:
+    """Pairs of channels of which one is the other, or the other scaled.
+
+    The world accelerations that stand in for missing body ones are no fault.
+    """
+    names, columns = [], []
+    for name, values in log.columns.items():
+        finite = bool(np.isfinite(values).all())
+        if name == "t_s" or not finite or len(values) < 3 or np.ptp(values) == 0:
+            continue
+        with np.errstate(over="ignore", invalid="ignore"):
+            centred = values - values.mean()
+            norm = np.linalg.norm(centred)
+        if np.isfinite(norm) and norm > 0:
+            names.append(name)
+            columns.append(centred / norm)
+    if len(columns) < 2:
+        return []
+    similarity = np.abs(np.array(columns) @ np.array(columns).T)
+    allowed = set(zip(ACC, ACC_WORLD, strict=True))
+    pairs = []
+    for i, j in zip(*np.nonzero(np.triu(similarity > 1 - 1e-12, 1)), strict=True):
+        pair = (names[i], names[j])
+        if not (pair in allowed or pair[::-1] in allowed):
+            pairs.append(pair)
+    return _without_copies(pairs, log)
+
+
+def _without_copies(pairs: list[tuple[str, str]], log: FlightLog) -> list[tuple[str, str]]:
+    """Pairs through `acc_*` left out where those merely repeat the world values."""
+    if log.meta.get("acc_frame") != "world":
+        return pairs
+    return [pair for pair in pairs if not set(pair) & set(ACC)]
+
+
+def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
+    """Stretches (channel, start, stop) without any change: the whole log, or in flight.
+
+    In flight: motors, rates and accelerations that hold one value for more than 0.5 s,
+    and rotor speeds for more than 1 s.
+    """
+    period = sample_period(log)
+    limits = {**dict.fromkeys(ACC + ACC_WORLD + GYRO + PWM, STUCK_S),
+              **{name: 2 * STUCK_S for name in log.columns if name.startswith("rpm_")}}
+    found = []
+    for name, values in log.columns.items():
+        if len(values) < 2:
+            continue
+        if np.all(values == values[0]):
+            found.append((name, 0, len(values)))
+        elif name in limits:
+            moves = (np.diff(values) != 0) | ~flying[1:] | ~flying[:-1]
+            bounds = np.r_[0, np.flatnonzero(moves) + 1, len(values)]
+            for start in np.flatnonzero(np.diff(bounds) * period > limits[name]):
+                found.append((name, int(bounds[start]), int(bounds[start + 1])))
+    return found
+
+
+def saturated(log: FlightLog) -> dict[str, int]:
+    """Samples at or beyond the end of each channel's scale."""
+    limits = {**dict.fromkeys(PWM, PWM_LIMIT), **dict.fromkeys(GYRO, 0.999 * GYRO_LIMIT),
+              **dict.fromkeys(ACC, 0.999 * ACC_LIMIT)}
+    counts = {name: int((np.abs(log[name]) >= limit).sum())
+              for name, limit in limits.items() if log.has(name)}
+    for name in ACC_WORLD:
+        if log.has(name):
+            counts[name] = int(np.isclose(np.abs(log[name]), INT16_LIMIT, rtol=0, atol=1.1e-3).sum())
+    return {name: count for name, count in counts.items() if count}
+
+
+def spikes(log: FlightLog) -> dict[str, list[int]]:
+    """Single samples far from both neighbours, which agree with one another.
+
+    The motors are left out: their kicks come from set-point steps and are real.
+    """
+    found = {}
+    for name, floor in SPIKE_FLOOR.items():
+        values = log.columns.get(name)
+        if values is None or len(values) < 5:
+            continue
+        with np.errstate(invalid="ignore", over="ignore"):
+            left, right = np.diff(values)[:-1], -np.diff(values)[1:]
+            noise = np.nanmedian(np.abs(left)) if np.isfinite(left).any() else 0.0
+            limit = max(floor, SPIKE_NOISE * 1.4826 * noise)
+            out = (np.minimum(np.abs(left), np.abs(right)) > limit) & (left * right > 0)
+            out &= np.abs(left - right) < limit / 3
+        if out.any():
+            found[name] = (np.flatnonzero(out) + 1).tolist()
+    return found

@@ -1,0 +1,90 @@
+"""The clock of a log: true rate, and the samples that were lost on the way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.logs.flight_log import FlightLog
+
+WINDOW = 100  #: samples on both sides over which the least delay is taken
+LEAST_AFTER = 20  #: samples that must follow, to tell a loss from a burst at the end
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Samples lost before `sample`, and for how long nothing came."""
+
+    sample: int
+    lost: int
+    seconds: float
+
+
+def sample_period(log: FlightLog) -> float:
+    """Seconds between samples: meta["sample_period_s"], else the clock's median step, else 0.01."""
+    known = log.meta.get("sample_period_s")
+    if isinstance(known, (int, float)) and np.isfinite(known) and known > 0:
+        return float(known)
+    if log.has("t_s") and len(log) > 1:
+        with np.errstate(invalid="ignore", over="ignore"):
+            steps = np.diff(log["t_s"])
+        steps = steps[np.isfinite(steps) & (steps > 0)]
+        if len(steps):
+            return float(np.median(steps))
+    return 0.01
+
+
+def true_period(time_s: np.ndarray) -> float | None:
+    """Seconds between samples: the median slope over long stretches, so that bursts and a few
+    lost samples do not count. None for a clock that does not run."""
+    lag = max(min(500, len(time_s) // 4), 1)
+    if len(time_s) < 2:
+        return None
+    with np.errstate(invalid="ignore", over="ignore"):
+        slopes = (time_s[lag:] - time_s[:-lag]) / lag
+    slopes = slopes[np.isfinite(slopes)]
+    period = float(np.median(slopes)) if len(slopes) else 0.0
+    return period if 0 < period < np.inf else None
+
+
+def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
+    """Gaps after which the clock stays behind for good.
+
+    A host clock that stamps arrivals is late in bursts and then catches up: only a
+    delay whose minimum over the next second is at least 0.7 periods above that
+    of the second before is a loss.
+    """
+    time_s = np.asarray(time_s, dtype=np.float64)
+    if len(time_s) < 3 or not np.isfinite(time_s).all():
+        return []
+    delay = time_s - period * np.arange(len(time_s))
+    gaps: list[Gap] = []
+    since = 0
+    late = np.diff(time_s[:len(time_s) - LEAST_AFTER]) if len(time_s) > LEAST_AFTER else np.empty(0)
+    for sample in np.flatnonzero(late > 1.5 * period) + 1:
+        before = delay[max(since, sample - WINDOW):sample].min()
+        after = delay[sample:sample + WINDOW].min()
+        lost = int(round((after - before) / period))
+        if after - before > 0.7 * period and lost >= 1:
+            gaps.append(Gap(int(sample), lost, float(time_s[sample] - time_s[sample - 1])))
+            since = int(sample)
+    return gaps
+
+
+def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
+    """When the samples were taken, seconds from the first, and the gaps.
+
+    Logs with meta["sample_period_s"] carry arrival times: there the index is the
+    clock, moved on by the samples that were lost. Others carry the drone's own
+    clock, which is taken as it is.
+    """
+    clock = log["t_s"] if log.has("t_s") else np.arange(len(log)) * sample_period(log)
+    stated = log.meta.get("sample_period_s")
+    if stated is None and log.has("t_s"):
+        period = true_period(clock) or sample_period(log)
+        return clock - clock[0], lost_samples(clock, period)
+    period = sample_period(log)
+    gaps = lost_samples(clock, true_period(clock) or period)
+    shift = np.zeros(len(log))
+    for gap in gaps:
+        shift[gap.sample:] += gap.lost
+    return (np.arange(len(log)) + shift) * period, gaps

@@ -1,0 +1,25 @@
+"""Whether the drone flies."""
+
+import numpy as np
+
+from airtouch.logs.flight_log import PWM, FlightLog
+
+AIRBORNE_PWM = 15000.0  #: mean PWM above which the drone is in the air
+AIRBORNE_RANGE_M = 0.10  #: where no PWM is logged: down range that only a flying drone shows
+
+
+def airborne(log: FlightLog) -> np.ndarray:
+    """Whether the drone flies, bool (n,): mean PWM > 15000.
+
+    Without PWM: from the first to the last sample with a down range (or height)
+    above 0.10 m. Raises AirTouchError when the log has neither.
+    """
+    if log.has(*PWM):
+        with np.errstate(invalid="ignore", over="ignore"):
+            return log.stack(PWM).mean(axis=1) > AIRBORNE_PWM
+    high = log["z_m" if log.has("z_m") and not log.has("zrange_m") else "zrange_m"] > AIRBORNE_RANGE_M
+    flying = np.zeros(len(log), dtype=bool)
+    where = np.flatnonzero(high)
+    if len(where):
+        flying[where[0]:where[-1] + 1] = True
+    return flying

@@ -1,0 +1,111 @@
+"""The quality report of one flight: what is wrong with its clock and its channels."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.channel_faults import duplicates, saturated, spikes, stuck
+from airtouch.logs.clock import Gap, lost_samples, sample_period, true_period
+from airtouch.logs.edges import Edge, true_edges
+from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.in_flight import airborne
+from airtouch.logs.segments import Segment, segments
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What `check` found. Sample indices count from 0; stretches are (channel, start, stop)."""
+
+    source: str
+    format: str
+    samples: int
+    duration_s: float
+    rate_hz: float | None  #: true rate by the log's clock; None where there is none
+    gaps: list[Gap]  #: samples that were lost
+    clock_repeats: int  #: steps of the clock that are zero
+    clock_backwards: int  #: steps of the clock that are negative
+    missing: dict[str, int]  #: channel -> samples that are NaN or infinite
+    duplicated: list[tuple[str, str]]  #: pairs of channels that repeat one another
+    stuck: list[tuple[str, int, int]]  #: stretches without any change in flight
+    saturated: dict[str, int]  #: channel -> samples at the end of its scale
+    spikes: dict[str, list[int]]  #: channel -> isolated samples far from both neighbours
+    segments: list[Segment]
+    edges: list[Edge]
+    warnings: list[str]  #: all of it in words, the reader's own warnings first
+
+    @property
+    def lost(self) -> int:
+        """Samples lost in all gaps."""
+        return sum(gap.lost for gap in self.gaps)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self) | {"lost": self.lost}
+
+
+def check(log: FlightLog) -> Quality:
+    """The quality report of a flight log; it never changes the log and never raises for a poor one."""
+    clock = log["t_s"] if log.has("t_s") else np.empty(0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff(clock)
+    period = true_period(clock)
+    flying, phases, edges = _flight(log)
+    missing = {name: int((~np.isfinite(v)).sum()) for name, v in log.columns.items()}
+    found = {
+        "gaps": lost_samples(clock, period) if period else [],
+        "clock_repeats": int((steps == 0).sum()),
+        "clock_backwards": int((steps < 0).sum()),
+        "missing": {name: count for name, count in missing.items() if count},
+        "duplicated": duplicates(log),
+        "stuck": stuck(log, flying),
+        "saturated": saturated(log),
+        "spikes": spikes(log),
+    }
+    warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, found, phases)
+    return Quality(
+        source=log.source, format=str(log.meta.get("format", "")), samples=len(log),
+        duration_s=_duration(clock, len(log), sample_period(log)), rate_hz=1.0 / period if period else None,
+        segments=phases, edges=edges, warnings=warnings, **found,
+    )
+
+
+def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
+    """Airborne samples, phases and edges; a log without motors and height has none of them."""
+    try:
+        flying = airborne(log)
+        return flying, segments(log), true_edges(log) if log.has("zrange_m") else []
+    except AirTouchError:
+        return np.ones(len(log), dtype=bool), [], []
+
+
+def _duration(clock: np.ndarray, samples: int, period: float) -> float:
+    span = float(clock[-1] - clock[0]) if len(clock) else np.nan
+    return span if np.isfinite(span) else max(samples - 1, 0) * period
+
+
+def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment]) -> list[str]:
+    words = []
+    if found["gaps"]:
+        lost = sum(gap.lost for gap in found["gaps"])
+        longest = max(gap.seconds for gap in found["gaps"])
+        words.append(f"{lost} samples lost in {len(found['gaps'])} gaps, the longest {longest:.2f} s")
+    if found["clock_repeats"]:
+        words.append(f"the clock stands still {found['clock_repeats']} times")
+    if found["clock_backwards"]:
+        words.append(f"the clock runs backwards {found['clock_backwards']} times")
+    for name, count in found["missing"].items():
+        words.append(f"{name}: {count} of {len(log)} samples missing")
+    words += [f"{b} repeats {a}" for a, b in found["duplicated"]]
+    for name, start, stop in found["stuck"]:
+        whole = stop - start == len(log)
+        place = f"{name} is stuck from sample {start} to {stop}"
+        words.append(f"{name} never changes" if whole else place)
+    for name, count in found["saturated"].items():
+        words.append(f"{name}: {count} samples at the end of its scale")
+    for name, at in found["spikes"].items():
+        words.append(f"{name}: {len(at)} isolated spikes, first at sample {at[0]}")
+    if not any(phase.kind != "ground" for phase in phases):
+        words.append("no flight in it, or no motors and height to tell")
+    return words

@@ -1,0 +1,31 @@
+"""Thrust-stand runs (IMRCLab's and Bitcraze's CSVs): thrust, PWM, voltage, rpm."""
+
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import load_text
+from airtouch.logs.table import parse_table
+
+#: header -> column of the table; the weight is in grams in every known file
+STAND_COLUMNS = {
+    "weight[g]": "weight_g", "weight": "weight_g", "pwm": "pwm", "vbat[V]": "vbat_V",
+    "rpm1": "rpm_1", "rpm2": "rpm_2", "rpm3": "rpm_3", "rpm4": "rpm_4",
+    "v[V]": "voltage_V", "i[A]": "current_A", "p[W]": "power_W",
+}
+
+
+def read_thrust_stand(path: str | Path) -> dict[str, np.ndarray]:
+    """A run as named columns (n,): `weight_g`, `pwm`, `vbat_V`, `rpm_1` to `rpm_4`, ...
+
+    Columns that a file lacks are absent. Raises AirTouchError for another header
+    and for rows that are not numbers.
+    """
+    source = str(path)
+    header, _, body = load_text(path).partition(b"\n")
+    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+    if not {"pwm", "vbat[V]", "rpm1"} <= set(names):
+        raise AirTouchError(f"{source}:1: not the header of a thrust-stand run (pwm, vbat[V], rpm1, ...)")
+    rows = parse_table(body, source, len(names), 2, [])
+    return {STAND_COLUMNS[n]: rows[:, i] for i, n in enumerate(names) if n in STAND_COLUMNS}
