@@ -5,9 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.errors import AirTouchError
-
-#: Results saturate here: the largest float32.
-FEATURE_LIMIT = float(np.finfo(np.float32).max)
+from airtouch.reference.finite import FLOAT32_MAX
 
 
 def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)) -> np.ndarray:
@@ -29,7 +27,7 @@ def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)
 
 
 def _root_of_product(power: np.ndarray) -> np.ndarray:
-    clipped = np.where(power > FEATURE_LIMIT, FEATURE_LIMIT, np.where(power < 0, 0.0, power))
+    clipped = np.where(power > FLOAT32_MAX, FLOAT32_MAX, np.where(power < 0, 0.0, power))
     mantissa, exponent = np.frexp(clipped[:, 0])
     exponent = exponent.astype(np.int64)
     for column in clipped.T[1:]:
@@ -40,4 +38,4 @@ def _root_of_product(power: np.ndarray) -> np.ndarray:
     root = np.sqrt(np.ldexp(mantissa, odd))
     half = np.clip((exponent - odd) // 2, -2000, 2000)
     with np.errstate(over="ignore", under="ignore"):
-        return np.minimum(np.ldexp(root, half), FEATURE_LIMIT)
+        return np.minimum(np.ldexp(root, half), FLOAT32_MAX)

@@ -10,7 +10,7 @@ from airtouch.reference.band_power import band_bins, band_power, window_ends
 from airtouch.reference.cross_spectrum import cascaded_cross_spectrum
 from airtouch.reference.disturbance_force import PWM_MAX, disturbance_force, force_norm
 from airtouch.reference.feature_window import deviation_from_mean
-from airtouch.reference.finite import hold_finite
+from airtouch.reference.finite import FLOAT32_MAX, hold_finite
 from airtouch.reference.fr_cfar import fr_cfar
 from airtouch.vehicle import Vehicle
 
@@ -99,7 +99,7 @@ def edge_pipeline(
         ready=ready, band_power=powers, features=cascaded_cross_spectrum(powers),
         force=force, force_norm=force_norm(force), cfar_power=power, threshold=threshold,
         alert=alert, alert_recent=alert_recent, edge=np.where(dropped, NONE, crossing), filtered=dropped,
-        armed=armed, non_finite=np.cumsum((~np.isfinite(raw)).sum(axis=1)),
+        armed=armed, non_finite=np.cumsum((~(np.abs(raw) <= FLOAT32_MAX)).sum(axis=1)),
     )
 
 

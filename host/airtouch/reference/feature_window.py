@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.reference.finite import hold_finite
+from airtouch.reference.finite import FLOAT32_MAX, hold_finite
 
 STD_FLOOR = 1e-17  #: a streaming standard deviation below this counts as zero: its square leaves float32
 
@@ -42,7 +42,7 @@ def streaming_z_score(features: np.ndarray, time_constant: float) -> np.ndarray:
         raise AirTouchError(f"z-score: needs (n, columns), not {features.shape}")
     out = np.zeros(features.shape)
     for column, values in enumerate(features.T):
-        starts = np.flatnonzero(np.isfinite(values))
+        starts = np.flatnonzero(np.abs(values) <= FLOAT32_MAX)
         if len(starts):
             out[starts[0]:, column] = _standardise(hold_finite(values[starts[0]:])[0], time_constant)
     return out

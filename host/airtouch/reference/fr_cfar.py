@@ -5,7 +5,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
-from airtouch.reference.finite import hold_finite
+from airtouch.reference.finite import FLOAT32_MAX
 
 POWER_LIMIT = float(np.float32(1e30))  #: cells are clamped to this, the square of SAMPLE_LIMIT
 
@@ -30,7 +30,7 @@ def fr_cfar(
     the leading window is not full, and alert (n,) bool, False there. Non-finite cells hold the
     last finite one, negative ones count as 0. Raises AirTouchError for settings out of range.
     """
-    _check(guard_cells, leading_window, p_fa)
+    check_settings(guard_cells, leading_window, p_fa)
     cells = np.asarray(power, dtype=np.float64)
     if cells.ndim != 1:
         raise AirTouchError(f"FR-CFAR: power must be (n,), not {cells.shape}")
@@ -39,7 +39,7 @@ def fr_cfar(
     lag = guard_cells + leading_window
     if len(cells) > lag:
         leading = sliding_window_view(cells, leading_window)[:len(cells) - lag]
-        threshold[lag:] = threshold_factor(leading_window, p_fa) * leading.mean(axis=1)
+        threshold[lag:] = np.minimum(threshold_factor(leading_window, p_fa) * leading.mean(axis=1), FLOAT32_MAX)
     with np.errstate(invalid="ignore"):
         return threshold, cells > threshold
 
@@ -47,13 +47,15 @@ def fr_cfar(
 def hold_power(power: np.ndarray) -> np.ndarray:
     """Cells with gaps held (0 before any), clamped to 0..POWER_LIMIT."""
     power = np.asarray(power, dtype=np.float64)
-    finite = np.isfinite(power)
-    scaled = np.where(finite, np.clip(np.where(finite, power, 0.0), 0.0, POWER_LIMIT), np.nan)
-    last = np.maximum.accumulate(np.where(finite, np.arange(len(power)), -1)) if len(power) else power.astype(int)
-    return np.where(last >= 0, scaled[np.maximum(last, 0)], 0.0)
+    finite = np.abs(power) <= FLOAT32_MAX
+    if finite.all():
+        return np.clip(power, 0.0, POWER_LIMIT)
+    last = np.maximum.accumulate(np.where(finite, np.arange(len(power)), -1))
+    return np.where(last >= 0, np.clip(power[np.maximum(last, 0)], 0.0, POWER_LIMIT), 0.0)
 
 
-def _check(guard_cells: int, leading_window: int, p_fa: float) -> None:
+def check_settings(guard_cells: int, leading_window: int, p_fa: float) -> None:
+    """AirTouchError for settings that no detector can have."""
     if int(leading_window) != leading_window or leading_window < 1:
         raise AirTouchError(f"FR-CFAR: the leading window must be at least 1 cell, not {leading_window}")
     if int(guard_cells) != guard_cells or guard_cells < 0:

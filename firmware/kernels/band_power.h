@@ -1,0 +1,89 @@
+/**
+ * @file band_power.h
+ * FC-FE: mean square of each channel within one frequency band, over the last
+ * `window` samples, as a bank of sliding DFTs over the band's bins only.
+ *
+ * P = 2 / (N sum w^2) sum_k |DFT_k(w (x - mean x))|^2 over the bins
+ * low <= k fs / N <= high, w the periodic Hann window: the one-sided power
+ * spectral density integrated over the band. Unit: that of x, squared.
+ *
+ * Each bin is kept in its modulated form: a sample is multiplied by the
+ * constant twiddle e^(i 2 pi k n / N) when it enters and when it leaves, so no
+ * state is ever rotated and nothing drifts. Every N samples the sums are
+ * replaced by ones that have only ever been added to. The window is applied
+ * in the frequency domain: 4 X_w[k] = 2 X[k] - X[k-1] - X[k+1].
+ *
+ * No heap, no global, no division or trigonometry in a step.
+ */
+#pragma once
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/** Floats of storage for a bank; @p bins counts one neighbour on each side of the band. */
+#define BAND_POWER_FLOATS(window, channels, bins) \
+  ((window) * ((channels) + 2) + (bins) * ((channels) * 8 + 2) + 4 * (channels))
+
+/** One bin of one channel: real and imaginary sum, and what rounding lost of each. */
+typedef struct {
+  float re;
+  float im;
+  float reLow;
+  float imLow;
+} bandSum_t;
+
+/** A bank of channels. Set up by bandPowerInit(); read nothing but through the functions. */
+typedef struct {
+  uint16_t window;    ///< N, samples
+  uint16_t channels;
+  uint16_t firstBin;  ///< the lower neighbour of the band
+  uint16_t bins;      ///< of the band and its two neighbours
+  uint16_t hop;       ///< samples between two outputs
+  uint16_t position;  ///< n mod N of the next sample
+  uint16_t phase;     ///< firstBin * n mod N of the next sample
+  uint16_t wait;      ///< samples until the next output, once full
+  bool full;          ///< N samples have been seen
+  bool nyquist;       ///< the band ends at half the sample rate
+  float gain;         ///< 1 / (sqrt(3) N)
+  float *cosine;      ///< N twiddles
+  float *sine;
+  float *ring;        ///< N samples of all channels
+  float *rotation;    ///< a cosine and a sine for each bin
+  float *held;        ///< last finite sample of each channel
+  float *reference;   ///< first sample of the block, which `fresh` is relative to
+  float *change;      ///< newest minus oldest sample
+  float *level;       ///< newest sample minus reference
+  bandSum_t *whole;   ///< sums over the last N samples
+  bandSum_t *fresh;   ///< sums since the block of N began
+} bandPower_t;
+
+/**
+ * Bins that a band needs, neighbours included.
+ * @param firstBin  if not NULL, receives the lower neighbour's number
+ * @return 0 when the band holds no bin, touches zero frequency or passes half the rate
+ */
+uint16_t bandPowerBins(float sampleRateHz, uint16_t window, float lowHz, float highHz, uint16_t *firstBin);
+
+/**
+ * Sets a bank up.
+ * @param storage  BAND_POWER_FLOATS(window, channels, bins) floats that outlive the bank
+ * @param floats   how many there are
+ * @return false, with the bank unusable, for a window under 4 or over 16384, no
+ *         channel, no hop, a band without bins or too little storage
+ * Costs 2 N sines; the only place that uses any.
+ */
+bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float lowHz, float highHz,
+                   uint16_t hop, uint16_t channels, float *storage, size_t floats);
+
+/** Forgets every sample; keeps the settings. */
+void bandPowerReset(bandPower_t *self);
+
+/**
+ * Takes one sample of every channel.
+ * @param sample  `channels` values; NaN and infinite ones hold the last finite one
+ * @param power   `channels` powers, written only when true is returned
+ * @return whether this sample ends a window: at sample N - 1, then every `hop`
+ * Costs about 40 operations a bin and channel; never fails.
+ */
+bool bandPowerStep(bandPower_t *self, const float *sample, float *power);

@@ -1,0 +1,37 @@
+#include "disturbance_force.h"
+
+#include <math.h>
+
+#include "sample_guard.h"
+
+#define PWM_MAX 65535.0f
+
+float voltageFactor(const airtouchVehicle_t *vehicle, float vbat) {
+  if (!(vehicle->nominalVoltage > 0.0f) || !isfinite(vbat) || !(vbat > 0.0f)) {
+    return 1.0f;
+  }
+  const float ratio = clampFloat(vbat, 0.0f, SAMPLE_LIMIT) / vehicle->nominalVoltage;
+  return ratio * ratio;
+}
+
+float totalThrust(const airtouchVehicle_t *vehicle, const float pwm[4]) {
+  float thrust = 0.0f;
+  for (int i = 0; i < 4; i++) {
+    const float p = clampFloat(pwm[i], 0.0f, PWM_MAX);
+    if (p > 0.0f) {
+      thrust += vehicle->thrust[0] + p * (vehicle->thrust[1] + p * vehicle->thrust[2]);
+    }
+  }
+  return thrust;
+}
+
+void disturbanceForce(const airtouchVehicle_t *vehicle, const float acc[3], float thrust,
+                      const float thrustAxis[3], float force[3]) {
+  for (int i = 0; i < 3; i++) {
+    force[i] = vehicle->mass * acc[i] - thrust * thrustAxis[i];
+  }
+}
+
+float forceNorm(const float force[3]) {
+  return sqrtf(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+}

@@ -1,0 +1,30 @@
+/**
+ * @file disturbance_force.h
+ * The force that neither gravity nor the motors explain:
+ * f_w = m a - m g - R f_u, f_u = (0, 0, Psi), Psi the sum of the motors' thrust.
+ * Pure functions; inputs must be finite (see sample_guard.h).
+ */
+#pragma once
+
+#include "kernel_types.h"
+
+/**
+ * (vbat / nominal)^2.
+ * @return 1 when the vehicle's nominal voltage is unknown or @p vbat is not a positive number
+ */
+float voltageFactor(const airtouchVehicle_t *vehicle, float vbat);
+
+/** Psi in newtons at the nominal voltage; PWM is clamped to 0..65535. */
+float totalThrust(const airtouchVehicle_t *vehicle, const float pwm[4]);
+
+/**
+ * f_w in newtons, world axes.
+ * @param acc         specific force a - g, world axes, m/s^2 (+g along z at rest)
+ * @param thrust      Psi, newtons, voltage taken into account
+ * @param thrustAxis  R e_z
+ */
+void disturbanceForce(const airtouchVehicle_t *vehicle, const float acc[3], float thrust,
+                      const float thrustAxis[3], float force[3]);
+
+/** ||f_w||, newtons. */
+float forceNorm(const float force[3]);

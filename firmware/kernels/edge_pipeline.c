@@ -1,0 +1,161 @@
+#include "edge_pipeline.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "cross_spectrum.h"
+#include "disturbance_force.h"
+#include "sample_guard.h"
+
+#define EDGE_NEVER (UINT32_C(1) << 30)
+#define PWM_MAX 65535.0f
+
+static const uint16_t sensorAxes[EDGE_PIPELINE_SENSORS] = {3, 3, 3};
+
+void edgePipelineDefaults(edgePipelineConfig_t *config, const airtouchVehicle_t *vehicle) {
+  memset(config, 0, sizeof(*config));
+  config->sampleRateHz = AIRTOUCH_SAMPLE_RATE_HZ;
+  config->lowHz = AIRTOUCH_BAND_LOW_HZ;
+  config->highHz = AIRTOUCH_BAND_HIGH_HZ;
+  config->pFa = AIRTOUCH_P_FA;
+  config->forceMeanSamples = AIRTOUCH_FORCE_MEAN_SAMPLES;
+  config->armPwm = AIRTOUCH_ARM_PWM;
+  config->probabilityEntry = AIRTOUCH_PROBABILITY_ENTRY;
+  config->probabilityExit = AIRTOUCH_PROBABILITY_EXIT;
+  config->window = AIRTOUCH_BAND_WINDOW;
+  config->hop = AIRTOUCH_BAND_HOP;
+  config->leadingWindow = AIRTOUCH_LEADING_WINDOW;
+  config->guardCells = AIRTOUCH_GUARD_CELLS;
+  config->alertHold = AIRTOUCH_ALERT_HOLD;
+  config->armSamples = AIRTOUCH_ARM_SAMPLES;
+  config->dwellSamples = AIRTOUCH_DWELL_SAMPLES;
+  config->physicalFilter = 1;
+  config->vehicle = *vehicle;
+}
+
+bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *config) {
+  memset(pipeline, 0, sizeof(*pipeline));
+  pipeline->config = *config;
+  pipeline->thrustAxis[2] = 1.0f;
+  pipeline->voltageFactor = 1.0f;
+  pipeline->sinceAlert = EDGE_NEVER;
+  pipeline->sinceEdge = EDGE_NEVER;
+  for (int c = 0; c < EDGE_PIPELINE_CHANNELS; c++) {
+    pipeline->bandPower[c] = NAN;
+  }
+  for (int s = 0; s < EDGE_PIPELINE_SENSORS; s++) {
+    pipeline->features[s] = NAN;
+  }
+  if (!(config->forceMeanSamples > 0.0f) || !isfinite(config->forceMeanSamples)) {
+    return false;
+  }
+  exponentialMeanInit(&pipeline->forceMean, config->forceMeanSamples);
+  return bandPowerInit(&pipeline->band, config->sampleRateHz, config->window, config->lowHz, config->highHz,
+                       config->hop, EDGE_PIPELINE_CHANNELS, pipeline->bandStorage, EDGE_PIPELINE_BAND_FLOATS) &&
+         frCfarInit(&pipeline->cfar, config->leadingWindow, config->guardCells, config->pFa,
+                    pipeline->cfarStorage, EDGE_PIPELINE_MAX_CELLS);
+}
+
+/** Keeps the finite values of @p sample in the pipeline, counts the others. */
+static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
+  float *held = pipeline->held;
+  for (int i = 0; i < 10; i++) {
+    const float x = i < 3 ? sample->acc[i] : (i < 6 ? sample->gyro[i - 3] : sample->pwm[i - 6]);
+    pipeline->nonFinite += isfinite(x) ? 0u : 1u;
+    guardSample(x, &held[i]);
+  }
+  for (int i = 6; i < 10; i++) {
+    held[i] = clampFloat(held[i], 0.0f, PWM_MAX);
+  }
+  for (int i = 0; i < 3; i++) {
+    guardSample(sample->thrustAxis[i], &pipeline->thrustAxis[i]);
+  }
+  if (isfinite(sample->vbat) && sample->vbat > 0.0f) {
+    pipeline->voltageFactor = voltageFactor(&pipeline->config.vehicle, sample->vbat);
+  }
+}
+
+static bool findFeatures(edgePipeline_t *pipeline) {
+  const float *held = pipeline->held;
+  float channel[EDGE_PIPELINE_CHANNELS];
+  memcpy(channel, held, 6 * sizeof(float));
+  for (int i = 1; i < 4; i++) {
+    channel[5 + i] = held[6 + i] - held[6];
+  }
+  if (!bandPowerStep(&pipeline->band, channel, pipeline->bandPower)) {
+    return false;
+  }
+  cascadedCrossSpectrum(pipeline->bandPower, sensorAxes, EDGE_PIPELINE_SENSORS, pipeline->features);
+  return true;
+}
+
+/** The cell that FR-CFAR tests: the one place that chooses it. */
+static float cfarInput(edgePipeline_t *pipeline, const edgeEvent_t *event) {
+  if (pipeline->config.cfarNorm) {
+    return event->forceNorm;
+  }
+  const float deviation = exponentialMeanStep(&pipeline->forceMean, event->force[2]);
+  return deviation * deviation;
+}
+
+static void findForce(edgePipeline_t *pipeline, edgeEvent_t *event) {
+  const edgePipelineConfig_t *config = &pipeline->config;
+  const float thrust = totalThrust(&config->vehicle, pipeline->held + 6) * pipeline->voltageFactor;
+  disturbanceForce(&config->vehicle, pipeline->held, thrust, pipeline->thrustAxis, event->force);
+  event->forceNorm = forceNorm(event->force);
+  event->cfarPower = cfarInput(pipeline, event);
+  event->alert = frCfarStep(&pipeline->cfar, event->cfarPower, &event->threshold);
+  if (event->alert) {
+    pipeline->sinceAlert = 0;
+  } else if (pipeline->sinceAlert < EDGE_NEVER) {
+    pipeline->sinceAlert++;
+  }
+  event->alertRecent = pipeline->sinceAlert < config->alertHold;
+}
+
+static bool isArmed(edgePipeline_t *pipeline) {
+  const float *pwm = pipeline->held + 6;
+  if (0.25f * (pwm[0] + pwm[1] + pwm[2] + pwm[3]) > pipeline->config.armPwm) {
+    pipeline->airborne += pipeline->airborne < EDGE_NEVER ? 1u : 0u;
+  } else {
+    pipeline->airborne = 0;
+  }
+  return pipeline->airborne >= pipeline->config.armSamples;
+}
+
+/** Hysteresis from probability to edges; EDGE_NONE, EDGE_ENTRY or EDGE_EXIT. */
+static uint8_t decode(edgePipeline_t *pipeline, float probability, bool armed) {
+  const edgePipelineConfig_t *config = &pipeline->config;
+  if (!armed) {
+    pipeline->over = false;
+    pipeline->sinceEdge = EDGE_NEVER;
+    return EDGE_NONE;
+  }
+  pipeline->sinceEdge += pipeline->sinceEdge < EDGE_NEVER ? 1u : 0u;
+  if (!isfinite(probability) || pipeline->sinceEdge < config->dwellSamples) {
+    return EDGE_NONE;
+  }
+  if (pipeline->over ? probability > config->probabilityExit : probability < config->probabilityEntry) {
+    return EDGE_NONE;
+  }
+  pipeline->over = !pipeline->over;
+  pipeline->sinceEdge = 0;
+  return pipeline->over ? EDGE_ENTRY : EDGE_EXIT;
+}
+
+bool edgePipelineStep(edgePipeline_t *pipeline, const edgeSample_t *sample, edgeEvent_t *event) {
+  memset(event, 0, sizeof(*event));
+  takeSample(pipeline, sample);
+  event->ready = findFeatures(pipeline);
+  memcpy(event->bandPower, pipeline->bandPower, sizeof(event->bandPower));
+  memcpy(event->features, pipeline->features, sizeof(event->features));
+  findForce(pipeline, event);
+  event->armed = isArmed(pipeline);
+  event->nonFinite = pipeline->nonFinite;
+  event->edge = decode(pipeline, sample->probability, event->armed);
+  if (event->edge != EDGE_NONE && pipeline->config.physicalFilter && !event->alertRecent) {
+    event->edge = EDGE_NONE;
+    event->filtered = 1;
+  }
+  return event->edge != EDGE_NONE;
+}

@@ -1,0 +1,74 @@
+/**
+ * @file edge_pipeline.h
+ * Everything from a sample to an edge, in one struct: band power (FC-FE), fused
+ * features (CCS-FF), disturbance force, FR-CFAR, and the decoding of the
+ * network's probability with the physical filter behind it.
+ *
+ * Channels: acc x, y, z; gyro x, y, z; PWM 2 - 1, 3 - 1, 4 - 1. Under 12 kB.
+ */
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "airtouch_parameters.h"
+#include "band_power.h"
+#include "feature_window.h"
+#include "fr_cfar.h"
+#include "kernel_types.h"
+
+#define EDGE_PIPELINE_CHANNELS 9
+#define EDGE_PIPELINE_SENSORS 3
+
+/** The largest settings that a build has room for; define them to change that. */
+#ifndef EDGE_PIPELINE_MAX_WINDOW
+#define EDGE_PIPELINE_MAX_WINDOW AIRTOUCH_BAND_WINDOW
+#endif
+#ifndef EDGE_PIPELINE_MAX_BINS
+#define EDGE_PIPELINE_MAX_BINS 7
+#endif
+#ifndef EDGE_PIPELINE_MAX_CELLS
+#define EDGE_PIPELINE_MAX_CELLS (AIRTOUCH_LEADING_WINDOW + AIRTOUCH_GUARD_CELLS)
+#endif
+#define EDGE_PIPELINE_BAND_FLOATS \
+  BAND_POWER_FLOATS(EDGE_PIPELINE_MAX_WINDOW, EDGE_PIPELINE_CHANNELS, EDGE_PIPELINE_MAX_BINS)
+
+/** Values of edgeEvent_t.edge. */
+enum { EDGE_NONE = 0, EDGE_ENTRY = 1, EDGE_EXIT = 2 };
+
+/** The pipeline. It points into itself: initialise it where it stays, never copy it. */
+typedef struct {
+  edgePipelineConfig_t config;
+  bandPower_t band;
+  frCfar_t cfar;
+  exponentialMean_t forceMean;
+  float held[10];       ///< last finite acc, gyro, PWM
+  float thrustAxis[3];  ///< last finite R e_z
+  float voltageFactor;  ///< of the last known voltage
+  float bandPower[EDGE_PIPELINE_CHANNELS];
+  float features[EDGE_PIPELINE_SENSORS];
+  uint32_t nonFinite;
+  uint32_t sinceAlert;  ///< samples, EDGE_NEVER before any
+  uint32_t sinceEdge;
+  uint32_t airborne;    ///< samples
+  bool over;            ///< the decoder's state: over a platform
+  float bandStorage[EDGE_PIPELINE_BAND_FLOATS];
+  float cfarStorage[EDGE_PIPELINE_MAX_CELLS];
+} edgePipeline_t;
+
+/** Fills @p config with the paper's settings and this @p vehicle. */
+void edgePipelineDefaults(edgePipelineConfig_t *config, const airtouchVehicle_t *vehicle);
+
+/**
+ * Sets a pipeline up; the settings are copied.
+ * @return false for settings out of range or larger than this build's room
+ */
+bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *config);
+
+/**
+ * Takes one sample and says what it means.
+ * @param event  every field is written
+ * @return whether an edge is reported at this sample
+ * Never fails: values that are not finite hold the last finite one.
+ */
+bool edgePipelineStep(edgePipeline_t *pipeline, const edgeSample_t *sample, edgeEvent_t *event);

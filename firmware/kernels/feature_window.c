@@ -1,0 +1,98 @@
+#include "feature_window.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sample_guard.h"
+
+/** Beyond so many time constants e^-t is less than half a unit in the last place of 1. */
+#define SETTLED 20.0f
+
+static float compensatedMean(const float *x, uint16_t count, uint16_t stride) {
+  float sum = 0.0f, low = 0.0f;
+  for (uint16_t i = 0; i < count; i++) {
+    addCompensated(&sum, &low, x[(uint32_t)i * stride]);
+  }
+  return (sum - low) / (float)count;
+}
+
+static void zScoreColumn(const float *x, uint16_t window, uint16_t columns, float *out) {
+  float held = 0.0f, first = 0.0f, span = 0.0f;
+  for (uint16_t i = 0; i < window; i++) {
+    const uint32_t at = (uint32_t)i * columns;
+    const float value = guardSample(x[at], &held);
+    first = i == 0 ? value : first;
+    out[at] = value - first;
+    span = fmaxf(span, fabsf(out[at]));
+  }
+  if (!(span > 0.0f)) {
+    return;  // constant: out is all zeros
+  }
+  for (uint16_t i = 0; i < window; i++) {
+    out[(uint32_t)i * columns] /= span;
+  }
+  const float mean = compensatedMean(out, window, columns);
+  float sum = 0.0f, low = 0.0f;
+  for (uint16_t i = 0; i < window; i++) {
+    const float d = out[(uint32_t)i * columns] - mean;
+    addCompensated(&sum, &low, d * d);
+  }
+  const float std = sqrtf(sum / (float)window);
+  for (uint16_t i = 0; i < window; i++) {
+    out[(uint32_t)i * columns] = (out[(uint32_t)i * columns] - mean) / std;
+  }
+}
+
+void zScoreWindow(const float *features, uint16_t window, uint16_t columns, float *out) {
+  for (uint16_t c = 0; c < columns; c++) {
+    zScoreColumn(features + c, window, columns, out + c);
+  }
+}
+
+void exponentialMeanInit(exponentialMean_t *self, float timeConstant) {
+  memset(self, 0, sizeof(*self));
+  self->timeConstant = timeConstant;
+  self->rate = -expm1f(-1.0f / timeConstant);
+}
+
+float exponentialMeanStep(exponentialMean_t *self, float x) {
+  if (self->count == 0) {
+    self->mean = x;
+  }
+  const float age = (float)(self->count + 1) / self->timeConstant;
+  if (age < SETTLED) {
+    self->count++;
+    self->gain = self->rate / -expm1f(-age);
+  } else {
+    self->count = self->count == 0 ? 1 : self->count;
+    self->gain = self->rate;
+  }
+  const float deviation = (x - self->mean) + self->low;
+  addCompensated(&self->mean, &self->low, self->gain * deviation);
+  return deviation;
+}
+
+void streamingZScoreInit(streamingZScore_t *self, float timeConstant) {
+  memset(self, 0, sizeof(*self));
+  exponentialMeanInit(&self->mean, timeConstant);
+}
+
+float streamingZScoreStep(streamingZScore_t *self, float x) {
+  if (!self->started && !isfinite(x)) {
+    return 0.0f;
+  }
+  const float value = guardSample(x, &self->held);
+  if (!self->started) {
+    self->started = true;
+    self->first = value;
+  }
+  const float level = value - self->first;
+  const float step = exponentialMeanStep(&self->mean, level);
+  const float gain = self->mean.gain;
+  self->variance = (1.0f - gain) * (self->variance + gain * step * step);
+  const float std = sqrtf(self->variance);
+  if (!(std >= STREAMING_STD_FLOOR)) {
+    return 0.0f;
+  }
+  return ((level - self->mean.mean) + self->mean.low) / std;
+}

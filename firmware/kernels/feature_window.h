@@ -1,0 +1,52 @@
+/**
+ * @file feature_window.h
+ * Normalisation of the fused features: per window, as in the authors' data, and streaming.
+ */
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/** A streaming deviation below this counts as zero: its square leaves float. */
+#define STREAMING_STD_FLOOR 1e-17f
+
+/**
+ * Each column of a window to mean 0 and population standard deviation 1.
+ * @param features  window rows of `columns` values; NaN and infinite ones hold the last finite one
+ * @param out       as many values; may be @p features itself. A constant column gives 0
+ */
+void zScoreWindow(const float *features, uint16_t window, uint16_t columns, float *out);
+
+/** An exponentially weighted mean whose weights are normalised by their sum. */
+typedef struct {
+  float timeConstant;  ///< samples in which a weight falls by e
+  float rate;          ///< 1 - e^(-1 / timeConstant)
+  float mean;
+  float low;           ///< what rounding lost of it
+  float gain;          ///< weight of the newest sample
+  uint32_t count;      ///< samples seen, until the gain has settled
+} exponentialMean_t;
+
+/** Sets a mean up; @p timeConstant must be positive, in samples. */
+void exponentialMeanInit(exponentialMean_t *self, float timeConstant);
+
+/** Takes a finite sample and returns its deviation from the mean before it, 0 for the first. */
+float exponentialMeanStep(exponentialMean_t *self, float x);
+
+/** State of one column's streaming z-score. */
+typedef struct {
+  exponentialMean_t mean;  ///< of x - first
+  float first;             ///< the first finite sample
+  float held;              ///< the last finite one
+  float variance;
+  bool started;
+} streamingZScore_t;
+
+/** Sets a column up; @p timeConstant must be positive, in samples. */
+void streamingZScoreInit(streamingZScore_t *self, float timeConstant);
+
+/**
+ * Takes a sample and returns it against the weighted mean and deviation up to and with it.
+ * @return 0 before the first finite sample and while the deviation is below STREAMING_STD_FLOOR
+ */
+float streamingZScoreStep(streamingZScore_t *self, float x);

@@ -1,0 +1,65 @@
+/**
+ * @file kernel_types.h
+ * The plain structs that cross the border between kernels and their callers.
+ * No macro is used in them: the host reads this file as it is.
+ */
+#pragma once
+
+#include <stdint.h>
+
+/** What the disturbance force needs to know of a vehicle; SI units, PWM 0..65535. */
+typedef struct {
+  float mass;            ///< kg
+  float gravity;         ///< m/s^2
+  float thrust[3];       ///< c0, c1, c2: newtons a motor, c0 + c1 p + c2 p^2 for p > 0, else 0
+  float nominalVoltage;  ///< V at which the thrust curve holds; 0 where unknown
+} airtouchVehicle_t;
+
+/** Settings of the edge pipeline; edgePipelineDefaults() fills them with the paper's. */
+typedef struct {
+  float sampleRateHz;
+  float lowHz;                 ///< band, both edges included
+  float highHz;
+  float pFa;                   ///< FR-CFAR: probability of false alarm
+  float forceMeanSamples;      ///< time constant of f_w,z's mean, samples
+  float armPwm;                ///< airborne while the mean PWM is above this
+  float probabilityEntry;      ///< over the platform from here up
+  float probabilityExit;       ///< off it from here down
+  uint16_t window;             ///< band power: samples
+  uint16_t hop;                ///< band power: samples between two outputs
+  uint16_t leadingWindow;      ///< FR-CFAR: cells
+  uint16_t guardCells;         ///< FR-CFAR: cells
+  uint16_t alertHold;          ///< an alert vouches for edges this many samples after it
+  uint16_t armSamples;         ///< airborne for so long before an edge is reported
+  uint16_t dwellSamples;       ///< at least so long between two edges
+  uint8_t cfarNorm;            ///< 0: squared deviation of f_w,z from its mean; 1: ||f_w||
+  uint8_t physicalFilter;      ///< 1: edges without a recent alert are dropped
+  airtouchVehicle_t vehicle;
+} edgePipelineConfig_t;
+
+/** One sample of every sensor. */
+typedef struct {
+  float acc[3];         ///< world axes, m/s^2, gravity included (+g along z at rest)
+  float gyro[3];        ///< rad/s
+  float pwm[4];         ///< 0..65535
+  float vbat;           ///< V, NaN for none
+  float thrustAxis[3];  ///< R e_z in world axes; NaN holds the last one, at first (0, 0, 1)
+  float probability;    ///< the network's latest P(over a platform), NaN for none
+} edgeSample_t;
+
+/** What the pipeline found at one sample. */
+typedef struct {
+  float bandPower[9];   ///< the last band powers, NaN before the first
+  float features[3];    ///< their fusion: acceleration, rate, motors
+  float force[3];       ///< f_w, N, world axes
+  float forceNorm;      ///< ||f_w||, N
+  float cfarPower;      ///< the cell under test
+  float threshold;      ///< its threshold, NaN until known
+  uint32_t nonFinite;   ///< acc, gyro and PWM samples replaced so far
+  uint8_t ready;        ///< band power and features are new
+  uint8_t alert;        ///< the cell exceeds its threshold
+  uint8_t alertRecent;  ///< there was an alert within the last alertHold samples
+  uint8_t edge;         ///< 0 none, 1 entry, 2 exit
+  uint8_t filtered;     ///< an edge was dropped for want of a recent alert
+  uint8_t armed;        ///< airborne long enough
+} edgeEvent_t;

@@ -1,2 +1,0 @@
-#include <stdint.h>
-int32_t airtouchAbi(void) { return 1; }
