@@ -36,7 +36,7 @@ def sample_period(log: FlightLog) -> float:
 def true_period(time_s: np.ndarray) -> float | None:
     """Seconds between samples: the median slope over long stretches, so that bursts and a few
     lost samples do not count. None for a clock that does not run."""
-    lag = max(min(500, len(time_s) // 4), 1)
+    lag = max(min(500, len(time_s) // 16), min(50, len(time_s) // 4), 1)
     if len(time_s) < 2:
         return None
     with np.errstate(invalid="ignore", over="ignore"):

@@ -13,6 +13,8 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import Segment, segments
 
+SHORT_FLIGHT_S = 5.0  #: less than this in the air is worth a warning
+
 
 @dataclass(frozen=True)
 class Quality:
@@ -106,6 +108,9 @@ def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment]) -> l
         words.append(f"{name}: {count} samples at the end of its scale")
     for name, at in found["spikes"].items():
         words.append(f"{name}: {len(at)} isolated spikes, first at sample {at[0]}")
-    if not any(phase.kind != "ground" for phase in phases):
+    in_air = sum(phase.stop - phase.start for phase in phases if phase.kind != "ground") * sample_period(log)
+    if not in_air:
         words.append("no flight in it, or no motors and height to tell")
+    elif in_air < SHORT_FLIGHT_S:
+        words.append(f"in the air for only {in_air:.1f} s")
     return words

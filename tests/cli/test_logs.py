@@ -1,0 +1,74 @@
+"""`airtouch logs`, as a user calls it."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli.logs import command
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import PWM, FlightLog
+
+
+@pytest.fixture
+def folder(tmp_path):
+    n = 600
+    height = np.r_[np.full(300, 0.8), np.full(300, 0.05)]
+    columns = {"t_s": np.arange(n) * 0.002, "zrange_m": height} | {m: np.full(n, 4e4) + np.arange(n) for m in PWM}
+    logs.write(FlightLog(columns, {"source": "made", "condition": "calm"}), tmp_path / "good.csv")
+    (tmp_path / "empty.csv.gz").write_bytes(b"")
+    (tmp_path / "manifest.csv").write_text("file,use\n")
+    return tmp_path
+
+
+def call(*arguments):
+    return CliRunner().invoke(command, [str(a) for a in arguments])
+
+
+def test_help_teaches_with_an_example():
+    for sub in ("info", "check", "convert"):
+        result = call(sub, "--help")
+        assert result.exit_code == 0 and f"airtouch logs {sub}" in result.output
+
+
+def test_info_goes_on_past_bad_files_and_sums_up(folder):
+    result = call("info", folder, folder / "absent.csv")
+    assert result.exit_code == 2
+    assert "good.csv" in result.stdout and "calm" in result.stdout
+    assert "empty.csv.gz: the file is empty" in result.stderr
+    assert "1 flight read, 2 left out" in result.stderr
+    assert call("info", folder / "good.csv").exit_code == 0
+
+
+def test_check_as_json(folder):
+    result = call("check", folder, "--json")
+    assert result.exit_code == 2
+    report = json.loads(result.stdout)
+    assert report["flights"][0]["rate_hz"] == pytest.approx(500)
+    assert report["flights"][0]["edges"][0]["kind"] == "entry"
+    assert report["left_out"][0]["file"].endswith("empty.csv.gz")
+    text = call("check", folder / "good.csv").stdout
+    assert "entry at 300 (0.80 to 0.05 m)" in text
+
+
+def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):
+    out = folder / "out"
+    assert call("convert", folder / "good.csv", "--out", out).exit_code == 0
+    back = logs.read(out / "good.csv.gz")
+    np.testing.assert_array_equal(back["t_s"], np.arange(600) * 0.002)
+    again = call("convert", folder / "good.csv", "--out", out, "--rate", 100)
+    assert again.exit_code == 2 and "--force" in again.stderr
+    assert call("convert", folder / "good.csv", "--out", out, "--rate", 100, "--force").exit_code == 0
+    assert len(logs.read(out / "good.csv.gz")) == 120
+
+
+def test_convert_never_replaces_its_input_or_another_result(folder):
+    result = call("convert", folder / "good.csv", "--out", folder, "--format", "csv", "--force")
+    assert result.exit_code == 2 and "its own conversion" in result.stderr
+    result = call("convert", folder / "good.csv", folder / "good.csv", "--out", folder / "o", "--force")
+    assert result.exit_code == 2 and "1 flight written" in result.stderr
+    with pytest.raises(AirTouchError, match="cannot be made"):
+        CliRunner().invoke(command, ["convert", str(folder / "good.csv"), "--out", str(folder / "good.csv")],
+                           catch_exceptions=False)

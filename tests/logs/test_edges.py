@@ -1,0 +1,80 @@
+"""True edges: closed-form cases, then every flight of the manifest."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import PWM, FlightLog
+
+
+def flight(height, pwm=40000.0):
+    n = len(height)
+    return FlightLog({"zrange_m": np.asarray(height, float)} | {m: np.full(n, pwm) for m in PWM},
+                     {"sample_period_s": 0.01})
+
+
+def test_step_down_and_up():
+    height = np.r_[np.full(100, 0.8), np.full(150, 0.05), np.full(100, 0.8)]
+    edges = logs.true_edges(flight(height))
+    assert [(e.sample, e.kind) for e in edges] == [(100, "entry"), (250, "exit")]
+    assert (edges[0].height_before_m, edges[0].height_after_m) == (0.8, 0.05)
+
+
+def test_step_spread_over_readings_counts_once_where_it_first_exceeds():
+    height = np.r_[np.full(100, 0.76), np.full(5, 0.60), np.full(5, 0.20), np.full(100, 0.0)]
+    assert [e.sample for e in logs.true_edges(flight(height))] == [105]  # 0.16 m is none, 0.40 m is
+
+
+def test_threshold_is_more_than_30_cm():
+    step = np.r_[np.full(100, 0.8), np.full(100, 0.5)]  # 0.30000000000000004 in floats
+    assert logs.true_edges(flight(step)) == []
+    assert len(logs.true_edges(flight(step - np.r_[np.zeros(100), np.full(100, 0.001)]))) == 1
+    assert len(logs.true_edges(flight(step), step_m=0.2)) == 1
+
+
+def test_within_two_samples_but_not_three():
+    def ramp(samples):
+        return np.r_[np.full(100, 0.8), np.linspace(0.8, 0.4, samples + 1)[1:], np.full(100, 0.4)]
+    assert [e.sample for e in logs.true_edges(flight(ramp(2)))] == [101]
+    assert logs.true_edges(flight(ramp(3))) == []
+
+
+def test_glitch_overshoot_and_invalid_readings_are_no_edges():
+    glitch = np.full(300, 0.8)
+    glitch[100:104] = 0.2
+    assert logs.true_edges(flight(glitch)) == []
+    overshoot = np.r_[np.full(100, 0.05), np.full(4, 1.15), np.full(100, 0.77)]
+    assert [(e.sample, e.kind) for e in logs.true_edges(flight(overshoot))] == [(100, "exit")]
+    lost = np.full(300, 0.8)
+    lost[100:180] = np.nan
+    assert logs.true_edges(flight(lost)) == []
+
+
+def test_only_in_flight():
+    height = np.r_[np.full(100, 0.8), np.full(100, 0.05)]
+    assert logs.true_edges(flight(height, pwm=10000.0)) == []
+    with pytest.raises(AirTouchError, match="zrange_m"):
+        logs.true_edges(FlightLog({PWM[0]: np.zeros(3)}))
+
+
+def test_every_clean_flight_has_one_entry_and_one_exit(flights):
+    clean = [r for r in csv.DictReader((flights / "airtouch" / "manifest.csv").open()) if r["use"] == "clean"]
+    for row in clean:
+        edges = logs.true_edges(logs.read(flights / "airtouch" / row["file"]))
+        assert [e.kind for e in edges] == ["entry", "exit"], row["file"]
+        assert edges[0].height_after_m < 0.15 and edges[0].height_before_m > 0.6, row["file"]
+    assert len(clean) == 87
+
+
+@pytest.mark.parametrize("name, kinds", [
+    ("imu_data_0126-2009", ["entry", "exit"] * 3),  # manifest: 3 entry/exit pairs
+    ("imu_data_1104-1406_00d", ["entry", "exit"] * 2),  # 9 columns
+    ("imu_data_0126-1621", []),  # no flight
+    ("imu_data_0701-2232", []),  # 0 pairs
+])
+def test_messy_flights_as_the_manifest_notes(flights, name, kinds):
+    log = logs.read(flights / "airtouch" / f"{name}.csv.gz")
+    assert [e.kind for e in logs.true_edges(log)] == kinds

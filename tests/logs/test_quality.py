@@ -1,0 +1,83 @@
+"""The quality report finds the faults that were put in, and no others."""
+
+import json
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.logs.clock import lost_samples, true_period
+from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
+
+
+def sound_flight(seed=0, n=2000):
+    rng = np.random.default_rng(seed)
+    names = ACC + GYRO
+    columns = {"t_s": np.arange(n) * 0.01} | {name: rng.normal(0, 0.5, n) for name in names}
+    columns |= {m: 40000 + rng.normal(0, 500, n).round() for m in PWM}
+    columns["zrange_m"] = np.r_[np.linspace(0, 0.8, 300), np.full(n - 600, 0.8), np.linspace(0.8, 0, 300)]
+    columns["zrange_m"][900:1100] = 0.05
+    for m in PWM:
+        columns[m][:100] = columns[m][-100:] = 0
+    return FlightLog(columns, {"source": "made", "warnings": []})
+
+
+def test_sound_flight_has_no_fault():
+    report = logs.check(sound_flight())
+    assert report.warnings == [] and report.lost == 0
+    assert report.rate_hz == pytest.approx(100) and report.duration_s == pytest.approx(19.99)
+    assert [e.sample for e in report.edges] == [900, 1100]
+    json.dumps(report.as_dict())
+
+
+def test_faults_put_in_are_found():
+    log = sound_flight()
+    log.columns["gyro_y_radps"] = 3.0 * log["acc_x_mps2"] + 1
+    log.columns["gyro_z_radps"][500:600] = 0.25
+    log.columns["acc_y_mps2"][700] += 40
+    log.columns["m2_pwm"][800:803] = 65535
+    log.columns["acc_z_mps2"][10:15] = np.nan
+    log.columns["vbat_V"] = np.full(2000, 3.7)
+    log.columns["t_s"][50] = log["t_s"][49]
+    log.columns["t_s"][60:62] = log["t_s"][61:59:-1]
+    report = logs.check(log)
+    assert report.duplicated == [("acc_x_mps2", "gyro_y_radps")]
+    assert ("gyro_z_radps", 500, 600) in report.stuck and ("vbat_V", 0, 2000) in report.stuck
+    assert report.spikes == {"acc_y_mps2": [700]}
+    assert report.saturated == {"m2_pwm": 3}
+    assert report.missing == {"acc_z_mps2": 5}
+    assert (report.clock_repeats, report.clock_backwards) == (1, 1)
+
+
+def test_lost_samples_are_told_from_bursts():
+    rng = np.random.default_rng(1)
+    sent = np.delete(np.arange(4000), [*range(1000, 1017), 2500])
+    arrival = 3.0 + sent * 0.009993 + rng.exponential(0.002, len(sent))
+    for start in (500, 3000):  # bursts: 30 samples wait for the last of them, and none is lost
+        arrival[start:start + 30] = arrival[start + 29] + np.arange(30) * 1e-4
+    period = true_period(arrival)
+    assert period == pytest.approx(0.009993, rel=1e-3)
+    assert [(g.sample, g.lost) for g in lost_samples(arrival, period)] == [(1000, 17), (2483, 1)]
+
+
+def test_segments_of_a_made_flight():
+    kinds = [(s.kind, s.start, s.stop) for s in logs.segments(sound_flight())]
+    assert [k for k, _, _ in kinds] == ["ground", "take-off", "cruise", "over platform", "cruise", "landing",
+                                       "ground"]
+    assert ("over platform", 900, 1100) in kinds and kinds[0] == ("ground", 0, 100)
+    assert kinds[-1] == ("ground", 1900, 2000)
+    moving = sound_flight().with_columns({
+        "vx_mps": np.where((np.arange(2000) > 700) & (np.arange(2000) < 1300), 0.3, 0.0), "vy_mps": np.zeros(2000)})
+    found = [s.kind for s in logs.segments(moving)]
+    assert found == ["ground", "take-off", "hover", "cruise", "over platform", "cruise", "hover", "landing", "ground"]
+
+
+def test_real_flights(flights):
+    folder = flights / "airtouch"
+    report = logs.check(logs.read(folder / "imu_data_0102-2131.csv.gz"))  # gyro duplicates acc
+    assert len(report.duplicated) == 3
+    assert logs.check(logs.read(folder / "imu_data_0103-1417.csv.gz")).lost >= 10  # lost packets
+    assert logs.check(logs.read(folder / "imu_data_0201-2204_h79.csv.gz")).warnings == []
+    assert logs.check(logs.read(folder / "imu_data_0126-1621.csv.gz")).warnings == ["in the air for only 1.5 s"]
+    stuck = logs.check(logs.read(flights / "imrclab" / "brushed_jana23.csv.gz")).stuck
+    assert {"vbat_V", "rpm_1"} == {name for name, _, _ in stuck}  # as its SOURCE.md says

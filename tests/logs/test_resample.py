@@ -1,0 +1,65 @@
+"""Resampling against closed forms: tones kept, tones that would fold removed, gaps left open."""
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+
+
+def tone(frequency, rate=500.0, seconds=8.0):
+    t = np.arange(int(seconds * rate)) / rate
+    return FlightLog({"t_s": 2.0 + t, "acc_x_mps2": np.sin(2 * np.pi * frequency * t)}, {"source": "made"})
+
+
+def test_low_tone_is_kept_and_high_tone_does_not_fold():
+    kept = logs.resample(tone(5.0))
+    t = kept["t_s"]
+    assert len(kept) == 800 and np.allclose(np.diff(t), 0.01, atol=1e-12)
+    np.testing.assert_allclose(kept["acc_x_mps2"][50:-50], np.sin(2 * np.pi * 5 * t)[50:-50], atol=0.005)
+    folded = logs.resample(tone(90.0))["acc_x_mps2"][50:-50]  # 90 Hz would appear at 10 Hz
+    assert np.abs(folded).max() < 1e-3
+    assert kept.meta["resampled"]["from_hz"] == pytest.approx(500) and kept.meta["sample_period_s"] == 0.01
+    assert any("resampled" in w for w in kept.meta["warnings"])
+
+
+def test_gaps_are_not_filled():
+    log = tone(1.0, rate=100.0)
+    keep = np.r_[0:200, 205:400, 450:800]
+    log = FlightLog({k: v[keep] for k, v in log.columns.items()}, {"source": "made"})
+    new = logs.resample(log)
+    missing = np.flatnonzero(np.isnan(new["acc_x_mps2"]))
+    assert missing.tolist() == list(range(400, 450))
+    short = np.sin(2 * np.pi * np.arange(200, 205) / 100)
+    np.testing.assert_allclose(new["acc_x_mps2"][200:205], short, atol=0.01)
+    assert new.meta["resampled"]["lost_samples"] == 55
+
+
+def test_arrival_times_are_not_taken_for_sample_times():
+    rng = np.random.default_rng(0)
+    arrival = np.arange(1000) * 0.01 + rng.exponential(0.003, 1000)
+    arrival[300:330] = arrival[329] + np.arange(30) * 1e-4
+    x = rng.normal(size=1000)
+    log = FlightLog({"t_s": arrival, "acc_x_mps2": x}, {"source": "made", "sample_period_s": 0.01})
+    new = logs.resample(log)
+    np.testing.assert_allclose(new["acc_x_mps2"], x[:len(new)], atol=1e-9)
+
+
+def test_steps_are_held_angles_unwrapped_motors_in_range():
+    t = np.arange(2000) / 500.0
+    log = FlightLog({"t_s": t, "zrange_m": np.where(t < 2, 0.8, 0.05), "yaw_rad": np.angle(np.exp(1j * 3 * t)),
+                     "m1_pwm": np.where(t < 2, 0.0, 65535.0)}, {"source": "made"})
+    new = logs.resample(log)
+    assert set(np.unique(new["zrange_m"])) == {0.05, 0.8}
+    error = np.angle(np.exp(1j * (new["yaw_rad"] - 3 * new["t_s"])))
+    assert np.abs(error[20:-20]).max() < 1e-3 and np.abs(new["yaw_rad"]).max() <= np.pi
+    assert new["m1_pwm"].min() >= 0 and new["m1_pwm"].max() <= 65535
+
+
+def test_impossible_requests_say_so():
+    with pytest.raises(AirTouchError, match="not possible"):
+        logs.resample(tone(1.0), 0)
+    for clock in (np.zeros(5), np.full(5, np.nan), np.zeros(0)):
+        with pytest.raises(AirTouchError, match="clock does not run"):
+            logs.resample(FlightLog({"t_s": clock, "acc_x_mps2": np.zeros(len(clock))}, {"source": "made"}))

@@ -1,0 +1,106 @@
+"""What is written is read back exactly; any bytes give a log or one clear line."""
+
+import gzip
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs import canonical, parquet
+from airtouch.logs.files import parse
+from airtouch.logs.flight_log import COLUMNS, FlightLog
+
+NAMES = st.lists(st.sampled_from([*COLUMNS, "extra", "my column"]), min_size=1, max_size=6, unique=True)
+VALUES = st.floats(width=64, allow_nan=True, allow_infinity=True)
+META = st.dictionaries(st.sampled_from(["vehicle", "condition", "note_2", "seed"]),
+                       st.one_of(st.text(), st.integers(), st.booleans(), st.lists(st.floats(allow_nan=False))))
+
+
+@st.composite
+def flight_logs(draw):
+    rows = draw(st.integers(1, 8))
+    columns = {n: draw(arrays(np.float64, rows, elements=VALUES)) for n in draw(NAMES)}
+    if not set(columns) & set(COLUMNS):
+        columns["t_s"] = np.arange(rows, dtype=float)
+    return FlightLog(columns, {"source": "a.csv", "format": "made", **draw(META)})
+
+
+def assert_same(back, log):
+    assert set(back.columns) == set(log.columns)
+    for name, values in log.columns.items():
+        np.testing.assert_array_equal(back[name], values)
+        known = ~np.isnan(values)
+        np.testing.assert_array_equal(np.signbit(back[name])[known], np.signbit(values)[known])
+    for key, value in log.meta.items():
+        if key not in ("source", "format"):
+            assert back.meta[key] == value
+    assert back.meta["origin"] == "a.csv"
+
+
+@settings(deadline=None)
+@given(flight_logs(), st.booleans())
+def test_canonical_round_trip(log, compress):
+    assert_same(parse(canonical.to_bytes(log, compress), "b.csv"), log)
+
+
+@settings(deadline=None, max_examples=50)
+@given(flight_logs())
+def test_parquet_round_trip(log):
+    pytest.importorskip("pyarrow")
+    assert_same(parse(parquet.to_bytes(log), "b.parquet"), log)
+
+
+def test_parquet_without_pyarrow_names_the_remedy(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(AirTouchError, match=r"pip install airtouch\[parquet\]"):
+        parquet.to_bytes(FlightLog({"t_s": np.zeros(2)}))
+
+
+def test_write_is_whole_or_not_at_all(tmp_path):
+    log = FlightLog({"t_s": np.arange(3.0)}, {"source": "x"})
+    for name in ("a.csv", "a.csv.gz"):
+        logs.write(log, tmp_path / name)
+        with pytest.raises(AirTouchError, match="--force"):
+            logs.write(log, tmp_path / name)
+        logs.write(log, tmp_path / name, force=True)
+        np.testing.assert_array_equal(logs.read(tmp_path / name)["t_s"], log["t_s"])
+    assert gzip.decompress((tmp_path / "a.csv.gz").read_bytes()) == (tmp_path / "a.csv").read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "a.csv.gz"]
+    for place, message in ((tmp_path / "a.txt", "unknown kind"), (tmp_path / "no" / "a.csv", "cannot be written")):
+        with pytest.raises(AirTouchError, match=message):
+            logs.write(log, place)
+    with pytest.raises(AirTouchError, match="without columns"):
+        logs.write(FlightLog({}), tmp_path / "b.csv")
+
+
+def test_missing_file_and_folder_say_so(tmp_path):
+    for path in (tmp_path / "none.csv", tmp_path, "bad\0name"):
+        with pytest.raises(AirTouchError, match="cannot be read"):
+            logs.read(path)
+
+
+HEADERS = st.sampled_from([b"", b"\x1f\x8b", b"PAR1", b"\xbc\x02\x00", b"\xbc\x01\x00\x01\x00", b"# a: [[\n",
+                           b"t_s,zrange_m\n", b"timestamp_ms,stateEstimate.ax\n", b"timestamp_ms,gyro.x\n",
+                           b"1,2,3,4,5,6\n", b"0,0,1,0,0,0,0,1\n", b",t_s\n", b"t_s,t_s\n1,2\n"])
+TABLES = st.text(alphabet="0123456789.,-+e\n\r nainfNAx_#:\u00b2\u0661", max_size=200).map(str.encode)
+
+
+@settings(max_examples=400, deadline=None)
+@given(HEADERS, st.one_of(st.binary(max_size=300), TABLES), st.booleans())
+def test_any_bytes_give_a_log_or_one_line(head, tail, zipped):
+    data = gzip.compress(head + tail) if zipped else head + tail
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            log = parse(data, "fuzz")
+        except AirTouchError as error:
+            assert str(error).startswith("fuzz") and "\n" not in str(error)
+            return
+        assert len(log) >= 1 and log.columns
+        logs.check(log)
