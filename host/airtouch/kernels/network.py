@@ -41,7 +41,7 @@ def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
     flat, keep = _flat_int8(model.int8)
     x = np.ascontiguousarray(_windows(model.int8.input_shape, windows), dtype=np.float32)
     quantised = np.empty(x.shape, dtype=np.int8)
-    lib.networkInt8BatchQuantise(flat, _pointer("float", x), x.size, _pointer("int8_t", quantised))
+    lib.networkInt8BatchQuantise(flat, pointer("float", x), x.size, pointer("int8_t", quantised))
     return run_int8(model.int8, quantised)
 
 
@@ -50,7 +50,7 @@ def run_int8(network: Int8Network, quantised: np.ndarray) -> np.ndarray:
     flat, keep = _flat_int8(network)
     x = np.ascontiguousarray(_windows(network.input_shape, quantised), dtype=np.int8)
     outputs = np.empty((len(x), network.outputs), dtype=np.int8)
-    lib.networkInt8Batch(flat, _pointer("int8_t", x), len(x), _arena(flat), _pointer("int8_t", outputs))
+    lib.networkInt8Batch(flat, pointer("int8_t", x), len(x), _arena(flat), pointer("int8_t", outputs))
     return outputs
 
 
@@ -67,11 +67,11 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
     bias = _joined([layer.bias for layer in weighted], np.float32)
     flat = ffi.new("flatNetworkFloat_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
-        "shapes": _pointer("int32_t", shapes), "weights": _pointer("float", weights),
-        "bias": _pointer("float", bias)})
-    size = _checked(lib.networkFloatBatchArena(flat))
+        "shapes": pointer("int32_t", shapes), "weights": pointer("float", weights),
+        "bias": pointer("float", bias)})
+    size = checked(lib.networkFloatBatchArena(flat))
     outputs = np.empty((len(x), int(np.prod(layers[-1].output_shape))), dtype=np.float32)
-    lib.networkFloatBatch(flat, _pointer("float", x), len(x), ffi.new("float[]", size), _pointer("float", outputs))
+    lib.networkFloatBatch(flat, pointer("float", x), len(x), ffi.new("float[]", size), pointer("float", outputs))
     return outputs
 
 
@@ -94,9 +94,9 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     flat, keep = _flat_int8(network)
     window, quantised = np.empty(rows * x.shape[1], np.float32), np.empty(rows * x.shape[1], np.int8)
     logits, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
-    lib.networkInt8Flight(flat, _pointer("float", x), len(x), x.shape[1], rows, _pointer("float", window),
-                          _pointer("int8_t", quantised), _arena(flat), _pointer("int8_t", logits),
-                          _pointer("uint8_t", valid))
+    lib.networkInt8Flight(flat, pointer("float", x), len(x), x.shape[1], rows, pointer("float", window),
+                          pointer("int8_t", quantised), _arena(flat), pointer("int8_t", logits),
+                          pointer("uint8_t", valid))
     return np.where(valid, _softmax(network, logits), np.nan)
 
 
@@ -127,27 +127,33 @@ def layer_shape(layer: Int8Layer) -> list[int]:
 
 
 def _flat_int8(network: Int8Network) -> tuple[object, list[np.ndarray]]:
-    """The C view of a network, and the arrays that must outlive it."""
-    weighted = [layer for layer in network.layers if layer.kind != "max_pool"]
+    """The C view of a network whose layers fit each other, and the arrays that must outlive it."""
+    flat, keep = flat_layers(network.layers)
+    checked(lib.networkInt8BatchArena(flat))
+    return flat, keep
+
+
+def flat_layers(layers: Sequence[Int8Layer]) -> tuple[object, list[np.ndarray]]:
+    """The C view of layers, one after the other, and the arrays that must outlive it."""
+    weighted = [layer for layer in layers if layer.kind != "max_pool"]
     packed = [packed_weights(layer) for layer in weighted]
     multipliers = [layer.multipliers() for layer in weighted]
     weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
                               zip(zip(*packed), (np.int8, np.uint16, np.uint8)))
     bias = _joined([layer.folded_bias() for layer in weighted], np.int32)
     multiplier, shift = (_joined(parts, dtype) for parts, dtype in zip(zip(*multipliers), (np.int32, np.int8)))
-    shapes = np.array([layer_shape(layer) for layer in network.layers], dtype=np.int32)
+    shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
-        "layerCount": len(network.layers), "weightCount": weights.size, "channelCount": bias.size,
-        "blockCount": skips.size, "shapes": _pointer("int32_t", shapes), "weights": _pointer("int8_t", weights),
-        "bias": _pointer("int32_t", bias), "multiplier": _pointer("int32_t", multiplier),
-        "shift": _pointer("int8_t", shift), "blockCounts": _pointer("uint16_t", counts),
-        "blockSkips": _pointer("uint8_t", skips), "inputScale": network.layers[0].input_scale,
-        "inputZeroPoint": network.layers[0].input_zero_point})
-    _checked(lib.networkInt8BatchArena(flat))
+        "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
+        "blockCount": skips.size, "shapes": pointer("int32_t", shapes), "weights": pointer("int8_t", weights),
+        "bias": pointer("int32_t", bias), "multiplier": pointer("int32_t", multiplier),
+        "shift": pointer("int8_t", shift), "blockCounts": pointer("uint16_t", counts),
+        "blockSkips": pointer("uint8_t", skips), "inputScale": layers[0].input_scale,
+        "inputZeroPoint": layers[0].input_zero_point})
     return flat, [shapes, weights, bias, multiplier, shift, counts, skips]
 
 
-def _checked(size: int) -> int:
+def checked(size: int) -> int:
     if size < 0:
         raise AirTouchError(f"network: layer {-size - 1} does not fit its weights or its neighbours")
     return size
@@ -171,7 +177,7 @@ def _arena(flat: object) -> object:
     return ffi.new("int8_t[]", lib.networkInt8BatchArena(flat))
 
 
-def _pointer(kind: str, array: np.ndarray) -> object:
+def pointer(kind: str, array: np.ndarray) -> object:
     return ffi.cast(f"{kind} *", array.ctypes.data)
 
 

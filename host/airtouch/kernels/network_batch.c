@@ -2,10 +2,12 @@
 
 #include <math.h>
 
+#include "feature_window.h"
 #include "network_float.h"
 #include "network_int8.h"
+#include "network_unpack.h"
 
-enum { MAX_LAYERS = 32, SHAPE_COLUMNS = 12 };
+enum { SHAPE_COLUMNS = 12 };
 
 static int32_t inputs(const int32_t *shape) {
   return shape[1] * shape[2] * shape[3];
@@ -19,14 +21,11 @@ static int32_t weights(const int32_t *shape) {
   return shape[0] == LAYER_DENSE ? shape[6] * inputs(shape) : 0;
 }
 
-// The layers with pointers into the flat arrays; -1, or the first layer that does not fit.
-static int32_t unpackInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers, networkInt8_t *network) {
+int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
   int32_t weight = 0, channel = 0, sparseChannel = 0, block = 0;
   if (flat->layerCount < 1 || flat->layerCount > MAX_LAYERS) {
     return 0;
   }
-  *network = (networkInt8_t){.layers = layers, .layerCount = flat->layerCount,
-                             .inputScale = flat->inputScale, .inputZeroPoint = flat->inputZeroPoint};
   for (int32_t i = 0; i < flat->layerCount; i++) {
     const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
     layers[i] = (layerInt8_t){.kind = s[0], .inRows = s[1], .inColumns = s[2], .inChannels = s[3],
@@ -63,7 +62,15 @@ static int32_t unpackInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers, ne
       return i;
     }
   }
-  return networkInt8Check(network);
+  return -1;
+}
+
+// The network with pointers into the flat arrays; -1, or the first layer that does not fit.
+static int32_t unpackInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers, networkInt8_t *network) {
+  const int32_t wrong = unpackLayersInt8(flat, layers);
+  *network = (networkInt8_t){.layers = layers, .layerCount = flat->layerCount,
+                             .inputScale = flat->inputScale, .inputZeroPoint = flat->inputZeroPoint};
+  return wrong >= 0 ? wrong : networkInt8Check(network);
 }
 
 static void unpackFloat(const flatNetworkFloat_t *flat, layerFloat_t *layers, networkFloat_t *network) {
@@ -146,33 +153,6 @@ void networkInt8BatchQuantise(const flatNetworkInt8_t *flat, const float *x, int
   networkInt8Quantise(&network, x, count, q);
 }
 
-// Each column to mean 0 and population standard deviation 1; a constant column to 0.
-static void zScore(const float *features, int32_t rows, int32_t columns, float *window) {
-  for (int32_t c = 0; c < columns; c++) {
-    const float first = features[c];
-    float span = 0.0f;
-    for (int32_t r = 0; r < rows; r++) {
-      span = fmaxf(span, fabsf(features[r * columns + c] - first));
-    }
-    const float scale = span > 0.0f ? 1.0f / span : 0.0f;
-    float mean = 0.0f;
-    for (int32_t r = 0; r < rows; r++) {
-      window[r * columns + c] = (features[r * columns + c] - first) * scale;
-      mean += window[r * columns + c];
-    }
-    mean /= (float)rows;
-    float variance = 0.0f;
-    for (int32_t r = 0; r < rows; r++) {
-      window[r * columns + c] -= mean;
-      variance += window[r * columns + c] * window[r * columns + c];
-    }
-    const float gain = span > 0.0f ? 1.0f / sqrtf(variance / (float)rows) : 0.0f;
-    for (int32_t r = 0; r < rows; r++) {
-      window[r * columns + c] *= gain;
-    }
-  }
-}
-
 void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int32_t samples,
                        int32_t columns, int32_t rows, float *window, int8_t *quantised,
                        int8_t *arena, int8_t *outputs, uint8_t *valid) {
@@ -192,7 +172,7 @@ void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int
     finite = usable ? finite + 1 : 0;
     valid[i] = finite >= rows;
     if (valid[i]) {
-      zScore(features + (i - rows + 1) * columns, rows, columns, window);
+      zScoreWindow(features + (i - rows + 1) * columns, (uint16_t)rows, (uint16_t)columns, window);
       networkInt8Quantise(&network, window, rows * columns, quantised);
       const int8_t *result = networkInt8Run(&network, quantised, arena);
       for (int32_t j = 0; j < outputCount; j++) {

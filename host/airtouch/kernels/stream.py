@@ -1,0 +1,42 @@
+"""The streaming int8 network of gap8/kernels, a flight in one call."""
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.kernels.library import ffi, lib
+from airtouch.kernels.network import checked, flat_layers, pointer
+from airtouch.reference.stream_int8 import StreamNetwork
+
+
+def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
+    """int8 head outputs (ceil(n / stride), outputs) of int8 samples (n, channels).
+
+    Reference: `airtouch.reference.stream_int8.run_stream`. Raises AirTouchError for samples of another
+    width and for layers that do not fit each other.
+    """
+    x = np.ascontiguousarray(quantised, dtype=np.int8)
+    if x.ndim != 2 or x.shape[1] != network.channels:
+        raise AirTouchError(f"network: needs samples (n, {network.channels}), not {x.shape}")
+    flat, keep = flat_stream(network)
+    arena = ffi.new("int8_t[]", arena_bytes(network))
+    outputs = np.empty((-(-len(x) // network.stride), network.head.output_shape[2]), dtype=np.int8)
+    lib.streamInt8Flight(flat, pointer("int8_t", x), len(x), arena, pointer("int8_t", outputs))
+    return outputs
+
+
+def arena_bytes(network: StreamNetwork) -> int:
+    """Bytes of state that the network keeps between samples."""
+    flat, keep = flat_stream(network)
+    return checked(lib.streamInt8BatchArena(flat))
+
+
+def flat_stream(network: StreamNetwork) -> tuple[object, list]:
+    """The C view of a network, and what must outlive it."""
+    layers, keep = flat_layers(network.layers)
+    dilations = np.array([conv.dilation for conv in network.convs], dtype=np.int32)
+    zero_points = np.array([conv.layer.input_zero_point for conv in network.convs], dtype=np.int32)
+    flat = ffi.new("flatStreamInt8_t *", {
+        "layers": layers, "dilations": pointer("int32_t", dilations),
+        "zeroPoints": pointer("int32_t", zero_points), "stride": network.stride,
+        "firstSkip": network.first_skip})
+    return flat, [layers, dilations, zero_points, *keep]
