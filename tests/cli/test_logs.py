@@ -16,7 +16,8 @@ from airtouch.logs.flight_log import PWM, FlightLog
 def folder(tmp_path):
     n = 600
     height = np.r_[np.full(300, 0.8), np.full(300, 0.05)]
-    columns = {"t_s": np.arange(n) * 0.002, "zrange_m": height} | {m: np.full(n, 4e4) + np.arange(n) for m in PWM}
+    columns = {"t_s": np.arange(n) * 0.002, "zrange_m": height}
+    columns |= {m: np.full(n, 4e4) + np.arange(n) for m in PWM}
     logs.write(FlightLog(columns, {"source": "made", "condition": "calm"}), tmp_path / "good.csv")
     (tmp_path / "empty.csv.gz").write_bytes(b"")
     (tmp_path / "manifest.csv").write_text("file,use\n")

@@ -48,7 +48,8 @@ def test_arrival_times_are_not_taken_for_sample_times():
 
 def test_steps_are_held_angles_unwrapped_motors_in_range():
     t = np.arange(2000) / 500.0
-    log = FlightLog({"t_s": t, "zrange_m": np.where(t < 2, 0.8, 0.05), "yaw_rad": np.angle(np.exp(1j * 3 * t)),
+    log = FlightLog({"t_s": t, "zrange_m": np.where(t < 2, 0.8, 0.05),
+                     "yaw_rad": np.angle(np.exp(1j * 3 * t)),
                      "m1_pwm": np.where(t < 2, 0.0, 65535.0)}, {"source": "made"})
     new = logs.resample(log)
     assert set(np.unique(new["zrange_m"])) == {0.05, 0.8}

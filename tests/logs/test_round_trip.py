@@ -2,6 +2,7 @@
 
 import gzip
 import sys
+import time
 import warnings
 
 import numpy as np
@@ -19,7 +20,8 @@ from airtouch.logs.flight_log import COLUMNS, FlightLog
 NAMES = st.lists(st.sampled_from([*COLUMNS, "extra", "my column"]), min_size=1, max_size=6, unique=True)
 VALUES = st.floats(width=64, allow_nan=True, allow_infinity=True)
 META = st.dictionaries(st.sampled_from(["vehicle", "condition", "note_2", "seed"]),
-                       st.one_of(st.text(), st.integers(), st.booleans(), st.lists(st.floats(allow_nan=False))))
+                       st.one_of(st.text(), st.integers(), st.booleans(),
+                                 st.lists(st.floats(allow_nan=False))))
 
 
 @st.composite
@@ -72,7 +74,8 @@ def test_write_is_whole_or_not_at_all(tmp_path):
         np.testing.assert_array_equal(logs.read(tmp_path / name)["t_s"], log["t_s"])
     assert gzip.decompress((tmp_path / "a.csv.gz").read_bytes()) == (tmp_path / "a.csv").read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "a.csv.gz"]
-    for place, message in ((tmp_path / "a.txt", "unknown kind"), (tmp_path / "no" / "a.csv", "cannot be written")):
+    for place, message in ((tmp_path / "a.txt", "unknown kind"),
+                           (tmp_path / "no" / "a.csv", "cannot be written")):
         with pytest.raises(AirTouchError, match=message):
             logs.write(log, place)
     with pytest.raises(AirTouchError, match="without columns"):
@@ -104,3 +107,35 @@ def test_any_bytes_give_a_log_or_one_line(head, tail, zipped):
             return
         assert len(log) >= 1 and log.columns
         logs.check(log)
+
+
+@pytest.mark.parametrize("data", [
+    b"\n" * 1_000_000 + b"t_s,zrange_m\n0,1\n",
+    b"# a\n" * 300_000 + b"t_s,zrange_m\n0,1\n",
+    b"# a: b\n\ntimestamp_ms,gyro.x,gyro.y,gyro.z\n0,1,2,3\n",
+    b"t_s," + b",".join(b"c%d" % i for i in range(100_000)) + b"\n",
+    b"1," * 500_000,
+    b"[" * 100_000,
+    b"# a: " + b"[" * 100_000 + b"\nt_s\n1\n",
+], ids=["blank lines", "comments", "comments before variables", "columns", "cells", "no line", "deep meta"])
+def test_odd_shapes_are_read_or_refused_at_once(data):
+    start = time.perf_counter()
+    try:
+        assert len(parse(data, "odd")) == 1
+    except AirTouchError as error:
+        assert str(error).startswith("odd") and len(str(error)) < 300
+    assert time.perf_counter() - start < 5
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_damaged_parquet_never_crashes(data):
+    pytest.importorskip("pyarrow")
+    sound = FlightLog({"t_s": np.arange(50.0), "zrange_m": np.ones(50)}, {"source": "a"})
+    log = bytearray(parquet.to_bytes(sound))
+    for _ in range(data.draw(st.integers(1, 4))):
+        log[data.draw(st.integers(4, len(log) - 1))] = data.draw(st.integers(0, 255))
+    try:
+        parse(bytes(log), "damaged")
+    except AirTouchError as error:
+        assert "\n" not in str(error)

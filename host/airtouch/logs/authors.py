@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
 from airtouch.logs.quaternion import decompress, euler, to_body
-from airtouch.logs.table import parse_table
+from airtouch.logs.table import parse_table, split_header
 
 GRAVITY = 9.81  #: m/s^2 in one g, as the Crazyflie firmware counts it
 GYRO_LSB = np.deg2rad(2000 * 2 / 65536)  #: rad/s in one LSB of `gyro.xRaw`
@@ -33,14 +33,15 @@ def read(text: bytes, source: str) -> FlightLog:
     meta["acc_frame"] and a warning say so. Raises AirTouchError for other widths
     and for rows that are not numbers.
     """
-    first = text.lstrip().split(b"\n", 1)[0]
+    _, first, rest, line_number = split_header(text)
     width = first.count(b",") + 1
     if width not in LAYOUTS:
         known = ", ".join(str(n) for n in LAYOUTS)
-        raise AirTouchError(f"{source}:1: {width} columns without a header; known layouts have {known}; "
-                            "add a header with column names as `airtouch logs convert` writes them")
+        raise AirTouchError(f"{source}:{line_number}: {width} columns without a header; "
+                            f"known layouts have {known}; add a header with column names as `airtouch logs convert` writes them")
     warnings: list[str] = []
-    rows = parse_table(text, source, width, 1, warnings)
+    body = first + b"\n" + rest if rest or text.endswith(b"\n") else first
+    rows = parse_table(body, source, width, line_number, warnings)
     layout = LAYOUTS[width]
     raw = {kind: rows[:, [i for i, k in enumerate(layout) if k == kind]] for kind in set(layout)}
     columns = {"t_s": raw["t"][:, 0]}

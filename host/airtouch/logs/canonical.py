@@ -10,8 +10,9 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
-from airtouch.logs.table import parse_table
+from airtouch.logs.table import names_of, parse_table, split_header
 
+MOST_COLUMNS = 256  #: those of the schema and any others
 _KEY = re.compile(r"[A-Za-z_][\w .-]*")
 
 
@@ -23,16 +24,15 @@ def read(text: bytes, source: str) -> FlightLog:
     Raises AirTouchError for a repeated name, a missing header and bad rows.
     """
     meta: dict[str, Any] = {}
-    line_number = 1
-    rest = text
-    while rest.lstrip(b" \t").startswith((b"#", b"\n")):
-        line, _, rest = rest.partition(b"\n")
-        line_number += 1
-        key, colon, value = line.decode("utf-8", "replace").strip().lstrip("#").partition(":")
+    comments, header, body, line_number = split_header(text)
+    for line in comments:
+        key, colon, value = line.decode("utf-8", "replace").lstrip("#").partition(":")
         if colon and _KEY.fullmatch(key.strip()):
             meta[key.strip()] = _value(value.strip())
-    header, _, body = rest.partition(b"\n")
-    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+    names = names_of(header)
+    if len(names) > MOST_COLUMNS:
+        raise AirTouchError(f"{source}:{line_number}: {len(names)} columns; "
+                            f"a flight log has at most {MOST_COLUMNS}")
     if len(set(names)) < len(names) or "" in names:
         raise AirTouchError(f"{source}:{line_number}: a column name is empty or repeated; "
                             "give each its own name")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.logs.flight_log import FlightLog
-from airtouch.logs.table import parse_table
+from airtouch.logs.table import names_of, parse_table, split_header
 from airtouch.logs.variables import to_columns
 
 
@@ -27,10 +27,9 @@ def read(text: bytes, source: str) -> FlightLog:
 
 def read_variables(text: bytes, source: str, meta: dict) -> FlightLog:
     """A CSV whose header names Crazyflie log variables, with `timestamp_ms` as its clock."""
-    header, _, body = text.lstrip(b"\n").partition(b"\n")
-    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
-    skipped = len(text) - len(text.lstrip(b"\n"))
-    rows = parse_table(body, source, len(names), 2 + skipped, meta["warnings"])
+    _, header, body, line_number = split_header(text)
+    names = names_of(header)
+    rows = parse_table(body, source, len(names), line_number + 1, meta["warnings"])
     table = dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
     columns = {"t_s": table["timestamp_ms"] * 1e-3} | to_columns(table, meta)
     return FlightLog(columns, meta)

@@ -8,6 +8,7 @@ from pathlib import Path
 from airtouch.errors import AirTouchError
 from airtouch.logs import authors, canonical, crazypad, imrclab, usd
 from airtouch.logs.flight_log import COLUMNS, FlightLog
+from airtouch.logs.table import names_of, split_header
 
 LARGEST_BYTES = 1 << 30  #: unpacked; more than this is no flight log
 
@@ -100,11 +101,10 @@ def _bytes(path: str | Path) -> bytes:
 
 
 def _by_header(text: bytes, source: str) -> FlightLog:
-    lines = (line for line in text.split(b"\n") if line.strip() and not line.lstrip().startswith(b"#"))
-    first = next(lines, None)
-    if first is None:
+    _, first, _, line_number = split_header(text)
+    if not first:
         raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
-    names = [cell.strip() for cell in first.decode("utf-8", "replace").split(",")]
+    names = names_of(first)
     if _numeric(names[0]):
         return authors.read(text, source)
     if any(name in COLUMNS for name in names):
@@ -116,7 +116,8 @@ def _by_header(text: bytes, source: str) -> FlightLog:
     if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
     shown = first[:60].decode("ascii", "replace")
-    raise AirTouchError(f"{source}:1: unknown header {shown!r}; name the columns as in the table of columns")
+    raise AirTouchError(f"{source}:{line_number}: unknown header {shown!r}; "
+                        "name the columns as in the table of columns")
 
 
 def _numeric(cell: str) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.canonical import ordered_names, plain, stored_meta
+from airtouch.logs.canonical import MOST_COLUMNS, ordered_names, plain, stored_meta
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 _KEY = b"airtouch"
@@ -22,6 +22,8 @@ def read(data: bytes, source: str) -> FlightLog:
     arrow, parquet = _pyarrow(source)
     try:
         table = parquet.read_table(io.BytesIO(data))
+        if table.num_columns > MOST_COLUMNS:
+            raise ValueError(f"{table.num_columns} columns; a flight log has at most {MOST_COLUMNS}")
         columns = {name: _numbers(table.column(name)) for name in table.column_names}
         meta = json.loads((table.schema.metadata or {}).get(_KEY, b"{}"))
     except (arrow.ArrowException, OSError, ValueError, TypeError, MemoryError, RecursionError) as error:

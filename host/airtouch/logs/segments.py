@@ -29,8 +29,8 @@ def segments(log: FlightLog) -> list[Segment]:
     """The phases of a flight in order, without holes.
 
     Ground: motors below the airborne level, or never higher than 5 cm. Take-off: until
-    85 % of the median height in the air; landing: from the last time at that height. Over platform: between an
-    entry and an exit of the down range. Between them cruise where the speed is above
+    85 % of the median height in the air; landing: from the last time at that height.
+    Over platform: between an entry and an exit of the down range. Between them cruise where the speed is above
     0.1 m/s, else hover; without velocity the whole level part counts as cruise when it
     crosses an edge, else as hover. Raises AirTouchError when neither PWM nor any
     height is logged.

@@ -10,6 +10,30 @@ from airtouch.errors import AirTouchError
 _EMPTY_CELL = re.compile(rb"(?<=,)(?=[,\n])|(?<=\n)(?=,)")
 
 
+def split_header(text: bytes) -> tuple[list[bytes], bytes, bytes, int]:
+    """Leading comment lines, the first line that is none, what follows, and that line's number.
+
+    Blank lines before it are skipped; without such a line it and the rest are empty.
+    """
+    comments: list[bytes] = []
+    place, number = 0, 1
+    while place < len(text):
+        end = text.find(b"\n", place)
+        end = len(text) if end < 0 else end
+        line = text[place:end].strip()
+        if line and not line.startswith(b"#"):
+            return comments, text[place:end], text[end + 1:], number
+        if line:
+            comments.append(line)
+        place, number = end + 1, number + 1
+    return comments, b"", b"", number
+
+
+def names_of(header: bytes) -> list[str]:
+    """The column names in a header line."""
+    return [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+
+
 def parse_table(body: bytes, source: str, columns: int, first_line: int,
                 warnings: list[str]) -> np.ndarray:
     """Comma-separated numbers as a float64 array of shape (rows, columns).

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import load_text
-from airtouch.logs.table import parse_table
+from airtouch.logs.table import names_of, parse_table, split_header
 
 #: header -> column of the table; the weight is in grams in every known file
 STAND_COLUMNS = {
@@ -23,9 +23,10 @@ def read_thrust_stand(path: str | Path) -> dict[str, np.ndarray]:
     and for rows that are not numbers.
     """
     source = str(path)
-    header, _, body = load_text(path).partition(b"\n")
-    names = [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+    _, header, body, line_number = split_header(load_text(path))
+    names = names_of(header)
     if not {"pwm", "vbat[V]", "rpm1"} <= set(names):
-        raise AirTouchError(f"{source}:1: not the header of a thrust-stand run (pwm, vbat[V], rpm1, ...)")
-    rows = parse_table(body, source, len(names), 2, [])
+        raise AirTouchError(f"{source}:{line_number}: not the header of a thrust-stand run "
+                            "(pwm, vbat[V], rpm1, ...)")
+    rows = parse_table(body, source, len(names), line_number + 1, [])
     return {STAND_COLUMNS[n]: rows[:, i] for i, n in enumerate(names) if n in STAND_COLUMNS}
