@@ -13,7 +13,8 @@ from airtouch.logs.files import parse
 from airtouch.logs.flight_log import ACC, GYRO
 
 VARIABLES = ("acc.x(f)", "acc.y(f)", "acc.z(f)", "gyro.x(f)", "gyro.y(f)", "gyro.z(f)", "motor.m1(H)",
-             "motor.m2(H)", "motor.m3(H)", "motor.m4(H)", "range.zrange(H)", "pm.vbat(f)", "stateEstimateZ.quat(I)")
+             "motor.m2(H)", "motor.m3(H)", "motor.m4(H)", "range.zrange(H)", "pm.vbat(f)",
+             "stateEstimateZ.quat(I)")
 
 
 def usd_log(version=2, rows=50, event=b"fixedFrequency", other=True):

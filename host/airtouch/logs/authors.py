@@ -38,7 +38,8 @@ def read(text: bytes, source: str) -> FlightLog:
     if width not in LAYOUTS:
         known = ", ".join(str(n) for n in LAYOUTS)
         raise AirTouchError(f"{source}:{line_number}: {width} columns without a header; "
-                            f"known layouts have {known}; add a header with column names as `airtouch logs convert` writes them")
+                            f"known layouts have {known}; "
+                            "add a header with column names as `airtouch logs convert` writes them")
     warnings: list[str] = []
     body = first + b"\n" + rest if rest or text.endswith(b"\n") else first
     rows = parse_table(body, source, width, line_number, warnings)

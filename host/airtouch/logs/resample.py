@@ -1,7 +1,6 @@
 """Resampling to a steady rate, only ever on request."""
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.clock import regular_time, true_period
@@ -83,6 +82,8 @@ def _smoothed(t: np.ndarray, v: np.ndarray, period: float, rate_hz: float) -> tu
     grid = t[0] + np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1) * period
     if len(grid) < 4:
         return t, v
+    from scipy.signal import butter, sosfiltfilt  # slow to import, and seldom needed
+
     sos = butter(8, CUTOFF * rate_hz, fs=1.0 / period, output="sos")
     padding = min(len(grid) - 1, int(3.0 / (CUTOFF * rate_hz * period)) + 1)
     return grid, sosfiltfilt(sos, np.interp(grid, t, v), padlen=padding)

@@ -30,10 +30,10 @@ def segments(log: FlightLog) -> list[Segment]:
 
     Ground: motors below the airborne level, or never higher than 5 cm. Take-off: until
     85 % of the median height in the air; landing: from the last time at that height.
-    Over platform: between an entry and an exit of the down range. Between them cruise where the speed is above
-    0.1 m/s, else hover; without velocity the whole level part counts as cruise when it
-    crosses an edge, else as hover. Raises AirTouchError when neither PWM nor any
-    height is logged.
+    Over platform: between an entry and an exit of the down range. The rest is cruise
+    where the speed is above 0.1 m/s, else hover; without velocity all of it counts as
+    cruise when the flight crosses an edge, else as hover. Raises AirTouchError when
+    neither PWM nor any height is logged.
     """
     period = sample_period(log)
     flying = _without_short_runs(airborne(log), int(0.5 / period))
