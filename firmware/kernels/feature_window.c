@@ -82,17 +82,13 @@ float streamingZScoreStep(streamingZScore_t *self, float x) {
     return 0.0f;
   }
   const float value = guardSample(x, &self->held);
-  if (!self->started) {
-    self->started = true;
-    self->first = value;
-  }
-  const float level = value - self->first;
-  const float step = exponentialMeanStep(&self->mean, level);
+  self->started = true;
+  const float step = exponentialMeanStep(&self->mean, value);
   const float gain = self->mean.gain;
   self->variance = (1.0f - gain) * (self->variance + gain * step * step);
   const float std = sqrtf(self->variance);
   if (!(std >= STREAMING_STD_FLOOR)) {
     return 0.0f;
   }
-  return ((level - self->mean.mean) + self->mean.low) / std;
+  return ((value - self->mean.mean) + self->mean.low) / std;
 }

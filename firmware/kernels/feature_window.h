@@ -22,7 +22,7 @@ typedef struct {
   float timeConstant;  ///< samples in which a weight falls by e
   float rate;          ///< 1 - e^(-1 / timeConstant)
   float mean;
-  float low;           ///< what rounding lost of it
+  float low;           ///< what rounding lost of it: mean - low is exact to twice float's digits
   float gain;          ///< weight of the newest sample
   uint32_t count;      ///< samples seen, until the gain has settled
 } exponentialMean_t;
@@ -35,9 +35,8 @@ float exponentialMeanStep(exponentialMean_t *self, float x);
 
 /** State of one column's streaming z-score. */
 typedef struct {
-  exponentialMean_t mean;  ///< of x - first
-  float first;             ///< the first finite sample
-  float held;              ///< the last finite one
+  exponentialMean_t mean;
+  float held;  ///< the last finite sample
   float variance;
   bool started;
 } streamingZScore_t;

@@ -20,7 +20,7 @@ class Parameters:
     guard_cells: int = 15  #: FR-CFAR: cells between them and the cell under test
     p_fa: float = 1e-6  #: FR-CFAR: probability of false alarm
     feature_window: int = 100  #: network: fused features it sees, samples
-    force_mean_samples: float = 200.0  #: FR-CFAR input: time constant of f_w,z's mean, samples
+    force_mean_samples: float = 100.0  #: FR-CFAR input: time constant of f_w,z's mean, samples
     alert_hold: int = 50  #: physical filter: an alert vouches for edges this many samples after it
     arm_pwm: float = 15000.0  #: decoding: airborne while the mean PWM is above this
     arm_samples: int = 100  #: decoding: airborne for so long before an edge can be reported, samples

@@ -1,0 +1,33 @@
+/**
+ * @file edge_decoder.h
+ * From the streaming network's three logits (over a platform, entry now, exit now)
+ * to edges: an event fires where its own logit and the state agree, or late where
+ * the state alone has changed for good.
+ */
+#pragma once
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "kernel_types.h"
+
+/** The decoder's memory. */
+typedef struct {
+  decoderConfig_t config;
+  float slow;         ///< smoothed over logit
+  uint32_t airborne;  ///< steps in the air
+  uint32_t since;     ///< steps since the last edge
+  bool over;          ///< over a platform
+} edgeDecoder_t;
+
+/** Sets the decoder up; the settings are copied. */
+void edgeDecoderInit(edgeDecoder_t *decoder, const decoderConfig_t *config);
+
+/**
+ * Takes the logits of one step.
+ * @param logits    over, entry, exit; NaN counts as "no"
+ * @param airborne  whether the drone flies; on the ground it is over nothing
+ * @return 0 nothing, 1 entry, 2 exit
+ * Costs about 30 operations. Never fails.
+ */
+uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airborne);

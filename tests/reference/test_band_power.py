@@ -1,0 +1,77 @@
+"""Band power against SciPy and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.signal import ShortTimeFFT
+from scipy.signal.windows import hann
+
+from airtouch.errors import AirTouchError
+from airtouch.reference import band_bins, band_power, window_ends
+
+
+def scipy_band_power(x, fs, window, band):
+    """The integral of ShortTimeFFT's spectral density over the band, and the last sample of each full window."""
+    stft = ShortTimeFFT(hann(window, sym=False), hop=1, fs=fs, scale_to="psd")
+    slices = np.arange(stft.p_min, stft.p_max(len(x)))
+    ends = slices + window - 1 - window // 2
+    full = (ends >= window - 1) & (ends < len(x))
+    within = (stft.f >= band[0] - 1e-9) & (stft.f <= band[1] + 1e-9)
+    sides = np.where(np.isclose(stft.f, fs / 2), 1.0, 2.0)[within, None]
+    density = sides * np.abs(stft.stft(x)[within]) ** 2
+    return ends[full], density[:, full].sum(axis=0) * fs / window
+
+
+@pytest.mark.parametrize("fs, window, band", [
+    (100.0, 200, (6.0, 8.0)), (100.0, 128, (0.0 + 100 / 64, 50.0)), (50.0, 37, (6.0, 8.0)), (1000.0, 64, (100.0, 300.0)),
+])
+def test_is_the_integral_of_scipys_spectral_density(fs, window, band):
+    x = np.random.default_rng(0).normal(size=1000) + np.sin(np.arange(1000) * 0.4)
+    ends, expected = scipy_band_power(x, fs, window, band)
+    ours = band_power(x, sample_rate_hz=fs, window=window, band_hz=band)
+    assert np.isnan(ours[:window - 1]).all() and len(ours) == len(x)
+    np.testing.assert_allclose(ours[ends], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("offset", [0.0, 9.81, 1e6])
+def test_a_sine_amid_the_band_has_half_its_amplitude_squared_whatever_its_offset(offset):
+    x = offset + 3.0 * np.sin(2 * np.pi * 7.0 * np.arange(1000) / 100.0 + 0.3)
+    np.testing.assert_allclose(band_power(x)[199:], 4.5, rtol=1e-6)
+
+
+def test_sines_outside_leave_nothing():
+    t = np.arange(1000) / 100.0
+    assert band_power(np.sin(2 * np.pi * 3.0 * t) + np.sin(2 * np.pi * 12.0 * t))[199:].max() < 1e-20
+
+
+def test_is_causal():
+    x = np.random.default_rng(1).normal(size=600)
+    changed = x.copy()
+    changed[400:] = 1e3
+    np.testing.assert_array_equal(band_power(x)[:400], band_power(changed)[:400])
+
+
+def test_hops_are_rows_of_the_full_rate():
+    x = np.random.default_rng(2).normal(size=(777, 3))
+    every = band_power(x, hop=1)
+    for hop in (2, 7, 200):
+        np.testing.assert_allclose(band_power(x, hop=hop), every[window_ends(777, 200, hop)], rtol=1e-12)
+
+
+def test_short_and_empty_flights_have_no_powers():
+    assert np.isnan(band_power(np.zeros((199, 2)))).all()
+    assert band_power(np.zeros((0, 9))).shape == (0, 9)
+    assert band_power(np.zeros((10, 9)), hop=5).shape == (0, 9)
+
+
+def test_bins_of_the_band():
+    assert band_bins(100.0, 200, (6.0, 8.0)) == (12, 16)
+
+
+@pytest.mark.parametrize("settings", [
+    dict(window=3), dict(window=2.5), dict(hop=0), dict(band_hz=(8.0, 6.0)), dict(band_hz=(0.0, 8.0)),
+    dict(band_hz=(6.0, 60.0)), dict(band_hz=(6.1, 6.2)), dict(sample_rate_hz=0.0), dict(band_hz=(np.nan, 8.0)),
+])
+def test_settings_out_of_range_are_one_line(settings):
+    with pytest.raises(AirTouchError) as error:
+        band_power(np.zeros(300), **settings)
+    assert "\n" not in str(error.value)
