@@ -5,8 +5,8 @@ from collections.abc import Callable
 DEFAULT_LAMBDA = 0.1  #: weight of the disturbance-force loss
 
 
-def edge_loss(df_lambda: float = DEFAULT_LAMBDA) -> Callable:
-    """L = L_S + lambda L_F for Keras, one value a window.
+def edge_loss(df_lambda: float = DEFAULT_LAMBDA, class_weights: tuple[float, float] = (1.0, 1.0)) -> Callable:
+    """L = L_S + lambda L_F for Keras, one value a window, weighed by its class (beside, over).
 
     The target is (n, 2): the label y (1 over a platform) and whether the measured
     disturbance force reached the FR-CFAR threshold at the window's last sample,
@@ -19,7 +19,9 @@ def edge_loss(df_lambda: float = DEFAULT_LAMBDA) -> Callable:
         cross_entropy = keras.losses.sparse_categorical_crossentropy(
             ops.cast(target[:, 0], "int32"), logits, from_logits=True)
         predicted = ops.sigmoid(logits[:, 1] - logits[:, 0])
-        return cross_entropy + df_lambda * disturbance_force_loss(target[:, 1], predicted, ops)
+        beside, over = class_weights
+        weight = beside + (over - beside) * target[:, 0]
+        return weight * (cross_entropy + df_lambda * disturbance_force_loss(target[:, 1], predicted, ops))
 
     return loss
 

@@ -1,0 +1,233 @@
+"""Training the paper's network on flights (sections 5.2, 5.3 and 7.1)."""
+
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from airtouch import __version__, logs, reference
+from airtouch.detector import network, pruning, quantisation
+from airtouch.detector.features import Features, flight_features
+from airtouch.detector.losses import DEFAULT_LAMBDA, edge_loss
+from airtouch.detector.model_file import Model
+from airtouch.detector.score import over_platform
+from airtouch.errors import AirTouchError
+from airtouch.kernels.network import infer_float, infer_int8
+from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT
+
+EPOCHS = 10
+BATCH = 128
+SPARSITY = 0.8
+HELD_OUT = 0.15  #: share of the flights that decide when to stop
+PRUNED_BY = 0.6  #: share of the steps after which the zeros stay where they are
+PATIENCE = 3  #: epochs without a lower loss on the held-out flights
+PEAK_RATE = 2e-3  #: learning rate at the top of the one cycle
+BATCHES_A_CALL = 50
+STRIDE = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
+
+#: progress(stage, done, total, note), stage "features" (flights) or "epochs"
+Progress = Callable[[str, int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Windows:
+    """n training windows.
+
+    x: (n, 100, 3) float32, each column z-scored. over: (n,) 1.0 where the last sample is over a
+    platform. alert: (n,) 1.0 where the disturbance force reached its threshold there.
+    flight: (n,) index of the flight.
+    """
+
+    x: np.ndarray
+    over: np.ndarray
+    alert: np.ndarray
+    flight: np.ndarray
+
+    def select(self, chosen: np.ndarray) -> "Windows":
+        """The windows where `chosen` (n,) is True."""
+        return Windows(self.x[chosen], self.over[chosen], self.alert[chosen], self.flight[chosen])
+
+
+def train_paper(
+    flights: Sequence[FlightLog],
+    *,
+    seed: int = 0,
+    epochs: int = EPOCHS,
+    sparsity: float = SPARSITY,
+    block: int = pruning.BLOCK,
+    df_lambda: float = DEFAULT_LAMBDA,
+    progress: Progress | None = None,
+    command: str = "airtouch.detector.train.train_paper",
+) -> Model:
+    """Train, prune and quantise; the same arguments give the same bits on one machine.
+
+    flights: with down range, for the true edges. sparsity: share of zeros in the first dense
+    layer, in blocks of `block` inputs (4, or 1 for single weights). df_lambda: weight of the
+    disturbance-force loss. Training stops early on flights held out by seed.
+    Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
+    """
+    _check(epochs, sparsity, block, df_lambda)
+    _tensorflow(seed)
+    told = progress or (lambda *_: None)
+    windows = training_windows(flights, told)
+    held = held_out(len(flights), seed)
+    kept = ~np.isin(windows.flight, held)
+    if not kept.any() or len(np.unique(windows.over[kept])) < 2:
+        raise AirTouchError("training: the flights hold no windows both over and beside a platform; give more flights")
+    weights, ran = _fit(windows.select(kept), windows.select(~kept), epochs, sparsity, block, df_lambda, told)
+    int8, tflite = quantisation.quantise(weights, windows.x[kept])
+    model = Model(weights, int8, tflite, {
+        "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
+        "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block, "lambda": df_lambda,
+        "flights": [os.path.basename(log.source) for log in flights],
+        "held_out": [os.path.basename(flights[i].source) for i in held], "data_sha256": data_hash(windows),
+    })
+    return Model(weights, int8, tflite, {**model.metadata, "held_out_accuracy": accuracy(model, windows.select(~kept))})
+
+
+def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Windows:
+    """Every full window of every flight that ends in the air."""
+    parts = []
+    for index, log in enumerate(flights):
+        parts.append(windows_of(log, flight_features(log), index))
+        progress("features", index + 1, len(flights), os.path.basename(log.source))
+    if not sum(len(part.x) for part in parts):
+        raise AirTouchError("training: no flight holds a full window in the air; 3 s of flight at 100 Hz are needed")
+    return Windows(*(np.concatenate([getattr(part, name) for part in parts])
+                     for name in ("x", "over", "alert", "flight")))
+
+
+def windows_of(log: FlightLog, features: Features, index: int = 0) -> Windows:
+    """The training windows of one flight."""
+    size = DEFAULT.feature_window
+    if len(log) < size:
+        return Windows(np.zeros((0, size, 3), np.float32), np.zeros(0, np.float32), np.zeros(0, np.float32),
+                       np.zeros(0, np.int32))
+    raw = np.moveaxis(sliding_window_view(features.fused, size, axis=0), 2, 1)
+    ends = np.arange(size - 1, len(log))
+    usable = logs.airborne(log)[ends] & np.isfinite(raw).all(axis=(1, 2))
+    ends = ends[usable]
+    over = over_platform(logs.true_edges(log), len(log))
+    x = reference.z_score_window(raw[usable]) if len(ends) else raw[usable]
+    return Windows(x.astype(np.float32), over[ends].astype(np.float32), features.alert[ends].astype(np.float32),
+                   np.full(len(ends), index, np.int32))
+
+
+def held_out(flights: int, seed: int) -> np.ndarray:
+    """Indices of the flights that decide when to stop, in order; none of fewer than four."""
+    if flights < 4:
+        return np.zeros(0, dtype=int)
+    return np.sort(np.random.default_rng(seed).permutation(flights)[:max(1, round(HELD_OUT * flights))])
+
+
+def accuracy(model: Model, windows: Windows) -> dict[str, float | int | None]:
+    """Balanced window accuracy of the float and the int8 network, 0 to 1; None without both classes."""
+    result: dict[str, float | int | None] = {"windows": len(windows.x), "float": None, "int8": None}
+    if len(np.unique(windows.over)) == 2:
+        for name, logits in (("float", infer_float(model.float_layers, windows.x)),
+                             ("int8", infer_int8(model, windows.x))):
+            said = logits[:, 1] > logits[:, 0]
+            result[name] = float(np.mean([np.mean(said[windows.over == c] == c) for c in (0.0, 1.0)]))
+    return result
+
+
+def data_hash(windows: Windows) -> str:
+    """SHA-256 of the training windows and their labels."""
+    total = hashlib.sha256()
+    for values in (windows.x, windows.over, windows.alert, windows.flight):
+        total.update(np.ascontiguousarray(values).tobytes())
+    return total.hexdigest()
+
+
+def class_weights(over: np.ndarray) -> tuple[float, float]:
+    """What a window beside and over a platform counts, so that both classes count alike."""
+    share = float(np.clip(np.mean(over), 1e-3, 1.0 - 1e-3))
+    return 0.5 / (1.0 - share), 0.5 / share
+
+
+def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
+    """Learning rate: cosine from peak / 25 up over 30 % of the steps, cosine down to peak / 10^4 (Smith 2018)."""
+    position = min(step / steps, 1.0)
+    if position < 0.3:
+        start, stop, part = peak / 25.0, peak, position / 0.3
+    else:
+        start, stop, part = peak, peak / 1e4, (position - 0.3) / 0.7
+    return stop + (start - stop) * 0.5 * (1.0 + float(np.cos(np.pi * part)))
+
+
+def _fit(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+         progress: Progress) -> tuple[network.Weights, int]:
+    """The trained weights, and after how many epochs."""
+    import keras
+
+    train, held = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, held))
+    batches = max(len(train.x) // BATCH, 1)
+    pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
+    constraint, schedule = pruning.pruning(sparsity, batches * pruned_epochs, block)
+    model = network.build_keras({pruning.PRUNED: constraint})
+    rate = _rate_table(batches * epochs)
+    model.compile(keras.optimizers.Adam(rate), loss=edge_loss(df_lambda, class_weights(train.over)),
+                  steps_per_execution=min(BATCHES_A_CALL, batches))
+    stopping = keras.callbacks.EarlyStopping(patience=PATIENCE, restore_best_weights=True,
+                                             start_from_epoch=pruned_epochs)
+    told = keras.callbacks.LambdaCallback(
+        on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
+    callbacks = [schedule, told] + ([stopping] if len(held.x) else [])
+    history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
+                        validation_data=_batches(held, shuffle=False) if len(held.x) else None)
+    return network.weights_of_keras(model), len(history.history["loss"])
+
+
+def _rate_table(steps: int):  # noqa: ANN202 - a Keras class that exists only here
+    import keras
+    from keras import ops
+
+    table = np.array([one_cycle(step, steps) for step in range(steps + 1)], dtype=np.float32)
+
+    class OneCycle(keras.optimizers.schedules.LearningRateSchedule):
+        def __call__(self, step):  # noqa: ANN001, ANN204
+            return ops.take(table, ops.minimum(ops.cast(step, "int32"), steps))
+
+    return OneCycle()
+
+
+def _batches(windows: Windows, shuffle: bool):  # noqa: ANN202 - a tf.data.Dataset
+    """Cached windows in batches; the order of each epoch follows from the seed."""
+    import tensorflow as tf
+
+    x = tf.constant(windows.x[..., None])
+    target = tf.constant(np.column_stack([windows.over, windows.alert]))
+    order = tf.data.Dataset.range(len(windows.x)).cache()
+    if shuffle:
+        order = order.shuffle(len(windows.x), reshuffle_each_iteration=True)
+    order = order.batch(BATCH, drop_remainder=shuffle and len(windows.x) >= BATCH)
+    return order.map(lambda i: (tf.gather(x, i), tf.gather(target, i))).prefetch(4)
+
+
+def _tensorflow(seed: int) -> None:
+    """Import TensorFlow, quietly, with every source of chance fixed."""
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    os.environ.setdefault("CUDA_VISIBLE_DEVICES", "-1")  # one machine, one result
+    try:
+        import keras
+        import tensorflow as tf
+    except ImportError:
+        raise AirTouchError("training needs TensorFlow: pip install 'airtouch[train]'") from None
+    keras.backend.clear_session()
+    keras.utils.set_random_seed(seed)
+    tf.config.experimental.enable_op_determinism()
+
+
+def _check(epochs: int, sparsity: float, block: int, df_lambda: float) -> None:
+    if epochs < 1:
+        raise AirTouchError(f"training: epochs must be at least 1, not {epochs}")
+    if not 0.0 <= sparsity < 1.0:
+        raise AirTouchError(f"training: sparsity must lie in 0..1, below 1, not {sparsity}")
+    if block not in (1, pruning.BLOCK):
+        raise AirTouchError(f"training: blocks of 1 or {pruning.BLOCK} weights, not {block}")
+    if not (np.isfinite(df_lambda) and df_lambda >= 0):
+        raise AirTouchError(f"training: lambda must be 0 or more, not {df_lambda}")
