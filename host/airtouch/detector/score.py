@@ -72,8 +72,19 @@ class FlightScore:
             "detections": self.detections,
             "balanced_accuracy": self.balanced_accuracy(),
             "airborne_s": self.airborne_s,
+            "windows": list(self.windows),
+            "reliability": self.bins.tolist(),
             "note": self.note,
         }
+
+    @classmethod
+    def from_dict(cls, entry: dict) -> "FlightScore":
+        """The inverse of `as_dict`; raises KeyError or TypeError for another shape."""
+        false = entry["false"]
+        return cls(
+            entry["file"], Condition(**entry["condition"]), tuple(EdgeScore(**e) for e in entry["edges"]),
+            None if false is None else tuple(false), entry["detections"], entry["airborne_s"],
+            tuple(entry["windows"]), np.array(entry["reliability"], float), entry["note"])
 
 
 def match(true: Sequence[float], detected: Sequence[float], tolerance: float) -> list[tuple[int, int]]:

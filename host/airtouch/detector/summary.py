@@ -49,7 +49,15 @@ def breakdown(scores: Sequence[FlightScore], key: Callable[[FlightScore], str | 
         value = key(score)
         if value is not None:
             groups.setdefault(value, []).append(score)
-    return {value: summarise(groups[value]) for value in sorted(groups)}
+    return {value: summarise(groups[value]) for value in sorted(groups, key=_order)}
+
+
+def _order(value: str) -> tuple[bool, float, str]:
+    """Numbers by value, before names."""
+    try:
+        return False, float(value), value
+    except ValueError:
+        return True, 0.0, value
 
 
 def by_height(scores: Sequence[FlightScore]) -> dict[str, dict]:

@@ -1,0 +1,76 @@
+"""`airtouch crossval`: cross-validate a detector by flight."""
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from airtouch.cli import scores as show
+from airtouch.cli.flights import find_flights
+from airtouch.detector import crossval, dataset, evaluate
+
+
+@click.command(name="crossval")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--detector", default="paper", show_default=True, help="paper, baseline, ...")
+@click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
+              help="Drop edges without an FR-CFAR alert.")
+@click.option("--epochs", type=click.IntRange(1), help="Training epochs; the detector's own number if left out.")
+@click.option("--seed", default=0, show_default=True, help="Of training.")
+@click.option("--random-windows", is_flag=True,
+              help="Also score the paper's random split of windows, which leaks (paper's network only).")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/crossval"), show_default=True,
+              help="Where finished folds are kept; a second run goes on from there.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
+@click.option("--force", is_flag=True, help="Replace the JSON file.")
+@click.option("--ledger", type=click.Path(path_type=Path),
+              help="Append a line to this file: how often the folds were looked at.")
+def command(folder: Path | None, detector: str, physical_filter: bool, epochs: int | None, seed: int,
+            random_windows: bool, out: Path, json_path: Path | None, force: bool, ledger: Path | None) -> None:
+    """Cross-validate a detector over the folds of FOLDER's manifest.csv, split by flight.
+
+    Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
+    training flights of each fold alone. Exit code 2 when a flight was left out.
+    """
+    show.check_free(json_path, force)
+    if folder is None:
+        folder = find_flights()
+        if folder is None:
+            raise click.UsageError("no recorded flights found; name their FOLDER or set AIRTOUCH_FLIGHTS")
+    files = dataset.collect([folder])
+    options = {} if epochs is None else {"epochs": epochs}
+    scores, folds, left_out = crossval.crossval(
+        detector, files, out, seed=seed, options=options, physical_filter=physical_filter,
+        tell=lambda line: click.echo(line, err=True))
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    title = detector if physical_filter else f"{detector}, physical filter off"
+    result = evaluate.as_json(title, scores, left_out, [f["lag_s"] for f in folds], {})
+    result["folds"] = folds
+    screen = show.console()
+    screen.print(show.table({title: result, **result["by_height"]},
+                            f"{title}: {len(folds)} folds by flight, seed {seed}"))
+    if random_windows:
+        leak = crossval.random_windows(files, seed=seed, **options)
+        result["random_windows"] = leak
+        screen.print(f"random split of windows (leaks): balanced window accuracy {leak['balanced_accuracy']:.1%} on "
+                     f"{leak['windows']} windows after {leak['epochs']} epochs; "
+                     f"by flight {result['balanced_accuracy']:.1%}")
+    if json_path:
+        show.write_json(json_path, result, force)
+        screen.print(f"written: {json_path}")
+    if ledger:
+        note(ledger, title, result)
+    show.left_out(left_out, len(scores))
+    if left_out:
+        sys.exit(2)
+
+
+def note(ledger: Path, title: str, result: dict) -> None:
+    """One line more in the ledger of looks at the folds."""
+    figures = {key: result[key] for key in ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy")}
+    line = f"- {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {title}: {json.dumps(figures)}\n"
+    with ledger.open("a", encoding="utf-8") as handle:
+        handle.write(line)

@@ -1,0 +1,52 @@
+"""`airtouch evaluate`: score a detector on flights."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from airtouch.cli import scores as show
+from airtouch.detector import dataset, evaluate, registry
+
+
+@click.command(name="evaluate")
+@click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--detector", default="paper", show_default=True, help="paper, baseline, ...")
+@click.option("--model", type=click.Path(path_type=Path), help="Trained model (.npz); the shipped one if left out.")
+@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+              help="Commanded speed of flights whose manifest does not say.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
+@click.option("--force", is_flag=True, help="Replace the JSON file.")
+def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed: float | None,
+            json_path: Path | None, force: bool) -> None:
+    """Score a detector on FLIGHTS: files, or folders (the clean flights of its manifest.csv, else all).
+
+    Errors are detection distances: time error times speed, delay included, positive when early.
+    Truth is the step of the down range; it is never an input. Exit code 2 when a flight was left out.
+    """
+    show.check_free(json_path, force)
+    module = registry.get(detector)
+    trained = module.load(model)
+    files = dataset.collect(flights, speed)
+    with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
+        def done(result: evaluate.Result | Exception) -> None:
+            if isinstance(result, Exception):
+                click.echo(f"\rairtouch: {result}", err=True)
+            bar.update(1)
+
+        scores, failures = evaluate.evaluate(files, module, trained, done)
+    result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
+    screen = show.console()
+    if scores:
+        screen.print(show.table({detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off"))
+        for what in ("height", "angle", "wind"):
+            if len(result[f"by_{what}"]) > 1:
+                screen.print(show.table(result[f"by_{what}"], f"by {what}"))
+        for name in sorted({s.note for s in scores if s.note}):
+            screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
+    if json_path:
+        show.write_json(json_path, result, force)
+        screen.print(f"written: {json_path}")
+    show.left_out(failures, len(scores))
+    if failures:
+        sys.exit(2)

@@ -1,0 +1,29 @@
+"""Where recorded flights may lie."""
+
+import os
+from pathlib import Path
+
+from airtouch.errors import AirTouchError
+
+
+def find_flights() -> Path | None:
+    """The folder of the authors' flights: AIRTOUCH_FLIGHTS or ../shared/flights, beside here or the checkout.
+
+    Each may be that folder or one with an `airtouch` folder in it. None where there is none; AirTouchError
+    where AIRTOUCH_FLIGHTS names no folder.
+    """
+    named = os.environ.get("AIRTOUCH_FLIGHTS")
+    if named:
+        if not Path(named).is_dir():
+            raise AirTouchError(f"AIRTOUCH_FLIGHTS={named}: no such folder")
+        return _inner(Path(named))
+    checkout = Path(__file__).resolve().parents[3]
+    for beside in (Path.cwd().parent, checkout.parent):
+        folder = beside / "shared" / "flights"
+        if folder.is_dir():
+            return _inner(folder)
+    return None
+
+
+def _inner(folder: Path) -> Path:
+    return folder / "airtouch" if (folder / "airtouch" / "manifest.csv").is_file() else folder

@@ -1,0 +1,51 @@
+"""What `evaluate`, `crossval` and `demo` print and write alike."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.report.columns import COLUMNS, cell
+
+def table(rows: dict[str, dict[str, Any]], title: str) -> Table:
+    """A table of summaries, one row each, with intervals."""
+    result = Table(title=title, title_justify="left", show_lines=True, caption_justify="left",
+                   caption="second line: 95 % interval, bootstrap by flight. A miss has no detection within 1.5 s; "
+                           "a detection serves one edge, the others are false. Hits: share of all true edges.")
+    for name in ("", "flights", "edges", *COLUMNS):
+        result.add_column(name, justify="left" if not name else "right")
+    for name, row in rows.items():
+        result.add_row(name, str(row["flights"]), str(row["edges"]), *(cell(row, *how) for how in COLUMNS.values()))
+    return result
+
+
+def console() -> Console:
+    """Standard output, wide enough for the table where it is not a terminal."""
+    found = Console()
+    return found if found.is_terminal else Console(width=150)
+
+
+def left_out(failures: list[tuple[str, str]], scored: int) -> None:
+    """The summary of what was left out, on stderr."""
+    if failures:
+        click.echo(f"airtouch: {scored} flights scored, {len(failures)} left out (see above)", err=True)
+
+
+def write_json(path: Path, content: dict[str, Any], force: bool) -> None:
+    """Numbers as JSON, whole or not at all; the folder is made where it is missing."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AirTouchError(f"{path.parent}: cannot be made: {error.strerror}") from None
+    write_bytes((json.dumps(content, indent=1, allow_nan=False) + "\n").encode(), path, force)
+
+
+def check_free(path: Path | None, force: bool) -> None:
+    """Refuse an existing file before the work, not after it."""
+    if path is not None and path.exists() and not force:
+        raise AirTouchError(f"{path}: exists already; use --force to replace it")

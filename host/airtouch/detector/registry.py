@@ -1,0 +1,42 @@
+"""The detectors, by name."""
+
+import importlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from airtouch.detector.trace import Trace
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+
+#: name -> module that is a `Detector`; imported only when asked for
+DETECTORS = {
+    "paper": "airtouch.detector.paper",
+    "baseline": "airtouch.detector.baseline",
+}
+
+
+class Detector(Protocol):
+    """What a detector's module offers. `model` is whatever its `fit` and `load` return."""
+
+    def run(self, log: FlightLog, model: Any = None) -> Trace:
+        """Edges of one flight at 100 Hz; None is the shipped model. AirTouchError for what it cannot use."""
+
+    def fit(self, flights: Sequence[FlightLog], seed: int = 0, **options: Any) -> Any:
+        """A model from training flights: weights, thresholds and lag, deterministic per seed."""
+
+    def load(self, path: Path | None) -> Any:
+        """A model from its file, the shipped one for None; AirTouchError that names what is wrong with it."""
+
+    def lag_s(self, model: Any) -> float:
+        """Seconds by which detections are late, learnt in training; the score takes it off and states it."""
+
+    def parameters(self, model: Any) -> dict[str, Any]:
+        """What a report prints: plain numbers and text."""
+
+
+def get(name: str) -> Detector:
+    """The module of a detector; AirTouchError that lists the known ones."""
+    if name not in DETECTORS:
+        raise AirTouchError(f"no detector {name!r}; known: {', '.join(DETECTORS)}")
+    return importlib.import_module(DETECTORS[name])

@@ -1,0 +1,30 @@
+"""The columns of every score table, on the terminal and in the report."""
+
+from typing import Any
+
+#: column -> (key of the summary, format); misses and false edges always stand beside the error
+COLUMNS = {
+    "mean |error|, m": ("mean_abs_error_m", "{:.3f}"),
+    "s": ("mean_abs_error_s", "{:.2f}"),
+    "missed": ("missed", "{:.0%}"),
+    "false/min": ("false_per_minute", "{:.1f}"),
+    "in 0.05 m": ("hit/0.05", "{:.0%}"),
+    "in 0.10 m": ("hit/0.10", "{:.0%}"),
+    "in 0.25 m": ("hit/0.25", "{:.0%}"),
+    "balanced": ("balanced_accuracy", "{:.0%}"),
+    "ECE": ("ece", "{:.2f}"),
+}
+
+
+def cell(table: dict[str, Any], key: str, form: str) -> str:
+    """A figure with its interval below it, - where there is nothing to count."""
+    def dig(source: Any) -> Any:
+        for part in key.split("/"):
+            source = source[part]
+        return source
+
+    value, interval = dig(table), dig(table["intervals"])
+    if value is None:
+        return "-"
+    return form.format(value) if interval is None else "{}\n{}".format(
+        form.format(value), " - ".join(form.format(bound) for bound in interval))

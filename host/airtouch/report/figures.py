@@ -1,0 +1,174 @@
+"""Plots of flights and scores, each as the bytes of a PNG."""
+
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from airtouch.detector.calibration import BINS, expected_calibration_error
+from airtouch.detector.channels import NAMES
+from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore
+from airtouch.detector.trace import Trace
+from airtouch.logs import Edge
+from airtouch.logs.flight_log import FlightLog
+
+TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
+KINDS = {"entry": "v", "exit": "^", "edge": "o"}
+STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
+
+
+def png(figure: Figure) -> bytes:
+    """The figure as a PNG at 120 dots an inch."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=120)
+    return buffer.getvalue()
+
+
+def flight(log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace]) -> bytes:
+    """One flight from signals to edges, all panes over the same seconds.
+
+    Signals, band power, probability with detected and true edges, disturbance force
+    with its FR-CFAR threshold, down range. Panes whose signal the trace lacks are left out.
+    others: detectors whose edges are shown below those of `trace`.
+    """
+    panes = [_accelerations, _rates, _motors] if "channels" in trace.signals else []
+    panes += [_band_power] if "band_power" in trace.signals else []
+    panes += [_probability, _edges]
+    panes += [_force, _cfar] if "force" in trace.signals else []
+    panes += [_range] if log.has("zrange_m") else []
+    with _style():
+        figure = Figure(figsize=(7.2, 1.15 * len(panes) + 0.9), layout="constrained")
+        axes = figure.subplots(len(panes), 1, sharex=True, squeeze=False)[:, 0]
+        t = np.arange(len(log)) * SAMPLE_PERIOD_S
+        for ax, pane in zip(axes, panes, strict=True):
+            pane(ax, t, log, trace, others)
+            for edge in edges or ():
+                ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=TRUE, lw=1.2, ls="--", alpha=0.8)
+            ax.margins(x=0)
+        axes[-1].set_xlabel("time, s (dashed green: true edges, from the down range)")
+        return png(figure)
+
+
+def reliability(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
+    """How often the drone was over a platform when the detector said so with probability p."""
+    with _style():
+        figure = Figure(figsize=(4.6, 4.2), layout="constrained")
+        ax = figure.subplots()
+        ax.plot([0, 1], [0, 1], color=MUTED, lw=1, ls="--", label="perfect")
+        for (name, some), colour in zip(scores.items(), (FOUND, OTHER, TRUE), strict=False):
+            table = np.sum([s.bins for s in some], axis=0) if some else np.zeros((BINS, 3))
+            filled = table[:, 0] > 0
+            if not filled.any():
+                continue
+            said, was = table[filled, 1] / table[filled, 0], table[filled, 2] / table[filled, 0]
+            ece = float(expected_calibration_error(table))
+            ax.plot(said, was, color=colour, lw=1, alpha=0.6)
+            ax.scatter(said, was, s=8 + 250 * table[filled, 0] / table[:, 0].sum(), color=colour,
+                       label=f"{name}, ECE {ece:.3f}")
+        ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="share truly over",
+               title="Reliability; a dot's area is its share of the samples")
+        ax.legend(loc="upper left", frameon=False)
+        return png(figure)
+
+
+def error_distribution(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
+    """Share of all true edges found within a distance; misses keep the curve below 1."""
+    with _style():
+        figure = Figure(figsize=(4.6, 4.2), layout="constrained")
+        ax = figure.subplots()
+        for (name, some), colour in zip(scores.items(), (FOUND, OTHER, TRUE), strict=False):
+            edges = [e for s in some for e in s.edges]
+            errors = np.sort([abs(e.error_m) for e in edges if e.error_m is not None])
+            if edges:
+                ax.step(np.r_[0.0, errors, 1.0], np.r_[0.0, np.arange(1, len(errors) + 1), len(errors)] / len(edges),
+                        where="post", color=colour, label=f"{name}, {len(edges)} edges")
+        ax.set(xlim=(0, 0.5), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges",
+               title="Edges found within a distance")
+        ax.grid(alpha=0.25)
+        ax.legend(loc="lower right", frameon=False)
+        return png(figure)
+
+
+def _accelerations(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    channels = trace.signals["channels"][:, :3] - [0, 0, 9.81]
+    ax.plot(t, channels, lw=0.6, label=["x", "y", "z - g"])
+    _finish(ax, "acceleration\nm/s²", channels)
+
+
+def _rates(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    rates = np.rad2deg(trace.signals["channels"][:, 3:6])
+    ax.plot(t, rates, lw=0.6, label=["x", "y", "z"])
+    _finish(ax, "rates\ndeg/s", rates)
+
+
+def _motors(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    motors = trace.signals["channels"][:, 6:] / 1000
+    ax.plot(t, motors, lw=0.6, label=["m2-m1", "m3-m1", "m4-m1"])
+    _finish(ax, "motors\n10³ PWM", motors)
+
+
+def _band_power(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    level = 10 * np.log10(np.maximum(trace.signals["band_power"].astype(float), 1e-30))
+    level -= np.nanmedian(level, axis=0)
+    ax.imshow(level.T, aspect="auto", cmap="magma", vmin=-5, vmax=20, interpolation="nearest",
+              extent=(t[0], t[-1], len(NAMES) - 0.5, -0.5))
+    ax.set_yticks(range(len(NAMES)), NAMES, fontsize=6)
+    ax.set_ylabel("band power\ndB on median", fontsize=8)
+
+
+def _probability(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    ax.plot(t, trace.probability, color=FOUND, lw=0.9)
+    ax.set_ylim(-0.05, 1.05)
+    ax.set_ylabel("P(over)", fontsize=8)
+
+
+def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, others: Mapping[str, Trace]) -> None:
+    rows = {"detected": trace, **others}
+    for row, (name, some) in enumerate(rows.items()):
+        for kind, marker in KINDS.items():
+            samples = [e.sample for e in some.edges if e.kind == kind]
+            ax.plot(np.array(samples) * SAMPLE_PERIOD_S, np.full(len(samples), row), marker, ms=6,
+                    color=FOUND if row == 0 else OTHER, ls="none")
+    ax.set_yticks(range(len(rows)), rows, fontsize=7)
+    ax.set_ylim(len(rows) - 0.5, -0.5)
+    ax.set_ylabel("edges\n▼ in, ▲ out", fontsize=8)
+
+
+def _force(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    force = trace.signals["force"][:, 2] * 1000
+    ax.plot(t, force, lw=0.6)
+    _finish(ax, "force f_w,z\nmN", force, legend=False)
+
+
+def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    power = np.maximum(trace.signals["cfar_power"].astype(float), 1e-12)
+    ax.semilogy(t, power, lw=0.6, label="tested")
+    ax.semilogy(t, np.maximum(trace.signals["threshold"].astype(float), 1e-12), lw=0.9, color=OTHER, label="threshold T")
+    alert = trace.signals["alert"].astype(bool)
+    ax.plot(t[alert], power[alert], ".", ms=5, color="black", label="alert")
+    ax.set_ylim(max(float(np.nanpercentile(power, 5)), 1e-10), None)
+    ax.legend(loc="upper right", ncols=3, fontsize=6, frameon=False)
+    ax.set_ylabel("FR-CFAR\nN²", fontsize=8)
+
+
+def _range(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
+    ax.plot(t, log["zrange_m"], color=TRUE, lw=0.9)
+    ax.set_ylabel("down range\nm (truth)", fontsize=8)
+
+
+def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> None:
+    """Axis label, and limits that a crash on landing does not spoil."""
+    low, high = np.nanpercentile(values, [0.5, 99.5])
+    pad = 0.15 * max(high - low, 1e-9)
+    ax.set_ylim(low - pad, high + pad)
+    ax.set_ylabel(label, fontsize=8)
+    if legend:
+        ax.legend(loc="upper left", ncols=3, fontsize=6, frameon=False)
+
+
+def _style():
+    import matplotlib
+
+    return matplotlib.rc_context(STYLE)

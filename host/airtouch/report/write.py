@@ -1,0 +1,92 @@
+"""The HTML report: one self-contained file."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from airtouch import __version__
+from airtouch.detector import summary
+from airtouch.detector.score import FlightScore
+from airtouch.detector.trace import Trace
+from airtouch.logs import Edge
+from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
+from airtouch.report import figures
+from airtouch.report.columns import COLUMNS, cell
+
+
+@dataclass(frozen=True)
+class ShownFlight:
+    """One flight to plot: its log, what the first detector said, and the others' edges."""
+
+    log: FlightLog
+    trace: Trace
+    edges: Sequence[Edge] | None
+    score: FlightScore
+    others: Mapping[str, Trace] = field(default_factory=dict)
+
+
+def write_report(
+    path: Path,
+    title: str,
+    scores: Mapping[str, Sequence[FlightScore]],
+    flights: Sequence[ShownFlight],
+    *,
+    parameters: Mapping[str, Any],
+    command: str,
+    left_out: Sequence[tuple[str, str]] = (),
+    force: bool = False,
+) -> None:
+    """Score table of the detectors side by side, plots, and a few flights, as one HTML file.
+
+    scores: detector -> its flights; the first detector is the one that is reported on.
+    Raises AirTouchError when the file exists, without `force`.
+    """
+    first = next(iter(scores))
+    summaries = {name: summary.summarise(some) for name, some in scores.items()}
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string((resources.files("airtouch.report") / "report.html").read_text("utf-8"))
+    page = template.render(
+        title=title, answer=answer(first, summaries[first]), summaries=summaries, columns=COLUMNS, cell=cell,
+        breakdowns={f"{first} by height": summary.by_height(scores[first]),
+                    f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
+                    f"{first} by wind": summary.by_wind(scores[first])},
+        errors=embed(figures.error_distribution(scores)), reliability=embed(figures.reliability(scores)),
+        flights=[{"name": f.score.file, "text": in_words(f.score),
+                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others))} for f in flights],
+        parameters=parameters, command=command, version=__version__, left_out=left_out)
+    write_bytes(page.encode(), path, force)
+
+
+def answer(name: str, table: Mapping[str, Any]) -> str:
+    """The result in one sentence."""
+    if not table["edges"]:
+        return f"{name}: {table['detections']} edges detected on {table['flights']} flights; the truth is not known."
+    error = table["mean_abs_error_m"]
+    found = "none was found" if error is None else f"mean distance error of those found {error:.3f} m"
+    return (f"{name} on {table['flights']} flights with {table['edges']} edges: {table['missed_count']} missed "
+            f"({table['missed']:.0%}), {table['false_count']} false ({table['false_per_minute']:.1f} a minute), {found}.")
+
+
+def in_words(score: FlightScore) -> str:
+    """What happened on one flight."""
+    parts = []
+    for edge in score.edges:
+        if edge.error_s is None:
+            parts.append(f"{edge.kind} at {edge.true_sample / 100:.2f} s missed")
+        else:
+            metres = "" if edge.error_m is None else f" ({abs(edge.error_m):.3f} m)"
+            side = "early" if edge.error_s > 0 else "late"
+            parts.append(f"{edge.kind} at {edge.true_sample / 100:.2f} s found {abs(edge.error_s):.2f} s {side}{metres}")
+    false = score.note if score.false is None else f"{len(score.false)} false edges"
+    return "; ".join([*parts, false]) + "."
+
+
+def embed(image: bytes) -> str:
+    """A PNG as a data URL."""
+    return "data:image/png;base64," + base64.b64encode(image).decode()
