@@ -63,3 +63,43 @@ typedef struct {
   uint8_t filtered;     ///< an edge was dropped for want of a recent alert
   uint8_t armed;        ///< airborne long enough
 } edgeEvent_t;
+
+/** Settings of the motion channels (motion_channels.h). */
+typedef struct {
+  airtouchVehicle_t vehicle;
+  float inverseScale[11];  ///< 1 over each channel's usual swing
+  float limit;             ///< channels are clamped to this magnitude, in usual swings
+  float armPwm;            ///< airborne while the mean PWM is above this
+  float slowGain;          ///< of the slow means, a sample
+  float lagGain;           ///< of the thrust's lag, a sample
+  float leastThrust;       ///< N; the usual thrust is never taken to be less
+  uint32_t settleSamples;  ///< after take-off the slow means follow at once for so long
+} motionConfig_t;
+
+/** Settings of the streaming detector's decoder (edge_decoder.h); scores are logits. */
+typedef struct {
+  float overShare;      ///< weight of the over logit beside the event's own
+  float entryScore;     ///< an entry fires above this
+  float exitScore;      ///< an exit fires above this
+  float lateEntry;      ///< smoothed over logit that makes a missed entry good
+  float lateExit;       ///< and a missed exit, below this
+  float smoothGain;     ///< of that smoothing, a step
+  uint32_t dwellSteps;  ///< at least so long between two edges
+  uint32_t armSteps;    ///< airborne for so long before the first
+} decoderConfig_t;
+
+/** How the streaming detector's network takes and gives numbers. */
+typedef struct {
+  float inputScale;  ///< q = floor(x / inputScale + 0.5) + inputZeroPoint
+  float outputScale; ///< logit = outputScale * (q - outputZeroPoint)
+  int32_t inputZeroPoint;
+  int32_t outputZeroPoint;
+} streamQuantisation_t;
+
+/** What the streaming detector says at one sample. */
+typedef struct {
+  float logits[3];  ///< over, entry, exit: the last ones computed
+  uint8_t ready;    ///< they are new
+  uint8_t edge;     ///< 0 none, 1 entry, 2 exit
+  uint8_t airborne; ///< whether the drone flies
+} streamEvent_t;

@@ -2,17 +2,9 @@
 
 #include <stddef.h>
 
-#include "network_unpack.h"
-#include "stream_int8.h"
+#include "stream_unpack.h"
 
-typedef struct {
-  layerInt8_t layers[MAX_LAYERS];
-  streamConv_t convs[STREAM_MAX_CONVS];
-  streamInt8_t network;
-} unpacked_t;
-
-// -1, or the first layer that does not fit.
-static int32_t unpack(const flatStreamInt8_t *flat, unpacked_t *to) {
+int32_t unpackStream(const flatStreamInt8_t *flat, unpackedStream_t *to) {
   const int32_t wrong = unpackLayersInt8(flat->layers, to->layers);
   const int32_t convs = flat->layers->layerCount - 1;
   if (wrong >= 0 || convs < 1 || convs > STREAM_MAX_CONVS) {
@@ -28,16 +20,16 @@ static int32_t unpack(const flatStreamInt8_t *flat, unpacked_t *to) {
 }
 
 int32_t streamInt8BatchArena(const flatStreamInt8_t *flat) {
-  unpacked_t to;
-  const int32_t wrong = unpack(flat, &to);
+  unpackedStream_t to;
+  const int32_t wrong = unpackStream(flat, &to);
   return wrong < 0 ? streamInt8ArenaBytes(&to.network) : -1 - wrong;
 }
 
 void streamInt8Flight(const flatStreamInt8_t *flat, const int8_t *inputs, int32_t samples,
                       int8_t *arena, int8_t *outputs) {
-  unpacked_t to;
+  unpackedStream_t to;
   streamState_t state;
-  if (unpack(flat, &to) >= 0) {
+  if (unpackStream(flat, &to) >= 0) {
     return;
   }
   streamInt8Reset(&to.network, &state, arena);

@@ -1,0 +1,52 @@
+#include "stream_detector.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "sample_guard.h"
+
+bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
+                        const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena) {
+  if (streamInt8Check(network) >= 0 || network->convs[0].layer.inChannels != MOTION_CHANNELS ||
+      network->head->outChannels != 3) {
+    return false;
+  }
+  detector->network = network;
+  detector->quantisation = *quantisation;
+  motionChannelsInit(&detector->motion, motion);
+  edgeDecoderInit(&detector->decoder, decoder);
+  streamInt8Reset(network, &detector->state, arena);
+  for (int i = 0; i < 3; i++) {
+    detector->logits[i] = 0.0f;
+  }
+  return true;
+}
+
+void streamQuantise(const streamQuantisation_t *quantisation, const float *channels, int32_t count, int8_t *q) {
+  for (int32_t i = 0; i < count; i++) {
+    const float value = floorf(channels[i] / quantisation->inputScale + 0.5f) + (float)quantisation->inputZeroPoint;
+    q[i] = (int8_t)clampFloat(value, -128.0f, 127.0f);
+  }
+}
+
+bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const float gyro[3], const float pwm[4],
+                        streamEvent_t *event) {
+  float channels[MOTION_CHANNELS];
+  int8_t quantised[MOTION_CHANNELS];
+  motionChannelsStep(&detector->motion, acc, gyro, pwm, channels);
+  streamQuantise(&detector->quantisation, channels, MOTION_CHANNELS, quantised);
+  const int8_t *output = streamInt8Step(detector->network, &detector->state, quantised);
+  const bool airborne = detector->motion.airborne > 0;
+  *event = (streamEvent_t){.ready = output != NULL, .airborne = airborne};
+  if (output != NULL) {
+    for (int i = 0; i < 3; i++) {
+      detector->logits[i] =
+          detector->quantisation.outputScale * (float)(output[i] - detector->quantisation.outputZeroPoint);
+    }
+    event->edge = edgeDecoderStep(&detector->decoder, detector->logits, airborne);
+  }
+  for (int i = 0; i < 3; i++) {
+    event->logits[i] = detector->logits[i];
+  }
+  return event->edge != 0;
+}

@@ -1,0 +1,43 @@
+/**
+ * @file stream_detector.h
+ * The streaming detector in one struct: motion channels, int8 network, decoder.
+ * One step a sample at 100 Hz; the network runs on every stride-th one.
+ */
+#pragma once
+
+#include <stdbool.h>
+
+#include "edge_decoder.h"
+#include "kernel_types.h"
+#include "motion_channels.h"
+#include "stream_int8.h"
+
+/** The detector. The network and the arena belong to the caller and must outlive it. */
+typedef struct {
+  const streamInt8_t *network;
+  streamQuantisation_t quantisation;
+  motionChannels_t motion;
+  edgeDecoder_t decoder;
+  streamState_t state;
+  float logits[3];
+} streamDetector_t;
+
+/**
+ * Sets a detector up; the settings are copied.
+ * @param arena  streamInt8ArenaBytes(network) bytes, aligned to 4, used by nothing else
+ * @return false for a network that does not take MOTION_CHANNELS channels or give three logits
+ */
+bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
+                        const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena);
+
+/**
+ * Takes one sample and says what it means.
+ * @param event  every field is written
+ * @return whether an edge is reported at this sample
+ * Never fails: values that are not finite hold the last finite one.
+ */
+bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const float gyro[3], const float pwm[4],
+                        streamEvent_t *event);
+
+/** Quantise channels as the network takes them. */
+void streamQuantise(const streamQuantisation_t *quantisation, const float *channels, int32_t count, int8_t *q);

@@ -1,0 +1,85 @@
+"""What the streaming detector sees of a flight: twelve channels without slow drift, each of unit swing."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
+from airtouch.reference.disturbance_force import PWM_MAX
+from airtouch.reference.finite import hold_finite
+from airtouch.vehicle import Vehicle
+
+NAMES = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "motor roll", "motor pitch", "motor yaw",
+         "motor mean", "unexplained az", "zero")
+THRUST_DELAY = 2  #: samples from a command to its thrust
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Settings; the samples are those of a 100 Hz log.
+
+    scale: usual swing of each channel: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
+    clamped to that many swings. slow_samples: time constant of the motors' slow means.
+    """
+
+    scale: tuple[float, ...] = (0.5, 0.5, 0.5, 0.2618, 0.2618, 0.08727, 4000.0, 4000.0, 4000.0, 1500.0, 0.5)
+    limit: float = 4.0
+    arm_pwm: float = 15000.0
+    slow_samples: float = 300.0
+    lag_samples: float = 6.0
+    settle_samples: int = 100
+    least_thrust_n: float = 0.05
+    vehicle: Vehicle = field(default_factory=vehicles.load)
+
+
+def motion_channels(
+    acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray, config: MotionConfig | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Channels (n, 12) in units of their usual swing, and airborne (n,) bool. Causal.
+
+    acc_level: (n, 3) m/s^2, level axes, gravity in z. gyro: (n, 3) rad/s. pwm: (n, 4).
+    Columns as NAMES: the motors' roll, pitch, yaw and mean have their slow mean taken off; `unexplained
+    az` is the vertical specific force less g times the lagged thrust over its slow mean, so that neither
+    mass nor battery matter; the last is 0. Values that are not finite: `hold_finite`.
+    Raises AirTouchError when the shapes disagree.
+    """
+    config = config or MotionConfig()
+    acc, rate, motors = (np.asarray(x, dtype=np.float64) for x in (acc_level, gyro, pwm))
+    n = len(acc)
+    if (acc.shape, rate.shape, motors.shape) != ((n, 3), (n, 3), (n, 4)):
+        raise AirTouchError(f"motion channels: needs (n, 3), (n, 3) and (n, 4), "
+                            f"not {acc.shape}, {rate.shape} and {motors.shape}")
+    acc, rate = hold_finite(acc)[0], hold_finite(rate)[0]
+    m1, m2, m3, m4 = np.clip(hold_finite(motors)[0], 0.0, PWM_MAX).T
+    mixed = np.column_stack([m3 + m4 - m1 - m2, m1 + m4 - m2 - m3, m1 + m3 - m2 - m4, (m1 + m2 + m3 + m4) / 4])
+    thrust = config.vehicle.thrust(np.column_stack([m1, m2, m3, m4])).sum(axis=1)
+    airborne = mixed[:, 3] > config.arm_pwm
+    gravity = config.vehicle.gravity_mps2
+    usual, lagged, slow = _slow(mixed, thrust, airborne, config)
+    raw = np.column_stack([acc[:, :2], acc[:, 2] - gravity, rate, mixed - slow,
+                           acc[:, 2] - gravity * lagged / np.maximum(usual, config.least_thrust_n)])
+    scaled = np.clip(raw / np.array(config.scale), -config.limit, config.limit)
+    return np.column_stack([scaled, np.zeros(n)]), airborne
+
+
+def _slow(
+    mixed: np.ndarray, thrust: np.ndarray, airborne: np.ndarray, config: MotionConfig
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slow mean of the lagged thrust (n,), the lagged thrust (n,) and slow means of the motors (n, 4).
+
+    First-order means; until `settle_samples` in the air they follow at once.
+    """
+    n = len(mixed)
+    usual, lagged, slow = np.zeros(n), np.zeros(n), np.zeros((n, 4))
+    if n == 0:
+        return usual, lagged, slow
+    state, behind, mean, flown = mixed[0].copy(), thrust[0], thrust[0], 0
+    for t in range(n):
+        flown = flown + 1 if airborne[t] else 0
+        behind += (thrust[max(t - THRUST_DELAY, 0)] - behind) / config.lag_samples
+        gain = 1.0 / config.slow_samples if flown > config.settle_samples else 1.0
+        state += gain * (mixed[t] - state)
+        mean += gain * (behind - mean)
+        usual[t], lagged[t], slow[t] = mean, behind, state
+    return usual, lagged, slow

@@ -1,0 +1,117 @@
+"""The streaming detector: C equals its NumPy definition, piece by piece and whole."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from airtouch import logs
+from airtouch.detector.channels import level_acceleration
+from airtouch.errors import AirTouchError
+from airtouch.kernels import stream_detector as c
+from airtouch.logs.flight_log import GYRO, PWM
+from airtouch.reference import edge_decoder, motion_channels
+from airtouch.reference.int8_network import quantise
+from airtouch.reference.stream_int8 import run_stream
+from test_stream import network
+
+ODD = st.sampled_from([0.0, -0.0, 1e-42, 1e30, -1e38, np.nan, np.inf, -np.inf, 65535.0, 65536.0, -1.0])
+
+
+def flight(seed: int, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Noise around hover after a second on the ground."""
+    rng = np.random.default_rng(seed)
+    pwm = 46000 + 2000 * rng.standard_normal((n, 4))
+    pwm[:min(n, 100)] = 0
+    return rng.normal([0, 0, 9.81], 0.4, (n, 3)), rng.normal(0, 0.3, (n, 3)), pwm
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**31), n=st.integers(0, 400),
+       odd=st.lists(st.tuples(st.integers(0, 399), st.integers(0, 9), ODD), max_size=20))
+def test_channels_equal_the_reference_for_any_input(seed, n, odd):
+    signals = np.column_stack(flight(seed, n)).astype(np.float32)
+    for row, column, value in odd:
+        if row < n:
+            signals[row, column] = value
+    parts = signals[:, :3], signals[:, 3:6], signals[:, 6:]
+    expected, flying = motion_channels.motion_channels(*parts)
+    channels, airborne = c.motion_channels(*parts)
+    assert np.array_equal(airborne, flying)
+    assert np.isfinite(channels).all() and np.abs(channels).max(initial=0) <= 4.0
+    huge = np.abs(np.nan_to_num(signals)).max(initial=0) > 1e6  # float32 keeps no detail beside such a value
+    assert huge or np.allclose(channels, expected, atol=2e-4)
+
+
+def test_channels_equal_the_reference_on_real_flights(flights):
+    worst = 0.0
+    for path in sorted((flights / "airtouch").glob("*_h8*.csv.gz"))[:6]:
+        log = logs.read(path)
+        parts = level_acceleration(log), log.stack(GYRO), log.stack(PWM)
+        worst = max(worst, float(np.abs(c.motion_channels(*parts)[0] - motion_channels.motion_channels(*parts)[0]).max()))
+    print(f"largest difference of a channel: {worst:.1e} of its usual swing")
+    assert worst < 1e-4
+
+
+def test_steady_hover_fades_to_zero_and_thrust_explains_itself():
+    acc, gyro, pwm = (np.tile(v, (3000, 1)) for v in ([0, 0, 9.81], [0, 0, 0], [45000, 46000, 47000, 48000]))
+    pwm[:100] = 0
+    channels, airborne = motion_channels.motion_channels(acc, gyro, pwm)
+    assert not airborne[:100].any() and airborne[100:].all()
+    assert np.abs(channels[-1]).max() < 1e-3
+
+
+def test_a_lift_shows_as_unexplained_acceleration_whatever_the_battery():
+    """0.4 m/s^2 of lift at constant command, with a thrust curve 20 % too strong."""
+    acc, gyro = np.tile([0, 0, 9.81], (1000, 1)), np.zeros((1000, 3))
+    acc[900:, 2] += 0.4
+    channels, _ = motion_channels.motion_channels(acc, gyro, np.full((1000, 4), 52000.0))
+    assert channels[905, 10] == pytest.approx(0.4 / 0.5, rel=1e-3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**31), n=st.integers(0, 600), nan=st.booleans(),
+       dwell=st.integers(0, 40), arm=st.integers(0, 60), share=st.floats(0, 1))
+def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, arm, share):
+    rng = np.random.default_rng(seed)
+    logits = np.cumsum(rng.normal(0, 0.7, (n, 3)), axis=0).astype(np.float32)
+    if nan and n:
+        logits[rng.integers(0, n, 5)] = np.nan
+    airborne = np.cumsum(rng.random(n) < 0.01) % 2 == 0
+    config = edge_decoder.DecoderConfig(over_share=float(np.float32(share)), dwell_steps=dwell, arm_steps=arm,
+                                        smooth_gain=0.125)
+    edges = c.edge_decoder(logits, airborne, config)
+    expected = edge_decoder.edge_decoder(logits.astype(np.float64), airborne, config)
+    first = np.flatnonzero(edges != expected)[:1]
+    assert not len(first) or _near_threshold(logits, config, first[0])
+    at = np.flatnonzero(edges)
+    assert not edges[~airborne].any()
+    for a, b in zip(at, at[1:]):
+        flown = airborne[a:b + 1].all()
+        assert not flown or (b - a >= dwell and edges[a] != edges[b])
+
+
+def _near_threshold(logits: np.ndarray, config: edge_decoder.DecoderConfig, at: int) -> bool:
+    """Whether float32 may honestly decide otherwise there: a score within rounding of its threshold."""
+    p, entry, leave = np.clip(logits[at].astype(np.float64), -8, 8)
+    scores = [entry + config.over_share * p - config.entry_score, leave - config.over_share * p - config.exit_score]
+    return min(abs(s) for s in scores) < 1e-5
+
+
+def test_the_whole_equals_its_parts():
+    net = network(9, channels=12, width=8)
+    acc, gyro, pwm = flight(3, 900)
+    events = c.stream_detector(acc, gyro, pwm, net)
+    channels, airborne = c.motion_channels(acc, gyro, pwm)
+    first = net.convs[0].layer
+    rows = run_stream(net, quantise(channels, first.input_scale, first.input_zero_point))
+    logits = net.head.output_scale * (rows.astype(np.float32) - net.head.output_zero_point)
+    steps = np.arange(0, len(acc), net.stride)
+    assert np.array_equal(np.flatnonzero(events.ready), steps)
+    assert np.allclose(events.logits[steps], logits, rtol=1e-6)
+    assert np.array_equal(events.edge[steps], c.edge_decoder(logits, airborne[steps]))
+    assert np.array_equal(events.airborne, airborne)
+
+
+def test_another_network_is_refused():
+    with pytest.raises(AirTouchError, match="12 channels"):
+        c.stream_detector(*flight(0, 50), network(1))
