@@ -21,6 +21,8 @@ from airtouch.detector import crossval, dataset, evaluate
 @click.option("--seed", default=0, show_default=True, help="Of training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")
+@click.option("--random-epochs", type=click.IntRange(1), default=60, show_default=True,
+              help="Training epochs of that split.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/crossval"), show_default=True,
               help="Where finished folds are kept; a second run goes on from there.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
@@ -28,7 +30,7 @@ from airtouch.detector import crossval, dataset, evaluate
 @click.option("--ledger", type=click.Path(path_type=Path),
               help="Append a line to this file: how often the folds were looked at.")
 def command(folder: Path | None, detector: str, physical_filter: bool, epochs: int | None, seed: int,
-            random_windows: bool, out: Path, json_path: Path | None, force: bool, ledger: Path | None) -> None:
+            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool, ledger: Path | None) -> None:
     """Cross-validate a detector over the folds of FOLDER's manifest.csv, split by flight.
 
     Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
@@ -53,7 +55,7 @@ def command(folder: Path | None, detector: str, physical_filter: bool, epochs: i
     screen.print(show.table({title: result, **result["by_height"]},
                             f"{title}: {len(folds)} folds by flight, seed {seed}"))
     if random_windows:
-        leak = crossval.random_windows(files, seed=seed, **options)
+        leak = crossval.random_windows(files, seed=seed, epochs=random_epochs)
         result["random_windows"] = leak
         screen.print(f"random split of windows (leaks): balanced window accuracy {leak['balanced_accuracy']:.1%} on "
                      f"{leak['windows']} windows after {leak['epochs']} epochs; "

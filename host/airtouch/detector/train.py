@@ -71,14 +71,14 @@ def train_paper(
     Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
     """
     _check(epochs, sparsity, block, df_lambda)
-    _tensorflow(seed)
+    use_tensorflow(seed)
     told = progress or (lambda *_: None)
     windows = training_windows(flights, told)
     held = held_out(len(flights), seed)
     kept = ~np.isin(windows.flight, held)
     if not kept.any() or len(np.unique(windows.over[kept])) < 2:
         raise AirTouchError("training: the flights hold no windows both over and beside a platform; give more flights")
-    weights, ran = _fit(windows.select(kept), windows.select(~kept), epochs, sparsity, block, df_lambda, told)
+    weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block, df_lambda, told)
     int8, tflite = quantisation.quantise(weights, windows.x[kept])
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
@@ -159,7 +159,7 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
     return stop + (start - stop) * 0.5 * (1.0 + float(np.cos(np.pi * part)))
 
 
-def _fit(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
          progress: Progress) -> tuple[network.Weights, int]:
     """The trained weights, and after how many epochs."""
     import keras
@@ -208,7 +208,7 @@ def _batches(windows: Windows, shuffle: bool):  # noqa: ANN202 - a tf.data.Datas
     return order.map(lambda i: (tf.gather(x, i), tf.gather(target, i))).prefetch(4)
 
 
-def _tensorflow(seed: int) -> None:
+def use_tensorflow(seed: int) -> None:
     """Import TensorFlow, quietly, with every source of chance fixed."""
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     os.environ.setdefault("CUDA_VISIBLE_DEVICES", "-1")  # one machine, one result

@@ -1,0 +1,177 @@
+"""`airtouch demo`: the whole pipeline once, in a few minutes."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch import logs
+from airtouch.cli import scores as show
+from airtouch.cli.flights import find_flights
+from airtouch.detector import dataset, evaluate, registry
+from airtouch.detector.dataset import FlightFile
+from airtouch.detector.summary import summarise
+from airtouch.errors import AirTouchError
+
+TRAIN, TEST, EPOCHS = 36, 12, 5  #: as much as fits in the time on two cores
+GENERATED = 32  #: flights, where none are recorded
+SHOWN = 4  #: flights plotted in the report
+
+
+@click.command(name="demo")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/demo"), show_default=True,
+              help="Folder for the report, the model and generated flights.")
+@click.option("--flights", type=click.Path(path_type=Path),
+              help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else they are generated.")
+@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+              help="Commanded speed of flights whose manifest does not say.")
+@click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
+@click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
+def command(out: Path, flights: Path | None, speed: float | None, epochs: int, force: bool) -> None:
+    """Train, prune, export, detect through the C kernels and the C int8 network, and report.
+
+    Takes under five minutes on two cores. You will see a score table of the paper's detector
+    beside its baseline on flights that neither has seen, and get an HTML report with plots.
+    """
+    started = time.monotonic()
+    report = out / "report.html"
+    if report.exists() and not force:
+        raise AirTouchError(f"{report}: exists already; use --force to replace it")
+    out.mkdir(parents=True, exist_ok=True)
+    steps = Steps(started)
+
+    steps.say("Flights")
+    train, test, where = flights_of(out, flights, speed)
+    click.echo(f"  {where}: {len(train)} to train on, {len(test)} held out, split by flight")
+    training, left_out = readable(train)
+
+    steps.say(f"Training: network of the paper, {epochs} epochs, pruned, then quantised to int8")
+    models = {name: fit(name, training, epochs) for name in registry.DETECTORS}
+
+    steps.say("Export: C sources for the GAP8")
+    export(models["paper"], out)
+
+    steps.say("Detection on the held-out flights, through the C kernels and the C int8 network")
+    results: dict[str, list[evaluate.Result]] = {}
+    for name, model in models.items():
+        results[name] = []
+        _, failures = evaluate.evaluate(test, registry.get(name), model,
+                                        lambda r, to=results[name]: to.append(r) if isinstance(r, evaluate.Result) else None)
+        left_out += [f for f in failures if f not in left_out]
+    if not results["paper"]:
+        raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
+    scores = {name: [r.score for r in some] for name, some in results.items()}
+    show.console().print(show.table({n: summarise(s) for n, s in scores.items()}, where))
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+
+    steps.say("Report")
+    write(report, where, results, models, left_out, epochs)
+    click.echo(f"  written: {report} (open it in a browser), {out / 'model'}")
+    click.echo(f"\ndone in {time.monotonic() - started:.0f} s")
+
+
+class Steps:
+    """Headings with the time since the start."""
+
+    def __init__(self, started: float) -> None:
+        self.started, self.number = started, 0
+
+    def say(self, what: str) -> None:
+        """Print the next heading."""
+        self.number += 1
+        click.echo(f"\n[{time.monotonic() - self.started:4.0f} s] {self.number}. {what}")
+
+
+def flights_of(out: Path, folder: Path | None, speed: float | None) -> tuple[list[FlightFile], list[FlightFile], str]:
+    """(training flights, held-out flights, what they are)."""
+    folder = folder or find_flights()
+    if folder is not None:
+        files, where = dataset.collect([folder], speed), f"recorded flights in {folder}"
+    else:
+        files, where = generated(out / "flights"), f"flights from the built-in generator ({out / 'flights'})"
+    if len(files) < 4:
+        raise AirTouchError(f"{folder}: {len(files)} flights are too few to train and to test; at least 4 are needed")
+    fold = [i if f.condition.fold is None else f.condition.fold for i, f in enumerate(files)]
+    test = [f for f, k in zip(files, fold, strict=True) if k % 4 == 0]
+    train = [f for f, k in zip(files, fold, strict=True) if k % 4 != 0]
+    return spread(train, TRAIN), spread(test, TEST), where
+
+
+def generated(folder: Path) -> list[FlightFile]:
+    """Flights of the minimal generator, written as canonical CSV with their manifest."""
+    from airtouch.simulation import minimal
+
+    folder.mkdir(parents=True, exist_ok=True)
+    missions = minimal.missions(GENERATED)
+    lines = ["file,use,fold,height,angle_deg,wind,speed_mps"]
+    for i, (mission, log) in enumerate(zip(missions, minimal.fly(missions), strict=True)):
+        name = f"generated_{i:03d}.csv.gz"
+        logs.write(log, folder / name, force=True)
+        lines.append(f"{name},clean,{i % 5},{100 * mission.clearance_m:.0f} cm,{mission.angle_deg:g},none,"
+                     f"{mission.speed_mps:g}")
+    (folder / dataset.MANIFEST).write_text("\n".join(lines) + "\n")
+    return dataset.collect([folder])
+
+
+def spread(files: list[FlightFile], most: int) -> list[FlightFile]:
+    """At most `most` of them, evenly over the list, so that every condition stays in."""
+    return files if len(files) <= most else [files[i * len(files) // most] for i in range(most)]
+
+
+def readable(files: Sequence[FlightFile]) -> tuple[list[Any], list[tuple[str, str]]]:
+    """Logs to train on, and what cannot be used."""
+    from airtouch.detector.crossval import readable_flights
+
+    found, left_out = readable_flights(files)
+    if not found:
+        raise AirTouchError(f"no flight to train on; the first was left out because: {left_out[0][1]}")
+    return list(found.values()), left_out
+
+
+def fit(name: str, training: Sequence[Any], epochs: int) -> Any:
+    """A detector's model, with a bar while its network is trained."""
+    if name == "baseline":
+        return registry.get(name).fit(training)
+    with click.progressbar(length=epochs, label=f"  {name}") as bar:
+        def told(stage: str, done: int, total: int, note: str) -> None:
+            if stage == "epochs":
+                bar.update(1)
+
+        return registry.get(name).fit(training, epochs=epochs, progress=told)
+
+
+def export(model: Any, out: Path) -> None:
+    """The model file, and the C sources made of it."""
+    from airtouch.detector import export as gap8
+
+    folder = out / "model"
+    folder.mkdir(exist_ok=True)
+    model.save(folder / "paper.npz", force=True)
+    written = gap8.export(model, folder, "paper.npz", force=True)
+    click.echo(f"  {folder}: paper.npz, {', '.join(path.name for path in written)}")
+
+
+def write(path: Path, where: str, results: dict[str, list[evaluate.Result]], models: dict[str, Any],
+          left_out: list[tuple[str, str]], epochs: int) -> None:
+    """The HTML report: the flights shown are spread from the best found to the worst."""
+    from airtouch.report.write import ShownFlight, write_report
+
+    first = sorted(results["paper"], key=badness)
+    chosen = [first[i * (len(first) - 1) // max(SHOWN - 1, 1)] for i in range(min(SHOWN, len(first)))]
+    by_file = {name: {r.score.file: r.trace for r in some} for name, some in results.items() if name != "paper"}
+    shown = [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
+                         {name: traces[r.score.file] for name, traces in by_file.items() if r.score.file in traces})
+             for r in chosen]
+    write_report(path, f"AirTouch demo: {where}", {n: [r.score for r in some] for n, some in results.items()}, shown,
+                 parameters={f"{n}: {key}": value for n, model in models.items()
+                             for key, value in registry.get(n).parameters(model).items()},
+                 command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)
+
+
+def badness(result: evaluate.Result) -> float:
+    """Misses and false edges of a flight, then its errors in seconds."""
+    errors = [abs(e.error_s) if e.error_s is not None else 3.0 for e in result.score.edges]
+    return sum(errors) + len(result.score.false or ())

@@ -1,0 +1,87 @@
+"""`airtouch crossval`: split by flight, resumed, stated."""
+
+import json
+import shutil
+
+import pytest
+from click.testing import CliRunner
+
+from airtouch.cli.crossval import command
+from airtouch.detector import baseline, crossval, dataset
+from airtouch.errors import AirTouchError
+
+
+def run(*arguments):
+    return CliRunner().invoke(command, [str(a) for a in arguments])
+
+
+def test_every_flight_is_scored_by_a_model_that_never_saw_it(generated, tmp_path, monkeypatch):
+    trained, scored = [], []
+    fit, evaluate_flight = baseline.fit, crossval.evaluate.evaluate_flight
+
+    def spy_fit(flights, **options):
+        trained.append({log.source.rsplit("/", 1)[-1] for log in flights})
+        return fit(flights, **options)
+
+    def spy_evaluate(file, log, detector, model):
+        scored.append((file.path.name, len(trained) - 1))
+        return evaluate_flight(file, log, detector, model)
+
+    monkeypatch.setattr(baseline, "fit", spy_fit)
+    monkeypatch.setattr(crossval.evaluate, "evaluate_flight", spy_evaluate)
+    scores, folds, left_out = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
+    assert len(scores) == 4 and len(folds) == 2 and not left_out
+    assert len(scored) == 4 and all(name not in trained[fold] for name, fold in scored)
+    again, _, _ = crossval.crossval("baseline", dataset.collect([generated]), tmp_path)
+    assert len(trained) == 2, "finished folds are not done again"
+    assert [s.as_dict() for s in again] == [s.as_dict() for s in scores]
+
+
+def test_command_with_ledger(generated, tmp_path):
+    out, ledger = tmp_path / "cv.json", tmp_path / "looks.md"
+    call = (generated, "--detector", "baseline", "--out", tmp_path / "folds", "--json", out, "--ledger", ledger)
+    result = run(*call)
+    assert result.exit_code == 0, result.output
+    table = json.loads(out.read_text())
+    assert table["flights"] == 4 and len(table["folds"]) == 2 and len(table["lag_s"]) == 2
+    assert "done before" in run(*call, "--force").stderr
+    assert ledger.read_text().count("baseline") == 2
+
+
+def test_a_damaged_cache_is_done_again(generated, tmp_path):
+    files = dataset.collect([generated])
+    crossval.crossval("baseline", files, tmp_path)
+    for cache in tmp_path.glob("*.json"):
+        cache.write_text(cache.read_text()[:100])
+    scores, _, _ = crossval.crossval("baseline", files, tmp_path)
+    assert len(scores) == 4
+
+
+def test_the_cache_changes_with_the_conditions(generated, tmp_path):
+    folder = shutil.copytree(generated, tmp_path / "copy")
+    before = crossval.cache_key("baseline", dataset.collect([folder]), 0, 0, {})
+    manifest = folder / "manifest.csv"
+    manifest.write_text(manifest.read_text().replace(",0.25\n", ",0.2\n"))
+    assert crossval.cache_key("baseline", dataset.collect([folder]), 0, 0, {}) != before
+    assert crossval.cache_key("baseline", dataset.collect([generated]), 1, 0, {}) != before
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [(",clean,1,", ",clean,0,", "two folds"), (",clean,1,", ",clean,,", "no fold")])
+def test_folds_are_needed(generated, tmp_path, old, new, said):
+    folder = shutil.copytree(generated, tmp_path / "copy")
+    manifest = folder / "manifest.csv"
+    manifest.write_text(manifest.read_text().replace(old, new))
+    with pytest.raises(AirTouchError, match=said):
+        crossval.crossval("baseline", dataset.collect([folder]), tmp_path / "out")
+
+
+def test_baseline_has_no_filter(generated, tmp_path):
+    with pytest.raises(AirTouchError, match="no physical filter"):
+        crossval.crossval("baseline", dataset.collect([generated]), tmp_path, physical_filter=False)
+
+
+def test_a_bad_flight_is_left_out(generated, tmp_path):
+    folder = shutil.copytree(generated, tmp_path / "copy")
+    (folder / "f1.csv.gz").write_bytes(b"")
+    result = run(folder, "--detector", "baseline", "--out", tmp_path / "o")
+    assert result.exit_code == 2 and "f1.csv.gz" in result.stderr and "1 left out" in result.stderr

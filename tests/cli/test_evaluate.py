@@ -1,0 +1,120 @@
+"""`airtouch evaluate` from the outside: figures, bad files, exit codes."""
+
+import json
+import math
+import shutil
+
+import pytest
+from click.testing import CliRunner
+
+from airtouch.cli.evaluate import command
+from airtouch.errors import AirTouchError
+
+KEYS = {"detector", "flights", "edges", "mean_abs_error_m", "missed", "false_per_minute", "hit", "balanced_accuracy",
+        "intervals", "per_flight", "missed_count", "false_count", "airborne_minutes", "mean_abs_error_s", "ece",
+        "by_height", "by_angle", "by_wind", "lag_s", "parameters", "left_out"}
+
+
+def run(*arguments):
+    return CliRunner().invoke(command, [str(a) for a in arguments])
+
+
+def no_constant(name):
+    raise ValueError(name)
+
+
+def test_folder_of_flights(generated, tmp_path):
+    out = tmp_path / "out.json"
+    result = run(generated, "--detector", "baseline", "--json", out)
+    assert result.exit_code == 0, result.output
+    table = json.loads(out.read_text(), parse_constant=no_constant)
+    assert KEYS <= set(table) and set(table["hit"]) == {"0.05", "0.10", "0.25"}
+    assert table["flights"] == 4 and table["edges"] == 8
+    matched = [e for f in table["per_flight"] for e in f["edges"] if e["detected_sample"] is not None]
+    assert table["missed"] == pytest.approx(1 - len(matched) / 8)
+    assert table["false_count"] == sum(len(f["false"]) for f in table["per_flight"])
+    for f in table["per_flight"]:
+        assert f["detections"] == len(f["false"]) + sum(e["detected_sample"] is not None for e in f["edges"])
+        for e in f["edges"]:
+            if e["detected_sample"] is not None:
+                late = (e["detected_sample"] - e["true_sample"]) * 0.01 - table["lag_s"]
+                assert e["error_s"] == pytest.approx(-late)
+                assert e["error_m"] == pytest.approx(-late * f["condition"]["speed_mps"])
+    for value in (table[k] for k in ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy")):
+        assert value is None or math.isfinite(value)
+    assert "missed" in result.output and "false/min" in result.output
+
+
+def test_bad_files_are_named_once_and_the_others_go_on(generated, bad, tmp_path):
+    out = tmp_path / "out.json"
+    result = run(generated / "f0.csv.gz", *bad.values(), "--speed", 0.3, "--detector", "baseline", "--json", out)
+    assert result.exit_code == 2
+    lines = [line for line in result.stderr.splitlines() if line.startswith("airtouch: ")]
+    for name, path in bad.items():
+        about = [line for line in lines if str(path) in line]
+        assert len(about) == 1, (name, lines)
+    assert f"1 flights scored, {len(bad)} left out" in lines[-1]
+    table = json.loads(out.read_text(), parse_constant=no_constant)
+    assert table["flights"] == 1 and len(table["left_out"]) == len(bad)
+
+
+@pytest.mark.parametrize(("name", "said"), [
+    ("fast", "airtouch logs convert --rate 100"), ("nan", "missing (NaN)"), ("constant", "constant"),
+    ("stuck", "gyro y is constant"), ("copied", "is a copy of"), ("grounded", "no flight"), ("short", "1.50 s of data"),
+    ("empty", "empty")])
+def test_the_reason_and_the_remedy(bad, name, said):
+    result = run(bad[name], "--speed", 0.3, "--detector", "baseline")
+    assert result.exit_code == 2 and said in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_speed_must_be_known(generated, tmp_path):
+    shutil.copy(generated / "f0.csv.gz", tmp_path)
+    result = run(tmp_path, "--detector", "baseline")
+    assert result.exit_code == 2 and "--speed" in result.stderr
+    assert run(tmp_path, "--detector", "baseline", "--speed", 0.3).exit_code == 0
+
+
+def test_without_down_range_detections_are_listed_not_judged(generated, tmp_path):
+    from airtouch import logs
+
+    log = logs.read(generated / "f0.csv.gz")
+    del log.columns["zrange_m"]
+    logs.write(log, tmp_path / "f.csv")
+    out = tmp_path / "out.json"
+    result = run(tmp_path / "f.csv", "--detector", "baseline", "--json", out)
+    assert result.exit_code == 0, result.output
+    table = json.loads(out.read_text(), parse_constant=no_constant)
+    assert table["false_per_minute"] is None and table["edges"] == 0 and table["per_flight"][0]["false"] is None
+    assert "no down range" in result.output
+
+
+def test_nothing_is_overwritten_without_force(generated, tmp_path):
+    out = tmp_path / "out.json"
+    out.write_text("mine")
+    one = generated / "f0.csv.gz"
+    result = run(one, "--detector", "baseline", "--json", out)
+    assert isinstance(result.exception, AirTouchError) and out.read_text() == "mine"
+    assert run(one, "--detector", "baseline", "--json", out, "--force").exit_code == 0
+
+
+@pytest.mark.parametrize("arguments", [("none.csv",), ("--detector", "oracle", "."), ()])
+def test_wrong_calls(arguments):
+    result = run(*arguments)
+    assert isinstance(result.exception, AirTouchError) or result.exit_code == 2
+    assert "\n" not in str(result.exception)
+
+
+def test_a_foreign_model_is_refused(generated, tmp_path):
+    (tmp_path / "m.npz").write_bytes(b"PK nonsense")
+    result = run(generated, "--model", tmp_path / "m.npz")
+    assert isinstance(result.exception, AirTouchError) and "m.npz" in str(result.exception)
+
+
+def test_messy_flights_never_stop_the_batch(flights):
+    import csv
+
+    with (flights / "airtouch" / "manifest.csv").open() as handle:
+        messy = [flights / "airtouch" / row["file"] for row in csv.DictReader(handle) if row["use"] == "messy"]
+    result = run(*messy, "--speed", 0.3, "--detector", "baseline")
+    assert result.exit_code == 2 and (result.exception is None or isinstance(result.exception, SystemExit))
