@@ -9,8 +9,9 @@ from airtouch.detector.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.kernels import stream_detector as c
 from airtouch.logs.flight_log import GYRO, PWM
-from airtouch.reference import edge_decoder, motion_channels
+from airtouch.reference.edge_decoder import DecoderConfig, edge_decoder
 from airtouch.reference.int8_network import quantise
+from airtouch.reference.motion_channels import motion_channels
 from airtouch.reference.stream_int8 import run_stream
 from test_stream import network
 
@@ -34,7 +35,7 @@ def test_channels_equal_the_reference_for_any_input(seed, n, odd):
         if row < n:
             signals[row, column] = value
     parts = signals[:, :3], signals[:, 3:6], signals[:, 6:]
-    expected, flying = motion_channels.motion_channels(*parts)
+    expected, flying = motion_channels(*parts)
     channels, airborne = c.motion_channels(*parts)
     assert np.array_equal(airborne, flying)
     assert np.isfinite(channels).all() and np.abs(channels).max(initial=0) <= 4.0
@@ -47,7 +48,7 @@ def test_channels_equal_the_reference_on_real_flights(flights):
     for path in sorted((flights / "airtouch").glob("*_h8*.csv.gz"))[:6]:
         log = logs.read(path)
         parts = level_acceleration(log), log.stack(GYRO), log.stack(PWM)
-        worst = max(worst, float(np.abs(c.motion_channels(*parts)[0] - motion_channels.motion_channels(*parts)[0]).max()))
+        worst = max(worst, float(np.abs(c.motion_channels(*parts)[0] - motion_channels(*parts)[0]).max()))
     print(f"largest difference of a channel: {worst:.1e} of its usual swing")
     assert worst < 1e-4
 
@@ -55,7 +56,7 @@ def test_channels_equal_the_reference_on_real_flights(flights):
 def test_steady_hover_fades_to_zero_and_thrust_explains_itself():
     acc, gyro, pwm = (np.tile(v, (3000, 1)) for v in ([0, 0, 9.81], [0, 0, 0], [45000, 46000, 47000, 48000]))
     pwm[:100] = 0
-    channels, airborne = motion_channels.motion_channels(acc, gyro, pwm)
+    channels, airborne = motion_channels(acc, gyro, pwm)
     assert not airborne[:100].any() and airborne[100:].all()
     assert np.abs(channels[-1]).max() < 1e-3
 
@@ -64,7 +65,7 @@ def test_a_lift_shows_as_unexplained_acceleration_whatever_the_battery():
     """0.4 m/s^2 of lift at constant command, with a thrust curve 20 % too strong."""
     acc, gyro = np.tile([0, 0, 9.81], (1000, 1)), np.zeros((1000, 3))
     acc[900:, 2] += 0.4
-    channels, _ = motion_channels.motion_channels(acc, gyro, np.full((1000, 4), 52000.0))
+    channels, _ = motion_channels(acc, gyro, np.full((1000, 4), 52000.0))
     assert channels[905, 10] == pytest.approx(0.4 / 0.5, rel=1e-3)
 
 
@@ -77,10 +78,10 @@ def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, ar
     if nan and n:
         logits[rng.integers(0, n, 5)] = np.nan
     airborne = np.cumsum(rng.random(n) < 0.01) % 2 == 0
-    config = edge_decoder.DecoderConfig(over_share=float(np.float32(share)), dwell_steps=dwell, arm_steps=arm,
+    config = DecoderConfig(over_share=float(np.float32(share)), dwell_steps=dwell, arm_steps=arm,
                                         smooth_gain=0.125)
     edges = c.edge_decoder(logits, airborne, config)
-    expected = edge_decoder.edge_decoder(logits.astype(np.float64), airborne, config)
+    expected = edge_decoder(logits.astype(np.float64), airborne, config)
     first = np.flatnonzero(edges != expected)[:1]
     assert not len(first) or _near_threshold(logits, config, first[0])
     at = np.flatnonzero(edges)
@@ -90,7 +91,7 @@ def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, ar
         assert not flown or (b - a >= dwell and edges[a] != edges[b])
 
 
-def _near_threshold(logits: np.ndarray, config: edge_decoder.DecoderConfig, at: int) -> bool:
+def _near_threshold(logits: np.ndarray, config: DecoderConfig, at: int) -> bool:
     """Whether float32 may honestly decide otherwise there: a score within rounding of its threshold."""
     p, entry, leave = np.clip(logits[at].astype(np.float64), -8, 8)
     scores = [entry + config.over_share * p - config.entry_score, leave - config.over_share * p - config.exit_score]

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -21,15 +21,13 @@ def quantise(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]
     output channel. The network and the file compute the same bits. Needs TensorFlow.
     """
     chosen = windows[np.linspace(0, len(windows) - 1, min(REPRESENTATIVE, len(windows))).astype(int)]
-    with _quiet():
-        content = _tflite(weights, chosen.astype(np.float32).reshape(-1, 1, *INPUT_SHAPE))
-        return read_tflite(content), content
+    content = _tflite(weights, chosen.astype(np.float32).reshape(-1, 1, *INPUT_SHAPE))
+    return read_tflite(content), content
 
 
 def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
     import tensorflow as tf
 
-    @tf.function(input_signature=[tf.TensorSpec((1, *INPUT_SHAPE), tf.float32)])
     def network(x):  # noqa: ANN001, ANN202
         for kind, name, _, _, kernel, relu in GRAPH:
             if kind == "max_pool":
@@ -43,39 +41,65 @@ def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
             x = tf.nn.relu(x) if relu else x
         return x
 
-    converter = tf.lite.TFLiteConverter.from_concrete_functions([network.get_concrete_function()])
-    converter.optimizations = [tf.lite.Optimize.DEFAULT]
-    converter.representative_dataset = lambda: ([window] for window in windows)
-    converter.target_spec.supported_ops = [tf.lite.OpsSet.TFLITE_BUILTINS_INT8]
-    converter.inference_input_type = tf.int8
-    converter.inference_output_type = tf.int8
-    return bytes(converter.convert())
+    return convert(network, (1, *INPUT_SHAPE), windows)
 
 
-def read_tflite(content: bytes) -> Int8Network:
-    """The paper's int8 network out of a TFLite file that `quantise` made."""
+def convert(network: Callable, shape: tuple[int, ...], inputs: np.ndarray) -> bytes:
+    """A TFLite file, int8 throughout, of a function of one tensor of this shape.
+
+    inputs: (n, *shape) float32 that set the activations' ranges. Needs TensorFlow.
+    """
+    import tensorflow as tf
+
+    function = tf.function(network, input_signature=[tf.TensorSpec(shape, tf.float32)])
+    with _quiet():
+        converter = tf.lite.TFLiteConverter.from_concrete_functions([function.get_concrete_function()])
+        converter.optimizations = [tf.lite.Optimize.DEFAULT]
+        converter.representative_dataset = lambda: ([x] for x in inputs)
+        converter.target_spec.supported_ops = [tf.lite.OpsSet.TFLITE_BUILTINS_INT8]
+        converter.inference_input_type = tf.int8
+        converter.inference_output_type = tf.int8
+        return bytes(converter.convert())
+
+
+def read_weighted(content: bytes) -> list[dict[str, np.ndarray]]:
+    """The layers with weights of a TFLite file that `convert` made, in order.
+
+    Each: weights int8 (out, ...), bias int32 (out,), weight_scale float32 (out,), and scale float32 and
+    zero_point int32 of input and output, (2,).
+    """
     from tensorflow.lite.python import schema_py_generated as schema
 
     model = schema.ModelT.InitFromObj(schema.Model.GetRootAs(content, 0))
     graph = model.subgraphs[0]
-    weighted = [op for op in graph.operators if len(op.inputs) == 3]
+    layers = []
+    for op in graph.operators:
+        if len(op.inputs) != 3 or op.outputs is None:
+            continue
+        tensors = [graph.tensors[i] for i in (*op.inputs, op.outputs[0])]
+        kernel, bias = tensors[1], model.buffers[tensors[2].buffer].data
+        around = [tensors[0].quantization, tensors[3].quantization]
+        values = np.array(model.buffers[kernel.buffer].data, dtype=np.uint8).view(np.int8)
+        layers.append({
+            "weights": values.reshape(kernel.shape),
+            "bias": np.frombuffer(bytes(bias), dtype="<i4").copy(),
+            "weight_scale": np.broadcast_to(np.asarray(kernel.quantization.scale, dtype=np.float32),
+                                            (len(bias) // 4,)).copy(),
+            "scale": np.array([q.scale[0] for q in around], dtype=np.float32),
+            "zero_point": np.array([q.zeroPoint[0] for q in around], dtype=np.int32),
+        })
+    return layers
+
+
+def read_tflite(content: bytes) -> Int8Network:
+    """The paper's int8 network out of a TFLite file that `quantise` made."""
+    layers = read_weighted(content)
     arrays: dict[str, np.ndarray] = {}
-    scales, zero_points = [], []
-    for name, op in zip(WEIGHTED, weighted, strict=True):
-        source, kernel, bias = (graph.tensors[i] for i in op.inputs)
-        if not scales:
-            scales.append(source.quantization.scale[0])
-            zero_points.append(source.quantization.zeroPoint[0])
-        after = graph.tensors[op.outputs[0]].quantization
-        scales.append(after.scale[0])
-        zero_points.append(after.zeroPoint[0])
-        data = model.buffers[kernel.buffer].data
-        arrays[f"{name}.weights"] = np.array(data, dtype=np.uint8).view(np.int8).reshape(kernel.shape)
-        arrays[f"{name}.bias"] = np.frombuffer(bytes(model.buffers[bias.buffer].data), dtype="<i4").copy()
-        arrays[f"{name}.weight_scale"] = np.broadcast_to(
-            np.asarray(kernel.quantization.scale, dtype=np.float32), (KERNEL_SHAPES[name][-1],)).copy()
-    arrays["scale"] = np.array(scales, dtype=np.float32)
-    arrays["zero_point"] = np.array(zero_points, dtype=np.int32)
+    for name, layer in zip(WEIGHTED, layers, strict=True):
+        for part in ("weights", "bias", "weight_scale"):
+            arrays[f"{name}.{part}"] = layer[part]
+    for part in ("scale", "zero_point"):
+        arrays[part] = np.array([layers[0][part][0], *(layer[part][1] for layer in layers)])
     return network_of_arrays(arrays)
 
 

@@ -1,0 +1,1 @@
+"""The streaming network of the `best` detector: shape, training, quantisation, model file."""

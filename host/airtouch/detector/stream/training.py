@@ -1,0 +1,102 @@
+"""Training the streaming network: long crops, one cycle, three goals, pruning on the way."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from airtouch.detector.pruning import keep_mask, polynomial_sparsity
+from airtouch.detector.stream.batches import Flight, batch
+from airtouch.detector.stream.recipe import STRIDE, Recipe
+
+PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
+RANK_EVERY = 20  #: steps between two rankings of the weights
+
+Weights = dict[str, np.ndarray]
+
+
+def build(recipe: Recipe):  # noqa: ANN201 - a keras.Model
+    """Keras model: (batch, samples, 12) -> logits (batch, samples / 2, 3). Row j sees samples up to 2 j."""
+    import keras
+
+    def conv(taps: int, **options: int) -> keras.layers.Layer:
+        return keras.layers.Conv1D(recipe.width, taps, padding="causal", activation="relu", **options)
+
+    inputs = keras.Input((None, recipe.shapes[0][1]))
+    x = conv(recipe.first_taps, strides=STRIDE)(inputs)
+    rows = []
+    for dilation in recipe.dilations:
+        x = conv(recipe.taps, dilation_rate=dilation)(x)
+        rows.append(x)
+    unlikely = keras.initializers.Constant([-2.0, -4.0, -4.0])
+    head = keras.layers.Dense(recipe.shapes[-1][-1], bias_initializer=unlikely)
+    return keras.Model(inputs, head(keras.layers.Concatenate()(rows)))
+
+
+def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
+        progress: Callable[[int, int, str], None] = lambda *_: None) -> Weights:
+    """Float weights (`Recipe.weight_shapes`) trained on the flights; same arguments, same bits.
+
+    Call `detector.train.use_tensorflow(seed)` before.
+    """
+    import keras
+    import tensorflow as tf
+
+    rng = np.random.default_rng(seed)
+    model = build(recipe)
+    rise = recipe.steps // 6
+    rate = keras.optimizers.schedules.CosineDecay(
+        recipe.peak_rate / 20, recipe.steps - rise, alpha=1e-3, warmup_target=recipe.peak_rate, warmup_steps=rise)
+    optimizer = keras.optimizers.AdamW(rate, weight_decay=recipe.weight_decay, global_clipnorm=1.0)
+    optimizer.build(model.trainable_variables)
+    masks = [tf.Variable(tf.ones_like(v), trainable=False) for v in model.trainable_variables]
+    weight = tf.constant([1.0, recipe.event_weight, recipe.event_weight])
+    scored = recipe.warm_up // STRIDE
+
+    @tf.function(jit_compile=True)
+    def gradients(x, y):  # noqa: ANN001, ANN202
+        with tf.GradientTape() as tape:
+            loss = tf.nn.sigmoid_cross_entropy_with_logits(y, model(x, training=True))[:, scored:]
+            loss = tf.reduce_mean(tf.reduce_sum(loss * weight, -1))
+        return loss, tape.gradient(loss, model.trainable_variables)
+
+    @tf.function
+    def update(gradient):  # noqa: ANN001, ANN202
+        optimizer.apply_gradients(zip(gradient, model.trainable_variables))
+        for variable, mask in zip(model.trainable_variables, masks):
+            variable.assign(variable * mask)
+
+    losses = []
+    for step in range(recipe.steps):
+        loss, gradient = gradients(*map(tf.constant, batch(flights, recipe, rng)))
+        update(gradient)
+        losses.append(loss)
+        if step % RANK_EVERY == 0:
+            _rank(model, masks, recipe, step / recipe.steps)
+        if (step + 1) % 50 == 0:
+            progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
+    for variable, mask in zip(model.trainable_variables, masks):
+        variable.assign(variable * mask)
+    return dict(zip(_names(recipe), (v.numpy() for v in model.trainable_variables), strict=True)) | _head(model, recipe)
+
+
+def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
+    """Set the masks of the inner layers to the sparsity that the schedule wants now."""
+    part = np.clip((position - PRUNE_FROM) / (PRUNE_TO - PRUNE_FROM), 0.0, 1.0)
+    sparsity = polynomial_sparsity(float(part), 1.0, 0.0, recipe.sparsity)
+    if sparsity == 0.0 or position > PRUNE_TO + RANK_EVERY / recipe.steps:
+        return
+    for layer in range(1, 1 + len(recipe.dilations)):
+        values = model.trainable_variables[2 * layer].numpy()
+        flat = values.reshape(-1, values.shape[-1])
+        masks[2 * layer].assign(keep_mask(flat, sparsity).reshape(values.shape))
+
+
+def _names(recipe: Recipe) -> list[str]:
+    """The weights' names in the order of the model's variables."""
+    return [f"layer{i}.{part}" for i in range(len(recipe.shapes)) for part in ("kernel", "bias")]
+
+
+def _head(model, recipe: Recipe) -> Weights:  # noqa: ANN001
+    """The head's kernel as (layers that it reads, width, outputs)."""
+    last = len(recipe.shapes) - 1
+    return {f"layer{last}.kernel": model.trainable_variables[-2].numpy().reshape(recipe.shapes[-1])}
