@@ -6,11 +6,13 @@
 
 #define PWM_MAX 65535.0f
 
+bool voltageKnown(float vbat) { return vbat >= 0.1f && vbat <= 1000.0f; }
+
 float voltageFactor(const airtouchVehicle_t *vehicle, float vbat) {
-  if (!(vehicle->nominalVoltage > 0.0f) || !isfinite(vbat) || !(vbat > 0.0f)) {
+  if (!(vehicle->nominalVoltage > 0.0f) || !voltageKnown(vbat)) {
     return 1.0f;
   }
-  const float ratio = clampFloat(vbat, 0.0f, SAMPLE_LIMIT) / vehicle->nominalVoltage;
+  const float ratio = vbat / vehicle->nominalVoltage;
   return ratio * ratio;
 }
 

@@ -6,11 +6,16 @@
  */
 #pragma once
 
+#include <stdbool.h>
+
 #include "kernel_types.h"
+
+/** Whether @p vbat can be a battery's voltage: 0.1 to 1000 V, so not NaN. Others are held by the callers. */
+bool voltageKnown(float vbat);
 
 /**
  * (vbat / nominal)^2.
- * @return 1 when the vehicle's nominal voltage is unknown or @p vbat is not a positive number
+ * @return 1 when the vehicle's nominal voltage or @p vbat is unknown
  */
 float voltageFactor(const airtouchVehicle_t *vehicle, float vbat);
 

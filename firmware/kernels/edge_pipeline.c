@@ -70,7 +70,7 @@ static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
   for (int i = 0; i < 3; i++) {
     guardSample(sample->thrustAxis[i], &pipeline->thrustAxis[i]);
   }
-  if (isfinite(sample->vbat) && sample->vbat > 0.0f) {
+  if (voltageKnown(sample->vbat)) {
     pipeline->voltageFactor = voltageFactor(&pipeline->config.vehicle, sample->vbat);
   }
 }

@@ -1,7 +1,5 @@
 #include "disturbance_force_batch.h"
 
-#include <math.h>
-
 #include "disturbance_force.h"
 #include "sample_guard.h"
 
@@ -15,7 +13,7 @@ static float heldThrust(motors_t *motors, const float *pwm, float vbat, const ai
   for (int k = 0; k < 4; k++) {
     guardSample(pwm[k], &motors->pwm[k]);
   }
-  if (isfinite(vbat) && vbat > 0.0f) {
+  if (voltageKnown(vbat)) {
     motors->factor = voltageFactor(vehicle, vbat);
   }
   return totalThrust(vehicle, motors->pwm) * motors->factor;

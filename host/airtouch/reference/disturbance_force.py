@@ -7,6 +7,7 @@ from airtouch.reference.finite import hold_finite
 from airtouch.vehicle import Vehicle
 
 PWM_MAX = 65535.0
+VOLTAGE_RANGE = np.float32(0.1), np.float32(1000.0)  #: what can be a battery's voltage, V
 
 
 def disturbance_force(
@@ -41,20 +42,26 @@ def disturbance_force(
 
 def total_thrust(pwm: np.ndarray, vehicle: Vehicle, vbat_v: np.ndarray | float | None = None) -> np.ndarray:
     """Psi = H_0 W(m): the four motors' thrust in newtons, (n,), for PWM (n, 4)."""
+    pwm = np.asarray(pwm, dtype=np.float64)
+    if pwm.shape != (len(pwm), 4):
+        raise AirTouchError(f"thrust: needs (n, 4) PWM, not {pwm.shape}")
     held = np.clip(hold_finite(pwm)[0], 0.0, PWM_MAX)
     return vehicle.thrust(held).sum(axis=1) * voltage_factor(len(held), vehicle, vbat_v)
 
 
 def voltage_factor(n: int, vehicle: Vehicle, vbat_v: np.ndarray | float | None) -> np.ndarray:
-    """(vbat / nominal)^2, (n,); 1 where either is unknown, the last known voltage held."""
+    """(vbat / nominal)^2, (n,); 1 where either is unknown, the last known (0.1 to 1000 V) voltage held."""
     if vbat_v is None or vehicle.nominal_voltage_v is None:
         return np.ones(n)
     volts = np.broadcast_to(np.asarray(vbat_v, dtype=np.float64), (n,))
-    known = np.where(np.isfinite(volts) & (volts > 0), volts, np.nan)
+    known = np.where((volts >= VOLTAGE_RANGE[0]) & (volts <= VOLTAGE_RANGE[1]), volts, np.nan)
     held = hold_finite(known, initial=vehicle.nominal_voltage_v)[0]
     return np.square(held / vehicle.nominal_voltage_v)
 
 
 def force_norm(force: np.ndarray) -> np.ndarray:
     """||f_w|| in newtons, (n,), for forces (n, 3)."""
+    force = np.asarray(force, dtype=np.float64)
+    if force.shape != (len(force), 3):
+        raise AirTouchError(f"force norm: needs (n, 3) forces, not {force.shape}")
     return np.sqrt(np.square(force).sum(axis=1))
