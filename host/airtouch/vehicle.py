@@ -16,6 +16,8 @@ class Vehicle:
 
     thrust_of_pwm_n: (c0, c1, c2), newtons per motor, c0 + c1 p + c2 p^2 for PWM p > 0.
     nominal_voltage_v: battery voltage at which that curve holds; None where unknown.
+    Fields with a default are for the simulator and may be left out of a file; 0 in
+    thrust_per_speed2, thrust_base_pwm and motor_fall_time_constant_s means "derive it".
     """
 
     name: str
@@ -32,6 +34,17 @@ class Vehicle:
     range_noise_rms_m: float = 0.002
     gravity_mps2: float = 9.81
     nominal_voltage_v: float | None = None
+    thrust_per_speed2: float = 0.0  #: N/(rad/s)^2 of one rotor
+    rotor_inertia_kg_m2: float = 0.0  #: rotor and propeller
+    motor_fall_time_constant_s: float = 0.0  #: of a rotor slowing down
+    battery_cells: float = 1.0
+    battery_capacity_ah: float = 0.25
+    battery_resistance_ohm: float = 0.12
+    power_per_thrust15: float = 70.0  #: electrical power over thrust^1.5 of one rotor, W/N^1.5
+    acc_lowpass_hz: float = 0.0  #: of the logged accelerometer; 0: none
+    thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
+    derivative_on_error: float = 0.0  #: 1: rate derivative on the error (firmware before 2024)
+    battery_compensation: float = 0.0  #: 1: the firmware compensates the battery voltage
 
     def thrust(self, pwm: np.ndarray) -> np.ndarray:
         """Thrust of each motor in newtons for PWM of any shape; 0 where PWM <= 0."""

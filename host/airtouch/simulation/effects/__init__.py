@@ -1,0 +1,106 @@
+"""Every effect that can be switched on: one file each, one registry.
+
+`EFFECTS` maps names to effects in the order in which they are applied. `register` adds
+one of your own; `load_file` registers those of a Python file.
+"""
+
+import importlib
+import re
+import runpy
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
+
+__all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "parse", "register",
+           "unregister", "wrench"]
+
+NAMES = (
+    "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise",
+    "thrust_coefficient", "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load",
+    "imu_bias", "imu_noise", "vibration", "sensor_latency", "actuator_delay", "time_jitter",
+    "packet_loss", "range_step", "flow_scale", "controller_gain",
+)
+EFFECTS: dict[str, Effect] = {
+    name: importlib.import_module(f"airtouch.simulation.effects.{name}").EFFECT for name in NAMES}
+
+
+def register(effect: Effect) -> Effect:
+    """Add an effect of your own; raises AirTouchError when its name is taken."""
+    if effect.name in EFFECTS:
+        raise AirTouchError(f"an effect named {effect.name!r} is already there")
+    EFFECTS[effect.name] = effect
+    return effect
+
+
+def unregister(name: str) -> None:
+    """Take an effect out (the diagnosis is tested on effects that it does not know)."""
+    get(name)
+    del EFFECTS[name]
+
+
+def get(name: str) -> Effect:
+    """The effect of that name; AirTouchError names the known ones."""
+    if name not in EFFECTS:
+        raise AirTouchError(f"no effect {name!r}; known: {', '.join(EFFECTS)}")
+    return EFFECTS[name]
+
+
+def activate(chosen: Iterable[Active | tuple[str, Mapping[str, float]]] | Mapping[str, Mapping[str, float]],
+             ) -> list[Active]:
+    """Effects with all their values, in the registry's order (so that the order given does not matter).
+
+    chosen: {name: {parameter: value}}, or pairs of both where one effect comes twice.
+    Raises AirTouchError for unknown names and values out of bounds.
+    """
+    if isinstance(chosen, Mapping):
+        chosen = list(chosen.items())
+    active = []
+    for item in chosen:
+        if not isinstance(item, Active):
+            effect = get(item[0])
+            item = Active(effect, effect.values(item[1]))
+        active.append(item)
+    order = {name: i for i, name in enumerate(EFFECTS)}
+    return sorted(active, key=lambda a: order.get(a.effect.name, len(order)))
+
+
+_QUANTITY = re.compile(r"^([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)$")
+
+
+def parse(text: str) -> tuple[str, dict[str, float]]:
+    """`name:parameter=value unit,...` as on the command line, to a name and its values.
+
+    Every value carries the parameter's unit, as in `wind:x=0.3m/s`; pure numbers carry none.
+    Raises AirTouchError that says what was expected.
+    """
+    name, _, rest = text.partition(":")
+    effect = get(name.strip())
+    units = {p.name: p.unit for p in effect.parameters}
+    given = {}
+    for part in filter(None, (p.strip() for p in rest.split(","))):
+        key, equals, quantity = (piece.strip() for piece in part.partition("="))
+        match = _QUANTITY.match(quantity)
+        if not equals or not match:
+            raise AirTouchError(f"{text!r}: write {effect.name}:parameter=value with its unit")
+        if key not in units:
+            raise AirTouchError(f"{effect.name} has no parameter {key!r}; it has {', '.join(units)}")
+        unit = match.group(2).replace(" ", "")
+        expected = units[key].replace(" ", "")
+        if unit != ("" if expected == "1" else expected):
+            want = "no unit" if expected == "1" else f"the unit {units[key]}"
+            raise AirTouchError(f"{effect.name}: {key}={quantity} needs {want}")
+        given[key] = float(match.group(1))
+    return effect.name, effect.values(given)
+
+
+def load_file(path: str | Path) -> list[Effect]:
+    """Register every `Effect` that a Python file defines at its top level, and return them."""
+    if not Path(path).is_file():
+        raise AirTouchError(f"{path}: no such file of effects")
+    found = [v for v in runpy.run_path(str(path)).values() if isinstance(v, Effect)]
+    fresh = [e for e in found if EFFECTS.get(e.name) is not e]
+    if not found:
+        raise AirTouchError(f"{path}: defines no Effect")
+    return [register(e) for e in fresh]

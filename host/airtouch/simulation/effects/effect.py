@@ -1,0 +1,105 @@
+"""What an effect is: parameters with units and bounds, and how it enters the equations."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from numba import float64, types, uint64
+
+from airtouch.errors import AirTouchError
+
+warnings.filterwarnings("ignore", "First-class function type feature is experimental")
+
+PARAMETERS = 8  #: an effect's parameters in compiled code, at most
+MEMORY = 12  #: numbers that an effect may keep from step to step
+SIGNATURE = types.void(float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1])
+WrenchFunction = types.FunctionType(SIGNATURE)
+
+
+def wrench(function: Callable) -> Any:
+    """Compile `function(p, s, memory, stream, out)` so that simulator and diagnosis can call it.
+
+    p: the effect's parameters in their declared order. s: signals, by the places in
+    `simulation.signals`. memory (12,): zero at the start of a flight, its own from then
+    on. stream: its random numbers, for `random_stream.normal(stream)`. out (6,): add force
+    (N) and torque (N m) about the centre of mass, body axes. Called once a step.
+    """
+    cached = function.__module__.startswith("airtouch.")
+    return numba.njit([SIGNATURE], cache=cached)(function)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that an effect takes. neutral: the value at which it changes nothing.
+
+    None as neutral: it shapes the effect (a direction, a length, which rotor) and is not
+    scaled with its strength. unit "1" is a pure number. source: paper, data sheet or measurement.
+    """
+
+    name: str
+    unit: str
+    default: float
+    low: float
+    high: float
+    neutral: float | None
+    summary: str
+    source: str = ""
+    integer: bool = False
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One unmodelled effect. It has `settings`, which change the plant before the flight,
+
+    or a `wrench`, which adds a force and a torque in flight, or both.
+    settings(plant row, {parameter: value}) changes fields of `simulation.plant.FIELDS`.
+    """
+
+    name: str
+    summary: str
+    parameters: tuple[Parameter, ...]
+    settings: Callable[[Any, Mapping[str, float]], None] | None = None
+    wrench: Any = None
+
+    def values(self, given: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Every parameter: what is given, else its default.
+
+        Raises AirTouchError for an unknown name and for values out of bounds.
+        """
+        given = dict(given or {})
+        known = {p.name: p for p in self.parameters}
+        for name in given:
+            if name not in known:
+                raise AirTouchError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
+        result = {}
+        for p in self.parameters:
+            value = float(given.get(p.name, p.default))
+            if not p.low <= value <= p.high:
+                raise AirTouchError(f"{self.name}: {p.name} = {value:g} {p.unit} is out of bounds, "
+                                    f"{p.low:g} to {p.high:g} {p.unit}")
+            if p.integer and value != round(value):
+                raise AirTouchError(f"{self.name}: {p.name} must be a whole number, not {value:g}")
+            result[p.name] = value
+        return result
+
+    def scaled(self, values: Mapping[str, float], strength: float) -> dict[str, float]:
+        """`values` moved towards neutral: strength 1 leaves them, 0 switches the effect off."""
+        return {p.name: values[p.name] if p.neutral is None
+                else p.neutral + strength * (values[p.name] - p.neutral) for p in self.parameters}
+
+    def vector(self, values: Mapping[str, float]) -> np.ndarray:
+        """The parameters (8,) as compiled code gets them."""
+        out = np.zeros(PARAMETERS)
+        out[:len(self.parameters)] = [values[p.name] for p in self.parameters]
+        return out
+
+
+@dataclass(frozen=True)
+class Active:
+    """An effect that is switched on, with the values of all its parameters."""
+
+    effect: Effect
+    values: Mapping[str, float]

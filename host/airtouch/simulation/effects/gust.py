@@ -1,0 +1,42 @@
+"""Dryden gusts: random wind with a known spectrum, through the rotors' drag."""
+
+import math
+
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects.effect import Effect, Parameter, wrench
+from airtouch.simulation.random_stream import normal
+
+RMS, LENGTH, AIRSPEED, DRAG = range(4)
+ROOT_3 = math.sqrt(3.0)
+
+
+@wrench
+def gust(p, s, memory, stream, out):
+    # memory: world x through one lag of tau; world y and z each through two
+    h = s[at.STEP]
+    tau = p[LENGTH] / p[AIRSPEED]
+    decay = math.exp(-h / tau)
+    memory[0] = decay * memory[0] + math.sqrt(1.0 - decay * decay) * normal(stream)
+    white = math.sqrt(tau / h)  # held white noise of density tau: gives both shapes unit variance
+    for axis in range(2):
+        first, second = 1 + 2 * axis, 2 + 2 * axis
+        memory[first] = decay * memory[first] + (1.0 - decay) * white * normal(stream)
+        memory[second] = decay * memory[second] + (1.0 - decay) * memory[first]
+    # (1 + sqrt(3) tau s) / (1 + tau s)^2 in partial fractions
+    x = memory[0]
+    y = ROOT_3 * memory[1] + (1.0 - ROOT_3) * memory[2]
+    z = ROOT_3 * memory[3] + (1.0 - ROOT_3) * memory[4]
+    total = s[at.ROTOR_SPEED] + s[at.ROTOR_SPEED + 1] + s[at.ROTOR_SPEED + 2] + s[at.ROTOR_SPEED + 3]
+    drag = p[DRAG] * p[RMS] * total / (4.0 * s[at.HOVER_SPEED])
+    r = at.ROTATION
+    out[0] += drag * (s[r] * x + s[r + 3] * y + s[r + 6] * z)
+    out[1] += drag * (s[r + 1] * x + s[r + 4] * y + s[r + 7] * z)
+
+
+EFFECT = Effect(
+    "gust", "Dryden turbulence of zero mean, through the rotors' horizontal drag",
+    (Parameter("rms", "m/s", 0.3, 0.0, 10.0, 0.0, "of each component", "MIL-F-8785C, Dryden form"),
+     Parameter("length", "m", 0.5, 0.01, 500.0, None, "turbulence scale", "size of a fan's or a door's eddies"),
+     Parameter("airspeed", "m/s", 1.0, 0.05, 30.0, None, "at which the turbulence is carried past"),
+     Parameter("drag", "N s/m", 0.0147, 0.0, 2.0, None, "horizontal drag at hover", "drone-models")),
+    wrench=gust)

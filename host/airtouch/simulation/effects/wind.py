@@ -1,0 +1,24 @@
+"""Steady wind: the air's velocity acts through the rotors' drag."""
+
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects.effect import Effect, Parameter, wrench
+
+X, Y, Z, DRAG = range(4)
+
+
+@wrench
+def wind(p, s, memory, stream, out):
+    total = s[at.ROTOR_SPEED] + s[at.ROTOR_SPEED + 1] + s[at.ROTOR_SPEED + 2] + s[at.ROTOR_SPEED + 3]
+    drag = p[DRAG] * total / (4.0 * s[at.HOVER_SPEED])
+    r = at.ROTATION
+    out[0] += drag * (s[r] * p[X] + s[r + 3] * p[Y] + s[r + 6] * p[Z])
+    out[1] += drag * (s[r + 1] * p[X] + s[r + 4] * p[Y] + s[r + 7] * p[Z])
+
+
+EFFECT = Effect(
+    "wind", "steady wind, through the rotors' horizontal drag",
+    (Parameter("x", "m/s", 0.3, -10.0, 10.0, 0.0, "towards world x", "paper, section 7.6: 0 to 0.3 m/s"),
+     Parameter("y", "m/s", 0.0, -10.0, 10.0, 0.0, "towards world y"),
+     Parameter("z", "m/s", 0.0, -10.0, 10.0, 0.0, "upwards"),
+     Parameter("drag", "N s/m", 0.0147, 0.0, 2.0, None, "horizontal drag at hover", "drone-models")),
+    wrench=wind)

@@ -1,0 +1,68 @@
+"""Values of a scenario: numbers, ranges to draw from, and small sums over named values."""
+
+import ast
+import math
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+
+_BINARY = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+_FUNCTIONS = {"sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)),
+              "max": max, "min": min}
+
+
+def draw(node: Any, values: Mapping[str, Any], rng: np.random.Generator, where: str) -> Any:
+    """One value for a node of a scenario.
+
+    {low, high}: uniform; {choice = [...]}: one of them; "= sum": arithmetic over `values`
+    with sin, cos (degrees), min and max; lists and tables: element by element; anything
+    else: itself. Raises AirTouchError that begins with `where`.
+    """
+    if isinstance(node, str) and node.startswith("="):
+        return evaluate(node[1:], values, where)
+    if isinstance(node, list):
+        return [draw(item, values, rng, where) for item in node]
+    if isinstance(node, dict):
+        if set(node) == {"low", "high"}:
+            low, high = (draw(node[k], values, rng, where) for k in ("low", "high"))
+            if not (_number(low) and _number(high) and low <= high):
+                raise AirTouchError(f"{where}: a range needs two numbers, low <= high")
+            return float(rng.uniform(low, high))
+        if set(node) == {"choice"}:
+            if not isinstance(node["choice"], list) or not node["choice"]:
+                raise AirTouchError(f"{where}: choice needs a list")
+            return draw(node["choice"][int(rng.integers(len(node["choice"])))], values, rng, where)
+        return {key: draw(item, values, rng, f"{where}.{key}") for key, item in node.items()}
+    return node
+
+
+def evaluate(text: str, values: Mapping[str, Any], where: str) -> float:
+    """The number that arithmetic over named values gives."""
+    try:
+        return float(_evaluate(ast.parse(text.strip(), mode="eval").body, values))
+    except KeyError as error:
+        raise AirTouchError(f"{where}: {text.strip()!r} uses {error.args[0]!r}, which [values] does not have") from None
+    except (SyntaxError, TypeError, ValueError, ZeroDivisionError):
+        raise AirTouchError(f"{where}: {text.strip()!r} is not a sum of numbers and named values") from None
+
+
+def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> float:
+    if isinstance(node, ast.Constant) and _number(node.value):
+        return node.value
+    if isinstance(node, ast.Name):
+        return values[node.id]
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return -_evaluate(node.operand, values)
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        return _BINARY[type(node.op)](_evaluate(node.left, values), _evaluate(node.right, values))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
+        return _FUNCTIONS[node.func.id](*(_evaluate(a, values) for a in node.args))
+    raise ValueError
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -1,0 +1,292 @@
+"""One flight as one compiled loop: controller, motors, effects, rigid body, sensors, log.
+
+Order within a step of 2 ms: the IMU measures, the estimator and the controller run on
+what they are given, the log takes its row (100 Hz), the delayed command reaches the motors,
+every effect adds its force and torque at the middle of the step, the body moves (RK4).
+"""
+
+import math
+
+import numpy as np
+from numba import float64, from_dtype, int64, njit, types, uint64
+
+from airtouch.simulation import battery, contact, controller, estimator, motors, rigid_body, sensors, world
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects.effect import MEMORY, PARAMETERS, WrenchFunction
+from airtouch.simulation.plant import DTYPE
+from airtouch.simulation.random_stream import normal, normals
+from airtouch.simulation.rotation import euler, rotate_back
+
+SLOTS = 16  #: effects with a wrench that may be on at once
+LOG_STEPS = 5  #: physics steps a logged row
+STREAMS = 4  #: motor noise, IMU, range and flow, start
+RING = 64  #: delays of up to 63 steps
+OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended
+ENDINGS = ("ok", "a value is not finite", "it turned over", "it struck a surface", "it flew away")
+FLOOR_DEPTH_M = 0.03  #: legs this far inside a surface: it struck it
+(T, ACC, GYRO, PWM, DOWN, RANGES, VBAT, PLACE, SPEED, ANGLES, RPM, ACC_WORLD, COLUMNS) = (
+    0, 1, 4, 7, 11, 12, 16, 17, 20, 23, 26, 30, 33)
+
+_LOOP = types.Tuple((int64, int64))(
+    from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[::1],
+    float64[:, ::1], types.UniTuple(WrenchFunction, SLOTS), int64, float64[:, ::1],
+    uint64[:, ::1], uint64[:, ::1], float64[:, ::1])
+
+
+@njit(cache=True)
+def fill_signals(plant, state, acceleration, speed, corners, first, surface, box, h, t, hover, s, patch):
+    """The signals that effects see, for a state (13,) and rotor speeds (4,)."""
+    s[at.TIME], s[at.STEP], s[at.MASS], s[at.GRAVITY] = t, h, plant.mass, plant.gravity
+    s[at.ROTOR_RADIUS], s[at.ROTOR_SPACING], s[at.HOVER_SPEED] = plant.rotor_radius, plant.rotor_spacing, hover
+    q = state[6:10]
+    vx, vy, vz = rotate_back(q, state[3], state[4], state[5])
+    s[at.VELOCITY], s[at.VELOCITY + 1], s[at.VELOCITY + 2] = vx, vy, vz
+    for i in range(3):
+        s[at.RATES + i] = state[10 + i]
+        s[at.ACCELERATION + i] = acceleration[i]
+    r = at.ROTATION
+    from_quaternion(q, s, r)
+    lowest = 1e9
+    for i in range(4):
+        x, y = plant.rotor_x[i] - plant.com[0], plant.rotor_y[i] - plant.com[1]
+        s[at.ROTOR_X + i], s[at.ROTOR_Y + i] = x, y
+        s[at.ROTOR_SPEED + i] = speed[i]
+        s[at.THRUST + i] = plant.thrust_per_speed2 * speed[i] * speed[i] * plant.gain[i]
+        z = state[2] + s[r + 6] * x + s[r + 7] * y
+        world.below(corners, first, surface, box, state[0] + s[r] * x + s[r + 1] * y,
+                    state[1] + s[r + 3] * x + s[r + 4] * y, z, plant.rotor_radius, patch)
+        s[at.LOWER_HEIGHT + i] = z - patch[world.LOWER_TOP]
+        s[at.UPPER_HEIGHT + i] = z - patch[world.UPPER_TOP]
+        s[at.COVER + i] = patch[world.COVER]
+        s[at.LOWER_FACTOR + i], s[at.UPPER_FACTOR + i] = patch[world.LOWER_FACTOR], patch[world.UPPER_FACTOR]
+        s[at.LOWER_ROUGHNESS + i] = patch[world.LOWER_ROUGHNESS]
+        s[at.UPPER_ROUGHNESS + i] = patch[world.UPPER_ROUGHNESS]
+        lowest = min(lowest, z - (patch[world.UPPER_TOP] if patch[world.COVER] > 0.5 else patch[world.LOWER_TOP]))
+    s[at.HEIGHT] = lowest
+
+
+@njit(cache=True)
+def from_quaternion(q, s, r):
+    """Rotation matrix of q into s[r:r + 9]."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    s[r], s[r + 1], s[r + 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    s[r + 3], s[r + 4], s[r + 5] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    s[r + 6], s[r + 7], s[r + 8] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+
+
+@njit(_LOOP, cache=True, nogil=True)
+def fly(plant_array, corners, first, surface, box, room, setpoints, effects, used, parameters,
+        effect_streams, streams, table):
+    """Fly one flight and fill `table` (rows, 33), the columns of the flight log.
+
+    plant_array (1,); corners, first, surface, box: a World; room (4,): walls for the
+    Multi-ranger; setpoints (rows, 8): one a logged row; effects: SLOTS wrenches, `used` of
+    them on, with parameters (SLOTS, 8) and streams (SLOTS, 1). Returns how it ended (OK or
+    a reason) and the number of rows that are filled.
+    """
+    plant = plant_array[0]
+    h = plant.step
+    hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
+    leg = plant.range_below_rotors + 0.01
+    state, speed, target = np.zeros(13), np.zeros(4), np.zeros(4)
+    middle, middle_speed, work = np.zeros(13), np.zeros(4), np.zeros((6, 13))
+    s, patch, force = np.zeros(at.COUNT), np.zeros(7), np.zeros(6)
+    memory, pid_memory, est = np.zeros((SLOTS, MEMORY)), np.zeros(controller.SIZE), np.zeros(estimator.SIZE)
+    pwm, flicker, base_gain = np.zeros(4), np.zeros(4), plant.gain.copy()
+    phase, ring, command = np.zeros(4), np.zeros((RING, 6)), np.zeros((RING, 4))
+    motor_n, imu_n, other_n = np.zeros(4), np.zeros(6), np.zeros(4)
+    acc, gyro, seen_acc, seen_gyro = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    acc_filter, gyro_filter = np.zeros(5), np.zeros(5)
+    acc_memory, gyro_memory = np.zeros((3, 2)), np.zeros((3, 2))
+    sensors.lowpass_coefficients(plant.acc_lowpass, h, acc_filter)
+    sensors.lowpass_coefficients(plant.gyro_lowpass, h, gyro_filter)
+    acc_rms = plant.acc_noise / sensors.noise_gain(acc_filter)
+    ranges = np.full(4, np.nan)
+    world_force = np.zeros(3)
+
+    state[0], state[1] = setpoints[0, controller.X], setpoints[0, controller.Y]
+    ground = world.top_at(corners, first, surface, box, state[0], state[1])
+    state[2] = ground + leg - contact.SINK_M
+    yaw = setpoints[0, controller.YAW]
+    state[6], state[9] = math.cos(yaw / 2), math.sin(yaw / 2)
+    for i in range(4):
+        phase[i] = 6.283185307179586 * i * 0.381966 + normal(streams[3])
+    est[0], est[1], est[2] = 0.005 * normal(streams[3]), 0.005 * normal(streams[3]), yaw
+    est[6], est[7], est[8] = state[0], state[1], state[2] - plant.range_below_rotors
+    controller.reset(pid_memory, math.degrees(yaw))
+    force[2] = plant.mass * plant.gravity
+    for i in range(3):
+        sensors.settle(acc_filter, acc_memory[i], plant.gravity if i == 2 else 0.0)
+    charge = plant.battery_charge
+    power, battery_volts = 0.0, plant.nominal_voltage
+    down, last_down_top = 0.01, ground
+    next_range, next_ranges = 0.0, 0.0
+    flying = False
+    decay = math.exp(-h / plant.motor_noise_time)
+    fresh = math.sqrt(1.0 - decay * decay)
+    rows = table.shape[0]
+    steps = rows * LOG_STEPS
+    rigid_body.derivative(plant, state, patch[:4] * 0.0, 0.0, 0.0, force, work[0])
+
+    for k in range(steps):
+        t = k * h
+        row = k // LOG_STEPS
+        setpoint = setpoints[row]
+        # --- IMU: specific force at the sensor, which sits in the geometric centre
+        lift = 0.0
+        for i in range(4):
+            lift += plant.thrust_per_speed2 * speed[i] * speed[i] * plant.gain[i]
+        rx, ry, rz = -plant.com[0], -plant.com[1], -plant.com[2]
+        wx, wy, wz = state[10], state[11], state[12]
+        dx, dy, dz = work[0, 10], work[0, 11], work[0, 12]
+        dot = wx * rx + wy * ry + wz * rz
+        square = wx * wx + wy * wy + wz * wz
+        acc[0] = force[0] / plant.mass + dy * rz - dz * ry + wx * dot - rx * square
+        acc[1] = force[1] / plant.mass + dz * rx - dx * rz + wy * dot - ry * square
+        acc[2] = (force[2] + lift) / plant.mass + dx * ry - dy * rx + wz * dot - rz * square
+        normals(streams[1], imu_n)
+        shake_x, shake_y, shake_z = 0.0, 0.0, 0.0
+        if plant.vibration > 0.0:
+            for i in range(4):
+                size = 0.5 * plant.vibration * (speed[i] / hover) ** 2
+                shake_x += size * math.sin(phase[i])
+                shake_y += size * math.cos(phase[i])
+                shake_z += size * math.sin(phase[i] + 0.7)
+        for i in range(3):
+            shake = shake_x if i == 0 else (shake_y if i == 1 else shake_z)
+            value = acc[i] + plant.acc_bias[i] + acc_rms * imu_n[i]
+            value = sensors.lowpass(acc_filter, acc_memory[i], value) + shake
+            acc[i] = min(max(value, -plant.acc_range), plant.acc_range)
+            value = state[10 + i] + plant.gyro_bias[i] + plant.gyro_noise * imu_n[3 + i]
+            value += plant.vibration_gyro * shake
+            gyro[i] = min(max(value, -plant.gyro_range), plant.gyro_range)
+            ring[k % RING, i] = acc[i]
+            ring[k % RING, 3 + i] = sensors.lowpass(gyro_filter, gyro_memory[i], gyro[i])
+        if k == 0:
+            for j in range(RING):
+                ring[j] = ring[0]
+        late = plant.sensor_delay / h
+        for i in range(3):
+            seen_acc[i] = sensors.delayed(ring, k, late, i)
+            seen_gyro[i] = sensors.delayed(ring, k, late, 3 + i)
+
+        # --- other sensors
+        if t >= next_range:
+            next_range += sensors.RANGE_PERIOD_S
+            normals(streams[2], other_n)
+            eye = state[2] - plant.range_below_rotors
+            spot = max(sensors.CONE_TANGENT * (eye - ground), 0.002)
+            world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
+            near = patch[world.UPPER_TOP] if patch[world.COVER] > 0.0 else patch[world.LOWER_TOP]
+            spot = max(sensors.CONE_TANGENT * (eye - near), 0.002)
+            world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
+            top = patch[world.UPPER_TOP] if patch[world.COVER] >= sensors.CONE_COVER else patch[world.LOWER_TOP]
+            roll, pitch, _ = euler(state[6:10])
+            tilt = max(math.cos(roll) * math.cos(pitch), 0.3)
+            down = max((eye - top) / tilt + plant.range_noise * other_n[0], 0.0)
+            if down > sensors.MAX_RANGE_M:
+                down = np.nan
+            else:
+                height = down * tilt + top
+                if top > ground:
+                    height -= plant.range_residual
+                if top != last_down_top:
+                    height += plant.range_kick if top < last_down_top else -plant.range_kick
+                estimator.correct_range(est, height)
+            last_down_top = top
+        if t >= next_ranges:
+            next_ranges += sensors.MULTIRANGER_PERIOD_S
+            _, _, yaw = euler(state[6:10])
+            for i in range(4):
+                turn = (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)[i]
+                far = sensors.wall_distance(state[0], state[1], yaw + turn, room)
+                ranges[i] = far if far <= sensors.MAX_RANGE_M else np.nan
+
+        # --- estimator and controller
+        if flying or setpoint[controller.MOTORS] > 0.5:
+            wx, wy, wz = estimator.predict(est, seen_gyro, seen_acc, plant.gravity, h)
+        else:
+            wx, wy, wz = acc[0], acc[1], acc[2]
+        world_force[0], world_force[1], world_force[2] = wx, wy, wz
+        if k % LOG_STEPS == 0:
+            normals(streams[2], other_n)
+            height = max(state[2] - plant.range_below_rotors - last_down_top, 0.02)
+            scale = 1.0 + plant.flow_share * (max(est[8], 0.0) / height - 1.0) if flying else 1.0
+            estimator.correct_flow(est, state[3] * scale + plant.flow_noise * other_n[0],
+                                   state[4] * scale + plant.flow_noise * other_n[1])
+        volts = battery.supply(plant, battery_volts)
+        if setpoint[controller.MOTORS] > 0.5:
+            flying = True
+            if k % controller.POSITION_STEPS == 0:
+                controller.position_loop(plant, pid_memory, setpoint, est[6:9], est[3:6], est[2])
+            controller.attitude_loop(plant, pid_memory, est[0], est[1], est[2], seen_gyro, pwm)
+            if plant.compensate_battery > 0.5:
+                for i in range(4):
+                    pwm[i] = motors.compensated(plant, pwm[i], volts)
+            controller.cap(pwm)
+        else:
+            flying = False
+            controller.reset(pid_memory, math.degrees(est[2]))
+            for i in range(4):
+                pwm[i] = 0.0
+            est[3], est[4], est[5] = 0.0, 0.0, 0.0
+
+        # --- log
+        if k % LOG_STEPS == 0:
+            out = table[row]
+            out[T] = row * LOG_STEPS * h
+            roll, pitch, yaw = euler(state[6:10])
+            out[ANGLES], out[ANGLES + 1], out[ANGLES + 2] = roll, pitch, yaw
+            for i in range(3):
+                out[ACC + i], out[GYRO + i] = acc[i], gyro[i]
+                out[PLACE + i], out[SPEED + i], out[ACC_WORLD + i] = state[i], state[3 + i], world_force[i]
+            out[PLACE + 2] -= plant.range_below_rotors
+            for i in range(4):
+                out[PWM + i], out[RANGES + i] = pwm[i], ranges[i]
+                out[RPM + i] = speed[i] * 9.549296585513721
+            out[DOWN], out[VBAT] = down, volts
+
+        # --- motors
+        for i in range(4):
+            command[k % RING, i] = pwm[i]
+            if k == 0:
+                command[:, i] = pwm[i]
+        normals(streams[0], motor_n)
+        power = 0.0
+        for i in range(4):
+            given = sensors.delayed(command, k, plant.actuator_delay / h, i)
+            target[i] = motors.target_speed(plant, given, volts)
+            flicker[i] = decay * flicker[i] + fresh * motor_n[i]
+            plant.gain[i] = base_gain[i] * (1.0 + plant.motor_noise * flicker[i])
+            thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
+            power += plant.power_per_thrust15 * thrust * math.sqrt(thrust)
+            phase[i] = (phase[i] + h * speed[i]) % 6.283185307179586
+        charge, battery_volts = battery.drain(plant, charge, power, h)
+
+        # --- effects, at the middle of the step
+        for i in range(13):
+            middle[i] = state[i] + 0.5 * h * work[0, i]
+        for i in range(4):
+            tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
+            middle_speed[i] = speed[i] + 0.5 * h / tau * (target[i] - speed[i])
+        fill_signals(plant, middle, work[0, 3:6], middle_speed, corners, first, surface, box, h, t + 0.5 * h,
+                     hover, s, patch)
+        for i in range(6):
+            force[i] = 0.0
+        for i in range(used):
+            effects[i](parameters[i], s, memory[i], effect_streams[i], force)
+        deepest = contact.legs(plant, middle, s, leg, force)
+
+        rigid_body.step(plant, state, speed, target, h, force, work)
+        total = 0.0
+        for i in range(13):
+            total += state[i]
+        if not math.isfinite(total):
+            return NOT_FINITE, row
+        if s[at.ROTATION + 8] < 0.2:
+            return UPSET, row + 1
+        if deepest > FLOOR_DEPTH_M:
+            return STRUCK, row + 1
+        if abs(state[0]) > 1000.0 or abs(state[1]) > 1000.0 or abs(state[2]) > 100.0:
+            return LOST, row + 1
+    return OK, rows

@@ -1,0 +1,149 @@
+"""Everything that one flight's equations need, as one record that compiled code reads by name.
+
+A vehicle gives the nominal values, effects change them. Defaults of the controller are
+the firmware's documented ones (crazyflie-firmware, platform_defaults_cf2.h).
+"""
+
+import numpy as np
+
+from airtouch.vehicle import Vehicle
+
+_F = np.float64
+#: name, elements, value where the vehicle says nothing, meaning
+FIELDS: tuple[tuple[str, int, float, str], ...] = (
+    ("mass", 1, 0.0, "kg"),
+    ("gravity", 1, 9.81, "m/s^2"),
+    ("inertia", 3, 0.0, "kg m^2, principal"),
+    ("com", 3, 0.0, "m, centre of mass from the geometric centre, body axes"),
+    ("rotor_x", 4, 0.0, "m"),
+    ("rotor_y", 4, 0.0, "m"),
+    ("rotor_radius", 1, 0.0, "m"),
+    ("rotor_spacing", 1, 0.0, "m, between neighbouring rotors"),
+    ("thrust_per_speed2", 1, 0.0, "N per (rad/s)^2"),
+    ("yaw_torque_over_thrust", 1, 0.0, "m"),
+    ("rotor_inertia", 1, 0.0, "kg m^2, of rotor and propeller"),
+    ("motor_rise", 1, 0.06, "s, first-order lag of a rotor speeding up"),
+    ("motor_fall", 1, 0.06, "s, and slowing down"),
+    ("gain", 4, 1.0, "thrust of each rotor over nominal"),
+    ("thrust_curve", 3, 0.0, "N, N/PWM, N/PWM^2 at the nominal voltage"),
+    ("nominal_voltage", 1, 3.8, "V"),
+    ("motor_noise", 1, 0.0, "rms of thrust over its mean, each rotor on its own"),
+    ("motor_noise_time", 1, 0.02, "s, correlation time of that noise"),
+    ("actuator_delay", 1, 0.0, "s, from command to motor"),
+    ("battery_strength", 1, 0.0, "0: always the nominal voltage, 1: the battery's own"),
+    ("battery_charge", 1, 1.0, "share of the capacity at take-off"),
+    ("battery_capacity", 1, 900.0, "C"),
+    ("battery_resistance", 1, 0.12, "ohm"),
+    ("battery_cells", 1, 1.0, "in series"),
+    ("power_per_thrust15", 1, 70.0, "W per N^1.5 of each rotor"),
+    ("acc_noise", 1, 0.06, "m/s^2 rms, as logged"),
+    ("gyro_noise", 1, 0.006, "rad/s rms, as logged"),
+    ("acc_bias", 3, 0.0, "m/s^2"),
+    ("gyro_bias", 3, 0.0, "rad/s"),
+    ("acc_range", 1, 235.0, "m/s^2, saturation: 24 g"),
+    ("gyro_range", 1, 34.9, "rad/s, saturation: 2000 deg/s"),
+    ("acc_lowpass", 1, 30.0, "Hz, of what the controller and the log get; 0: none"),
+    ("gyro_lowpass", 1, 80.0, "Hz, of what the controller gets; 0: none"),
+    ("vibration", 1, 0.0, "m/s^2, amplitude of the rotors' 1/rev line on the accelerometer"),
+    ("vibration_gyro", 1, 0.05, "rad/s per m/s^2"),
+    ("range_noise", 1, 0.002, "m rms"),
+    ("range_below_rotors", 1, 0.025, "m, down range sensor below the rotor discs"),
+    ("flow_noise", 1, 0.02, "m/s rms at 100 Hz"),
+    ("flow_share", 1, 0.0, "how far optical flow is scaled by the estimated height, not the true distance"),
+    ("range_residual", 1, 0.0, "m, platform compensation's error over the platform"),
+    ("range_kick", 1, 0.0, "m, error of the one reading on which an edge is noticed"),
+    ("sensor_delay", 1, 0.0, "s, from IMU to controller"),
+    ("time_jitter", 1, 0.0, "s rms, on logged time"),
+    ("packet_loss", 1, 0.0, "share of logged samples lost"),
+    ("loss_burst", 1, 1.0, "samples lost in a row, mean"),
+    ("compensate_battery", 1, 0.0, "1: the firmware's battery compensation is on"),
+    ("thrust_base", 1, 36000.0, "PWM"),
+    ("thrust_min", 1, 20000.0, "PWM"),
+    ("thrust_scale", 1, 1000.0, "PWM per unit of the vertical velocity controller"),
+    ("rate_scale", 1, 1.0, "of the rate gains, to another vehicle's authority"),
+    ("derivative_on_error", 1, 0.0, "1: rate derivative acts on the error (firmware before 2024)"),
+    ("rate_gain", 1, 1.0, "times the rate loop's gains"),
+    ("attitude_gain", 1, 1.0, "times the attitude loop's gains"),
+    ("position_gain", 1, 1.0, "times the horizontal position and velocity gains"),
+    ("height_gain", 1, 1.0, "times the vertical position and velocity gains"),
+    ("tilt_limit", 1, 20.0, "degrees"),
+    ("step", 1, 0.002, "s, of physics and attitude controller"),
+)
+DTYPE = np.dtype([(name, _F) if n == 1 else (name, _F, (n,)) for name, n, _, _ in FIELDS])
+ROTOR_SIGN_X = np.array([1.0, -1.0, -1.0, 1.0])
+ROTOR_SIGN_Y = np.array([-1.0, -1.0, 1.0, 1.0])
+DEFAULT_THRUST_PER_SPEED2 = 2.1e-8  #: N/(rad/s)^2, Crazyflie: 0.089 N at 19,700 rpm
+
+
+def from_vehicle(vehicle: Vehicle) -> np.ndarray:
+    """The nominal plant of a vehicle: an array (1,) of DTYPE.
+
+    Its fields may be changed in place; lengths and units are in FIELDS.
+    """
+    plant = np.zeros(1, DTYPE)
+    for name, _, default, _ in FIELDS:
+        plant[name] = default
+    row = plant[0]
+    row["mass"], row["gravity"], row["inertia"] = vehicle.mass_kg, vehicle.gravity_mps2, vehicle.inertia_kg_m2
+    half = vehicle.arm_m / np.sqrt(2.0)
+    row["rotor_x"], row["rotor_y"] = ROTOR_SIGN_X * half, ROTOR_SIGN_Y * half
+    row["rotor_radius"], row["rotor_spacing"] = vehicle.rotor_radius_m, 2.0 * half
+    row["thrust_curve"] = vehicle.thrust_of_pwm_n
+    row["thrust_per_speed2"] = vehicle.thrust_per_speed2 or DEFAULT_THRUST_PER_SPEED2
+    row["yaw_torque_over_thrust"] = vehicle.yaw_torque_over_thrust_m
+    row["rotor_inertia"] = vehicle.rotor_inertia_kg_m2
+    row["motor_rise"] = vehicle.motor_time_constant_s
+    row["motor_fall"] = vehicle.motor_fall_time_constant_s or vehicle.motor_time_constant_s
+    row["nominal_voltage"] = vehicle.nominal_voltage_v or 3.8 * vehicle.battery_cells
+    row["battery_capacity"] = 3600.0 * vehicle.battery_capacity_ah
+    row["battery_resistance"] = vehicle.battery_resistance_ohm
+    row["battery_cells"] = vehicle.battery_cells
+    row["power_per_thrust15"] = vehicle.power_per_thrust15
+    row["acc_noise"], row["gyro_noise"] = vehicle.acc_noise_rms_mps2, vehicle.gyro_noise_rms_radps
+    row["range_noise"] = vehicle.range_noise_rms_m
+    row["acc_lowpass"] = vehicle.acc_lowpass_hz
+    hover = hover_pwm(vehicle)
+    row["thrust_base"] = vehicle.thrust_base_pwm or 0.9 * hover
+    row["thrust_min"] = min(20000.0, 0.5 * hover)
+    row["derivative_on_error"] = vehicle.derivative_on_error
+    row["compensate_battery"] = vehicle.battery_compensation
+    row["rate_scale"] = _authority(REFERENCE) / _authority(vehicle)
+    row["thrust_scale"] = 1000.0 * _lift_slope(REFERENCE) / _lift_slope(vehicle)
+    return plant
+
+
+def hover_pwm(vehicle: Vehicle) -> float:
+    """PWM at which four rotors carry the weight at the nominal voltage."""
+    c0, c1, c2 = vehicle.thrust_of_pwm_n
+    each = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
+    if c2 == 0.0:
+        return float((each - c0) / c1)
+    return float((-c1 + np.sqrt(c1 * c1 - 4.0 * c2 * (c0 - each))) / (2.0 * c2))
+
+
+def hover_speed(plant: np.ndarray) -> float:
+    """Speed of one rotor in hover, rad/s."""
+    row = plant[0]
+    return float(np.sqrt(row["mass"] * row["gravity"] / 4.0 / row["thrust_per_speed2"]))
+
+
+def _slope(vehicle: Vehicle) -> float:
+    """N per PWM of one motor in hover."""
+    return vehicle.thrust_of_pwm_n[1] + 2.0 * vehicle.thrust_of_pwm_n[2] * hover_pwm(vehicle)
+
+
+def _authority(vehicle: Vehicle) -> float:
+    """rad/s^2 per PWM about the roll axis."""
+    return vehicle.arm_m * _slope(vehicle) / vehicle.inertia_kg_m2[0]
+
+
+def _lift_slope(vehicle: Vehicle) -> float:
+    """m/s^2 per PWM."""
+    return _slope(vehicle) / vehicle.mass_kg
+
+
+#: The firmware's gains are tuned for this vehicle; others get them scaled to the same loops.
+REFERENCE = Vehicle(
+    name="reference", mass_kg=0.0319, arm_m=0.046, inertia_kg_m2=(1.68e-5, 1.68e-5, 2.98e-5),
+    thrust_of_pwm_n=(5.485e-4, 1.0326e-6, 2.1303e-11), yaw_torque_over_thrust_m=0.0072,
+    motor_time_constant_s=0.06, rotor_radius_m=0.0235)

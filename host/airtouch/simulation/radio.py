@@ -1,0 +1,25 @@
+"""What of a flight reaches the log: lost samples and times that jitter."""
+
+import numpy as np
+
+
+def received(table: np.ndarray, jitter_s: float, loss: float, burst: float, rng: np.random.Generator) -> np.ndarray:
+    """Rows of a log (n, columns), time in column 0, that the host gets, with the host's times.
+
+    jitter_s: rms of the error of each time; times never run backwards. loss: share of rows
+    lost, in runs of `burst` rows on average (Gilbert's two-state channel). The first row
+    always arrives.
+    """
+    n = len(table)
+    draws, errors = rng.random(n), rng.standard_normal(n)
+    if jitter_s > 0.0:
+        table[:, 0] = np.maximum.accumulate(table[:, 0] + jitter_s * errors)
+    if loss <= 0.0:
+        return table
+    recover = 1.0 / burst
+    fail = min(recover * loss / (1.0 - loss), 1.0)
+    kept, lost = np.ones(n, dtype=bool), False
+    for i in range(1, n):
+        lost = draws[i] >= recover if lost else draws[i] < fail
+        kept[i] = not lost
+    return table[kept]

@@ -1,0 +1,54 @@
+"""Random numbers of one flight: counter-based streams that depend on nothing but their key.
+
+Each consumer (a sensor, an effect) owns a stream, so that switching one effect on or
+off does not change what any other draws. Source: Steele, Lea, Flood, Fast Splittable
+Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64).
+"""
+
+import math
+import zlib
+
+import numpy as np
+from numba import float64, njit, types, uint64
+
+STREAM = uint64[::1]  #: type of a stream's state, one 64-bit counter
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_2 = np.uint64(0x94D049BB133111EB)
+_S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
+_TO_UNIT = 1.0 / (1 << 53)
+
+
+def stream(seed: int, flight: int, name: str) -> np.ndarray:
+    """The state (1,) uint64 of the stream `name` of a flight."""
+    key = np.random.SeedSequence([seed, flight, zlib.crc32(name.encode())])
+    return key.generate_state(1, np.uint64)
+
+
+@njit(float64(STREAM), cache=True)
+def uniform(state):
+    """One number in (0, 1]."""
+    state[0] += _GOLDEN
+    z = state[0]
+    z = (z ^ (z >> _S30)) * _MIX_1
+    z = (z ^ (z >> _S27)) * _MIX_2
+    z = z ^ (z >> _S31)
+    return (float(z >> _S11) + 1.0) * _TO_UNIT
+
+
+@njit(float64(STREAM), cache=True)
+def normal(state):
+    """One number of the standard normal distribution (Box and Muller)."""
+    radius = math.sqrt(-2.0 * math.log(uniform(state)))
+    return radius * math.cos(2.0 * math.pi * uniform(state))
+
+
+@njit(types.void(STREAM, float64[::1]), cache=True)
+def normals(state, out):
+    """Fill `out` with standard normal numbers."""
+    for i in range(0, len(out), 2):
+        radius = math.sqrt(-2.0 * math.log(uniform(state)))
+        angle = 2.0 * math.pi * uniform(state)
+        out[i] = radius * math.cos(angle)
+        if i + 1 < len(out):
+            out[i + 1] = radius * math.sin(angle)

@@ -1,0 +1,131 @@
+"""Scenarios: a world, a mission and effects with ranges, so that no two flights are alike."""
+
+import math
+import tomllib
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation import effects, mission, world
+from airtouch.simulation.expressions import draw
+
+KEYS = {"name", "summary", "values", "world", "platform", "mission", "effects"}
+DEFAULT_ROOM_M = (-10.0, 10.0, -10.0, 10.0)
+CIRCLE_CORNERS = 24
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A parsed scenario file; `draw_flight` makes one flight of it."""
+
+    name: str
+    summary: str
+    table: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """One flight with every value drawn: set-points (rows, 8), world, room (4,), effects."""
+
+    setpoints: np.ndarray
+    world: world.World
+    room: np.ndarray
+    effects: dict[str, dict[str, float]]
+    values: dict[str, Any]
+
+
+def names() -> list[str]:
+    """The scenarios that come with the package."""
+    folder = resources.files("airtouch") / "simulation" / "scenarios"
+    return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
+
+
+def load(name_or_path: str | Path) -> Scenario:
+    """A built-in scenario by name, or a TOML file by path. Raises AirTouchError in one line."""
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise AirTouchError(f"{path}: no such scenario file")
+        text = path.read_text(encoding="utf-8", errors="replace")
+    elif str(name_or_path) in names():
+        folder = resources.files("airtouch") / "simulation" / "scenarios"
+        text = (folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
+    else:
+        raise AirTouchError(f"no scenario {str(name_or_path)!r}; known: {', '.join(names())}, or a .toml file")
+    return parse(text, str(name_or_path))
+
+
+def parse(text: str, source: str) -> Scenario:
+    """A scenario from TOML text; `source` names it in messages. One flight is drawn as a check."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise AirTouchError(f"{source}: not valid TOML: {error}") from None
+    unknown = sorted(set(table) - KEYS)
+    if unknown:
+        raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(sorted(KEYS))}")
+    if "mission" not in table:
+        raise AirTouchError(f"{source}: no [mission]")
+    scenario = Scenario(str(table.get("name", Path(source).stem)), str(table.get("summary", "")), table)
+    draw_flight(scenario, 0, 0)
+    return scenario
+
+
+def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
+    """Flight number `flight`: depends on (scenario, seed, flight) only.
+
+    Raises AirTouchError when what is drawn cannot be flown.
+    """
+    rng = np.random.default_rng([seed, flight, zlib.crc32(b"scenario")])
+    source, table = scenario.name, scenario.table
+    values: dict[str, Any] = {}
+    for key, node in table.get("values", {}).items():
+        values[key] = draw(node, values, rng, f"{source}: values.{key}")
+    ground = draw(table.get("world", {}), values, rng, f"{source}: world")
+    platforms = [_platform(draw(p, values, rng, f"{source}: platform {i + 1}"), f"{source}: platform {i + 1}")
+                 for i, p in enumerate(table.get("platform", []))]
+    if set(ground) - {"floor", "room_m"}:
+        raise AirTouchError(f"{source}: [world] takes floor and room_m")
+    built = world.build(platforms, ground.get("floor", "cement"))
+    chosen = {}
+    for name, given in draw(table.get("effects", {}), values, rng, f"{source}: effects").items():
+        chosen[name] = effects.get(name).values(given)
+    plan = draw(table["mission"], values, rng, f"{source}: mission")
+    rows = mission.setpoints(plan, built, source)
+    room = np.array(ground.get("room_m", DEFAULT_ROOM_M), dtype=np.float64)
+    if room.shape != (4,):
+        raise AirTouchError(f"{source}: room_m needs four numbers: x from, to, y from, to")
+    return FlightPlan(rows, built, room, chosen, values)
+
+
+def _platform(table: Mapping[str, Any], where: str) -> world.Platform:
+    """A platform from its table: shape rectangle (size_m), circle (radius_m) or polygon (corners_m)."""
+    shape = table.get("shape", "rectangle")
+    wanted = {"rectangle": {"size_m"}, "circle": {"radius_m"}, "polygon": {"corners_m"}}
+    if shape not in wanted:
+        raise AirTouchError(f"{where}: no shape {shape!r}; known: {', '.join(wanted)}")
+    wrong = set(table) - wanted[shape] - {"shape", "centre_m", "angle_deg", "top_m", "material"}
+    missing = (wanted[shape] | {"top_m"}) - set(table)
+    if wrong or missing:
+        said = f"does not take {', '.join(sorted(wrong))}" if wrong else f"needs {', '.join(sorted(missing))}"
+        raise AirTouchError(f"{where}: a {shape} {said}")
+    if table["top_m"] < 0.0:
+        raise AirTouchError(f"{where}: its top is below the floor")
+    if shape == "rectangle":
+        half = np.asarray(table["size_m"], dtype=np.float64) / 2.0
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+    elif shape == "circle":
+        turn = np.arange(CIRCLE_CORNERS) * 2.0 * np.pi / CIRCLE_CORNERS
+        corners = table["radius_m"] * np.column_stack([np.cos(turn), np.sin(turn)])
+    else:
+        corners = np.asarray(table["corners_m"], dtype=np.float64)
+    angle = math.radians(table.get("angle_deg", 0.0))
+    turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    corners = corners @ turn + np.asarray(table.get("centre_m", [0.0, 0.0]), dtype=np.float64)
+    return world.Platform(corners, float(table["top_m"]), str(table.get("material", "acrylic")))

@@ -1,0 +1,84 @@
+"""Sensors as the controller and the log get them: IMU, down range, flow, Multi-ranger."""
+
+import math
+
+from numba import njit
+
+MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
+RANGE_PERIOD_S = 0.025
+MULTIRANGER_PERIOD_S = 0.1
+CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
+CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
+
+
+@njit(cache=True)
+def lowpass_coefficients(cutoff, h, out):
+    """Second-order Butterworth (b0, b1, b2, a1, a2) into out (5,); a cutoff of 0 passes all."""
+    if cutoff <= 0.0 or cutoff >= 0.49 / h:
+        out[0], out[1], out[2], out[3], out[4] = 1.0, 0.0, 0.0, 0.0, 0.0
+        return
+    f = math.tan(math.pi * cutoff * h)
+    c = 1.0 + math.sqrt(2.0) * f + f * f
+    out[0] = f * f / c
+    out[1] = 2.0 * out[0]
+    out[2] = out[0]
+    out[3] = 2.0 * (f * f - 1.0) / c
+    out[4] = (1.0 - math.sqrt(2.0) * f + f * f) / c
+
+
+@njit(cache=True)
+def lowpass(b, memory, x):
+    """One sample through the filter; memory (2,)."""
+    d = x - memory[0] * b[3] - memory[1] * b[4]
+    y = d * b[0] + memory[0] * b[1] + memory[1] * b[2]
+    memory[1] = memory[0]
+    memory[0] = d
+    return y
+
+
+@njit(cache=True)
+def settle(b, memory, level):
+    """Set the memory as if the input had always been `level`."""
+    d = level / (1.0 + b[3] + b[4])
+    memory[0] = d
+    memory[1] = d
+
+
+@njit(cache=True)
+def noise_gain(b):
+    """rms of the filter's output for white noise of rms 1."""
+    d1, d2, total = 0.0, 0.0, 0.0
+    for i in range(2000):
+        d = (1.0 if i == 0 else 0.0) - d1 * b[3] - d2 * b[4]
+        y = d * b[0] + d1 * b[1] + d2 * b[2]
+        d2, d1 = d1, d
+        total += y * y
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def delayed(ring, at, steps, column):
+    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a ring buffer."""
+    size = ring.shape[0]
+    whole = int(math.floor(steps))
+    part = steps - whole
+    now = ring[(at - whole) % size, column]
+    if part == 0.0:
+        return now
+    return now + part * (ring[(at - whole - 1) % size, column] - now)
+
+
+@njit(cache=True)
+def wall_distance(x, y, direction, room):
+    """Distance in m from (x, y) along `direction` (rad) to the wall of room (x0, x1, y0, y1)."""
+    c, s = math.cos(direction), math.sin(direction)
+    far = 1e9
+    if c > 1e-9:
+        far = min(far, (room[1] - x) / c)
+    elif c < -1e-9:
+        far = min(far, (room[0] - x) / c)
+    if s > 1e-9:
+        far = min(far, (room[3] - y) / s)
+    elif s < -1e-9:
+        far = min(far, (room[2] - y) / s)
+    return far
