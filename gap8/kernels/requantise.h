@@ -1,24 +1,19 @@
 // From an int32 accumulator to an int8 activation: the one rounding of this project.
 //
-// gemmlowp's double rounding, as TensorFlow Lite Micro does it: a saturating,
-// rounding, doubling high multiplication (ties away from zero), then a rounding
-// shift to the right (ties away from zero). Equal to tflite-micro to the last bit.
+// gemmlowp's double rounding, as TensorFlow Lite Micro does it: a rounding, doubling
+// high multiplication (ties up), then a rounding shift to the right (ties away from
+// zero). Equal to tflite-micro to the last bit. Right shifts of negative numbers must be
+// arithmetic, as they are on every target here.
 #pragma once
 
 #include <stdint.h>
 
-// round(a * b / 2^31), saturated. Ties away from zero.
+// round(a * b / 2^31) for b >= 0. Ties up.
 static inline int32_t roundingDoublingHighMultiply(int32_t a, int32_t b) {
-  if (a == INT32_MIN && b == INT32_MIN) {
-    return INT32_MAX;
-  }
-  const int64_t product = (int64_t)a * (int64_t)b;
-  const int64_t nudge = product >= 0 ? (1LL << 30) : 1LL - (1LL << 30);
-  return (int32_t)((product + nudge) / (1LL << 31));
+  return (int32_t)(((int64_t)a * (int64_t)b + (1LL << 30)) >> 31);
 }
 
 // round(x / 2^exponent) for exponent 0 to 31. Ties away from zero.
-// Needs >> of a negative number to be arithmetic, as on every target here.
 static inline int32_t roundingShiftRight(int32_t x, int32_t exponent) {
   const int32_t mask = (int32_t)((1LL << exponent) - 1);
   const int32_t threshold = (mask >> 1) + (x < 0 ? 1 : 0);

@@ -177,7 +177,7 @@ def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, blo
     told = keras.callbacks.LambdaCallback(
         on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
     callbacks = [schedule, told] + ([stopping] if len(held.x) else [])
-    history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
+    history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks, shuffle=False,
                         validation_data=_batches(held, shuffle=False) if len(held.x) else None)
     return network.weights_of_keras(model), len(history.history["loss"])
 
@@ -211,6 +211,7 @@ def _batches(windows: Windows, shuffle: bool):  # noqa: ANN202 - a tf.data.Datas
 def use_tensorflow(seed: int) -> None:
     """Import TensorFlow, quietly, with every source of chance fixed."""
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    os.environ.setdefault("TF_ENABLE_ONEDNN_OPTS", "0")  # one order of summation
     os.environ.setdefault("CUDA_VISIBLE_DEVICES", "-1")  # one machine, one result
     try:
         import keras

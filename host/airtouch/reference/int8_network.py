@@ -77,11 +77,8 @@ def quantised_multiplier(real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rounding_doubling_high_multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """round(a b / 2^31) for int32 arrays, ties away from zero, saturated."""
-    product = a.astype(np.int64) * b.astype(np.int64)
-    rounded = product + np.where(product >= 0, 1 << 30, 1 - (1 << 30))
-    quotient = np.where(rounded >= 0, rounded >> 31, -(-rounded >> 31))  # truncated division
-    return np.minimum(quotient, 2**31 - 1).astype(np.int32)
+    """round(a b / 2^31) for int32 a and int32 b >= 0, ties up."""
+    return ((a.astype(np.int64) * b.astype(np.int64) + (1 << 30)) >> 31).astype(np.int32)
 
 
 def rounding_shift_right(x: np.ndarray, exponent: np.ndarray) -> np.ndarray:

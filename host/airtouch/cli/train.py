@@ -1,0 +1,104 @@
+"""`airtouch train`: train a detector on recorded flights."""
+
+import shlex
+import sys
+import time
+from pathlib import Path
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from airtouch import logs
+from airtouch.cli.flights import find_flights
+from airtouch.cli.scores import check_free
+from airtouch.detector import dataset, evaluate, registry
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+
+
+@click.command(name="train")
+@click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--detector", default="paper", show_default=True, help="Which detector to train.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
+              help="Model file to write.")
+@click.option("--epochs", type=click.IntRange(1), help="At most so many; the detector's own number if left out.")
+@click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
+              help="Share of zeros in the first dense layer; 0.8 if left out.")
+@click.option("--block", type=click.Choice(["1", "4"]), help="Prune single weights or blocks of four; 4 if left out.")
+@click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="Weight of the disturbance-force loss.")
+@click.option("--seed", default=0, show_default=True, help="Fixes every bit of the result on one machine.")
+@click.option("--force", is_flag=True, help="Replace the model file.")
+def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, sparsity: float | None,
+            block: str | None, df_lambda: float | None, seed: int, force: bool) -> None:
+    """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
+
+    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Flights that cannot be used are named and
+    left out, and the exit code is 2. A share of the flights is held out to stop in time, and to choose the decoding.
+    """
+    check_free(out, force)
+    module = registry.get(detector)
+    given = {"epochs": epochs, "sparsity": sparsity, "block": block and int(block), "df_lambda": df_lambda}
+    options = {name: value for name, value in given.items() if value is not None}
+    chosen, failures = _read(flights)
+    start = time.monotonic()
+    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                  TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
+        tasks: dict[str, int] = {}
+
+        def progress(stage: str, done: int, total: int, note: str) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, note="")
+            bar.update(tasks[stage], completed=done, note=note)
+
+        model = module.fit(chosen, seed=seed, progress=progress, command=_command(), **options)
+    model.save(out, force)
+    _report(model.metadata, time.monotonic() - start)
+    click.echo(f"written: {out} ({out.stat().st_size} bytes)")
+    if failures:
+        click.echo(f"airtouch: {len(chosen)} flights used, {failures} left out (see above)", err=True)
+        sys.exit(2)
+
+
+def _read(paths: tuple[Path, ...]) -> tuple[list[FlightLog], int]:
+    """The logs that can be trained on, and how many could not."""
+    if not paths:
+        found = find_flights()
+        if found is None:
+            raise click.UsageError("no recorded flights found; name FLIGHTS or set AIRTOUCH_FLIGHTS")
+        paths = (found,)
+    chosen, failures = [], 0
+    for file in dataset.collect(paths):
+        try:
+            log = logs.read(file.path)
+            evaluate.check(log)
+            if evaluate.truth(log) is None:
+                raise AirTouchError(f"{file.path}: no down range in this log, so no truth to train on")
+            chosen.append(log)
+        except AirTouchError as error:
+            click.echo(f"airtouch: {error}", err=True)
+            failures += 1
+    if not chosen:
+        raise AirTouchError("no flight that can be trained on")
+    return chosen, failures
+
+
+def _report(metadata: dict, seconds: float) -> None:
+    held = set(metadata["held_out"])
+    fitted = [name for name in metadata["flights"] if name not in held]
+    click.echo(f"trained on {len(fitted)} flights, {metadata['epochs_run']} epochs, {seconds:.0f} s")
+    click.echo(f"held out ({len(held)}): {', '.join(metadata['held_out']) or 'none'}")
+    score = metadata["held_out_accuracy"]
+    if score["float"] is not None:
+        click.echo(f"balanced window accuracy on held-out flights: float {score['float']:.1%}, "
+                   f"int8 {score['int8']:.1%} (n = {score['windows']} windows)")
+
+
+def _command() -> str:
+    """The command as typed, without the folder that `airtouch` lies in."""
+    return shlex.join(["airtouch", *sys.argv[1:]])
+
+
+def _stderr():  # noqa: ANN202 - a rich.console.Console
+    from rich.console import Console
+
+    return Console(stderr=True)
