@@ -6,7 +6,7 @@ after large terms cancel are therefore held to 1e-5 of themselves plus a few EPS
 """
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 EPS = 2.0**-24  #: half a unit in the last place of 1, float32
 RELATIVE = 1e-5
@@ -28,14 +28,17 @@ def band_power_excess(kernel: np.ndarray, reference: np.ndarray, x: np.ndarray, 
 
 def spread(x: np.ndarray, window: int) -> np.ndarray:
     """(n, c): the range of the last `window` samples, or of all so far."""
-    padded = np.concatenate([np.repeat(x[:1], window - 1, axis=0), x]).astype(np.float64)
-    windows = sliding_window_view(padded, window, axis=0)
-    return windows.max(axis=-1) - windows.min(axis=-1)
+    causal = {"size": window, "axis": 0, "mode": "nearest", "origin": window - 1 - window // 2}
+    x = np.asarray(x, dtype=np.float64)
+    return maximum_filter1d(x, **causal) - minimum_filter1d(x, **causal)
 
 
 def deviation_power(x: np.ndarray, window: int) -> np.ndarray:
     """(n - window + 1, c): mean square deviation from the mean of each window."""
-    return sliding_window_view(x.astype(np.float64), window, axis=0).var(axis=-1)
+    x = x - x.mean(axis=0, dtype=np.float64)
+    first, second = (np.cumsum(np.concatenate([np.zeros((1, x.shape[1])), x**k]), axis=0) for k in (1, 2))
+    mean, square = ((s[window:] - s[:-window]) / window for s in (first, second))
+    return np.maximum(square - mean**2, 0.0)
 
 
 def worst(kernel: np.ndarray, reference: np.ndarray, scale: np.ndarray | float) -> float:

@@ -1,6 +1,7 @@
 """The whole pipeline, sample by sample in C, flight by flight here: features, force, threshold, edges."""
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -118,12 +119,12 @@ def decode(probability: np.ndarray, armed: np.ndarray, parameters: Parameters = 
     """
     edge = np.full(len(probability), NONE)
     over, since = False, NEVER
-    for i, value in enumerate(probability):
-        if not armed[i]:
+    for i, (value, ready) in enumerate(zip(np.float64(probability).tolist(), np.asarray(armed).tolist())):
+        if not ready:
             over, since = False, NEVER
             continue
         since = min(since + 1, NEVER)
-        if not np.isfinite(value) or since < parameters.dwell_samples:
+        if not isfinite(value) or since < parameters.dwell_samples:
             continue
         if value <= parameters.probability_exit if over else value >= parameters.probability_entry:
             over, since = not over, 0

@@ -1,6 +1,7 @@
 """Normalisation of the fused features: per window, as in the authors' data, and streaming."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from airtouch.errors import AirTouchError
 from airtouch.reference.finite import FLOAT32_MAX, hold_finite
@@ -68,10 +69,11 @@ def exponential_gain(n: int, time_constant: float) -> np.ndarray:
 
 def deviation_from_mean(x: np.ndarray, time_constant: float) -> np.ndarray:
     """x minus its exponential mean before that sample, (n,); 0 at the first."""
-    gain = exponential_gain(len(x), time_constant)
-    out = np.zeros(len(x))
-    mean = x[0] if len(x) else 0.0
-    for i, value in enumerate(x):
-        out[i] = value - mean
-        mean += gain[i] * out[i]
-    return out
+    if not (np.isfinite(time_constant) and time_constant > 0):
+        raise AirTouchError(f"exponential mean: the time constant must be positive, not {time_constant}")
+    if len(x) == 0:
+        return np.zeros(0)
+    recursion = [1.0, -np.exp(-1.0 / time_constant)]
+    level = x - x[0]
+    mean = lfilter([1.0], recursion, level) / lfilter([1.0], recursion, np.ones(len(x)))
+    return level - np.concatenate([[0.0], mean[:-1]])
