@@ -73,8 +73,9 @@ def read_weighted(content: bytes) -> list[dict[str, np.ndarray]]:
     model = schema.ModelT.InitFromObj(schema.Model.GetRootAs(content, 0))
     graph = model.subgraphs[0]
     layers = []
+    weighted = (schema.BuiltinOperator.CONV_2D, schema.BuiltinOperator.FULLY_CONNECTED)
     for op in graph.operators:
-        if len(op.inputs) != 3 or op.outputs is None:
+        if model.operatorCodes[op.opcodeIndex].builtinCode not in weighted:
             continue
         tensors = [graph.tensors[i] for i in (*op.inputs, op.outputs[0])]
         kernel, bias = tensors[1], model.buffers[tensors[2].buffer].data

@@ -11,6 +11,7 @@ from airtouch.logs.flight_log import FlightLog
 
 #: name -> module that is a `Detector`; imported only when asked for
 DETECTORS = {
+    "best": "airtouch.detector.best",
     "paper": "airtouch.detector.paper",
     "baseline": "airtouch.detector.baseline",
 }

@@ -65,12 +65,12 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
         for variable, mask in zip(model.trainable_variables, masks):
             variable.assign(variable * mask)
 
-    losses = []
+    losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
     for step in range(recipe.steps):
         loss, gradient = gradients(*map(tf.constant, batch(flights, recipe, rng)))
         update(gradient)
         losses.append(loss)
-        if step % RANK_EVERY == 0:
+        if step % RANK_EVERY == 0 or step == last_rank:
             _rank(model, masks, recipe, step / recipe.steps)
         if (step + 1) % 50 == 0:
             progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
@@ -83,7 +83,7 @@ def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa:
     """Set the masks of the inner layers to the sparsity that the schedule wants now."""
     part = np.clip((position - PRUNE_FROM) / (PRUNE_TO - PRUNE_FROM), 0.0, 1.0)
     sparsity = polynomial_sparsity(float(part), 1.0, 0.0, recipe.sparsity)
-    if sparsity == 0.0 or position > PRUNE_TO + RANK_EVERY / recipe.steps:
+    if sparsity == 0.0 or position >= PRUNE_TO + 1.0 / recipe.steps:
         return
     for layer in range(1, 1 + len(recipe.dilations)):
         values = model.trainable_variables[2 * layer].numpy()

@@ -1,0 +1,114 @@
+"""The `best` detector: a small causal network over twelve motion channels, in streaming form.
+
+One step a sample in C (`firmware/kernels/stream_detector.h`): motion channels, int8 network
+(`gap8/kernels/stream_int8.h`), decoder. Nothing waits for a window to fill.
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch import __version__, kernels, logs
+from airtouch.detector import tuning
+from airtouch.detector.channels import level_acceleration
+from airtouch.detector.stream import model as model_file
+from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.stream.recipe import STRIDE, Recipe
+from airtouch.detector.trace import Detection, Trace
+from airtouch.errors import AirTouchError
+from airtouch.kernels.network import parameter_bytes
+from airtouch.kernels.stream import arena_bytes
+from airtouch.kernels.stream_detector import StreamEvents
+from airtouch.logs.flight_log import GYRO, PWM, FlightLog
+from airtouch.reference.edge_decoder import DecoderConfig
+from airtouch.reference.motion_channels import MotionConfig
+
+#: Chosen once, over the five folds of the authors' flights (host/docs/looks.md).
+DECODER = DecoderConfig(over_share=0.3, entry_score=1.9, exit_score=0.5, late_entry=1.7, late_exit=-1.6,
+                        smooth_gain=0.2, dwell_steps=40, arm_steps=200)
+KINDS = {1: "entry", 2: "exit"}
+
+#: progress(stage, done, total, note), stage "features" (flights) or "steps"
+Progress = Callable[[str, int, int, str], None]
+
+
+def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
+    """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
+    model = model or load(None)
+    events = flight_events(log, model)
+    over, entry, leave = _probability(events.logits).T
+    sure = np.where(events.edge == 2, leave, entry)
+    edges = [Detection(int(i), KINDS[int(events.edge[i])], float(sure[i])) for i in np.flatnonzero(events.edge)]
+    probability = np.where(events.airborne, over, 0.0)
+    return Trace(probability, edges, {"logits": events.logits})
+
+
+def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:
+    """One flight through the C detector."""
+    return kernels.stream_detector(level_acceleration(log), log.stack(GYRO), log.stack(PWM), model.int8,
+                                   MotionConfig(), model.decoder)
+
+
+def fit(
+    flights: Sequence[FlightLog], seed: int = 0, *, recipe: Recipe | None = None, decoder: DecoderConfig = DECODER,
+    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", **changes: Any
+) -> StreamModel:
+    """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
+
+    recipe: shape and training, changed by `changes` (fields of `Recipe`). decoder: its settings.
+    Raises AirTouchError without TensorFlow, without flights with edges and for unknown fields.
+    """
+    from airtouch.detector.stream import batches, quantisation, training
+    from airtouch.detector.train import use_tensorflow
+
+    told = progress or (lambda *_: None)
+    recipe = _changed(recipe or Recipe(), changes)
+    use_tensorflow(seed)
+    prepared = []
+    for i, log in enumerate(flights):
+        prepared.append(batches.flight_of(log, recipe))
+        told("features", i + 1, len(flights), os.path.basename(log.source))
+    if not sum(len(f.edges) for f in prepared):
+        raise AirTouchError("training: the flights hold no edges; give flights over a platform, with down range")
+    weights = training.fit(prepared, recipe, seed, lambda done, total, note: told("steps", done, total, note))
+    int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in prepared], recipe))
+    model = StreamModel(recipe, weights, int8, tflite, {
+        "detector": "best", "version": __version__, "command": command, "seed": seed, "lag_s": 0.0,
+        "decoder": asdict(decoder), "flights": [os.path.basename(log.source) for log in flights]})
+    found = [(logs.true_edges(log), run(log, model).edges) for log in flights]
+    return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(found)})
+
+
+def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:
+    try:
+        return replace(recipe, **changes)
+    except TypeError as error:
+        raise AirTouchError(f"training: {str(error).split(') ')[-1]}; known: {', '.join(asdict(recipe))}") from None
+
+
+def load(path: Path | None) -> StreamModel:
+    """A model from its file, the shipped one for None; AirTouchError for any other file."""
+    return model_file.load(path)
+
+
+def lag_s(model: StreamModel | None) -> float:
+    """The lag learnt in training, seconds."""
+    return float((model or load(None)).metadata["lag_s"])
+
+
+def parameters(model: StreamModel | None) -> dict[str, Any]:
+    """Size, cost and settings, for reports."""
+    model = model or load(None)
+    return {"width": model.recipe.width, "receptive_s": model.recipe.receptive_samples / 100,
+            "parameter_bytes": parameter_bytes(model.int8),
+            "state_bytes": arena_bytes(model.int8),
+            "mac_per_sample": model.int8.multiplications / STRIDE, **asdict(model.decoder),
+            "seed": model.metadata.get("seed")}
+
+
+def _probability(logits: np.ndarray) -> np.ndarray:
+    return 1.0 / (1.0 + np.exp(-logits.astype(np.float64)))

@@ -1,0 +1,125 @@
+"""A trained streaming network as one file: float and int8 weights, decoder settings, how it came about."""
+
+import hashlib
+from dataclasses import asdict, dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector import archive
+from airtouch.detector.model_file import check_range
+from airtouch.detector.stream.quantisation import network_of
+from airtouch.detector.stream.recipe import Recipe
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.reference.edge_decoder import DecoderConfig
+from airtouch.reference.stream_int8 import StreamNetwork
+
+FORMAT = 1
+KIND = {"format": FORMAT, "network": "stream"}
+_INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
+_LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
+
+
+@dataclass(frozen=True)
+class StreamModel:
+    """weights: float32 arrays (`Recipe.weight_shapes`); int8: what flies; tflite: the same over one window;
+    metadata: plain JSON: decoder, lag_s, flights, seed, command, ..."""
+
+    recipe: Recipe
+    weights: dict[str, np.ndarray]
+    int8: StreamNetwork
+    tflite: bytes
+    metadata: dict[str, Any]
+
+    @property
+    def decoder(self) -> DecoderConfig:
+        """The decoder's settings."""
+        try:
+            return DecoderConfig(**self.metadata["decoder"])
+        except (KeyError, TypeError):
+            raise AirTouchError(f"the model's decoder settings are not those of this version; {archive.REMEDY}") from None
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that the int8 network computes with, hexadecimal."""
+        total = hashlib.sha256(repr((self.int8.stride, self.int8.first_skip, self.recipe.dilations)).encode())
+        for name, values in self._int8_arrays().items():
+            total.update(f"{name} {values.dtype.str} {values.shape}\n".encode() + values.tobytes())
+        return total.hexdigest()
+
+    def _int8_arrays(self) -> dict[str, np.ndarray]:
+        arrays = {}
+        for i, layer in enumerate(self.int8.layers):
+            parts = {"weights": layer.weights, "bias": layer.bias, "weight_scale": layer.weight_scale,
+                     "scale": np.array([layer.input_scale, layer.output_scale], np.float32),
+                     "zero_point": np.array([layer.input_zero_point, layer.output_zero_point], np.int32)}
+            arrays |= {f"int8.layer{i}.{part}": values for part, values in parts.items()}
+        return arrays
+
+    def to_bytes(self) -> bytes:
+        """The file's content; the same model gives the same bytes."""
+        arrays = {**self.weights, **self._int8_arrays(), "tflite": np.frombuffer(self.tflite, dtype=np.uint8)}
+        return archive.to_bytes(arrays, {**KIND, "recipe": asdict(self.recipe), **self.metadata})
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Write it whole or not at all; AirTouchError where the file exists, unless forced."""
+        write_bytes(self.to_bytes(), Path(path), force)
+
+
+def load(path: str | Path | None = None) -> StreamModel:
+    """A model from its file, the shipped one for None. Raises AirTouchError, one line, for anything else."""
+    if path is None:
+        with resources.as_file(resources.files("airtouch") / "models" / "best.npz") as shipped:
+            return load(shipped)
+    return parse(archive.read(Path(path)), str(path))
+
+
+def parse(data: bytes, source: str) -> StreamModel:
+    """A model from a file's content; `source` names it in messages. Raises as `load` does."""
+    arrays, metadata = archive.parse(data, source)
+    archive.check_kind(metadata, KIND, source)
+    recipe = _recipe(metadata.pop("recipe", None), source)
+    shapes = {name: (np.float32, shape) for name, shape in recipe.weight_shapes().items()}
+    for i, (taps, before, after) in enumerate(recipe.shapes):
+        sizes = {"weights": (after, taps * before), "bias": (after,), "weight_scale": (after,),
+                 "scale": (2,), "zero_point": (2,)}
+        shapes |= {f"int8.layer{i}.{part}": (_INT8[part], size) for part, size in sizes.items()}
+    archive.check_arrays(arrays, shapes, source)
+    if "tflite" not in arrays or arrays["tflite"].dtype != np.uint8:
+        raise AirTouchError(f"{source}: the TFLite file is missing from this model; {archive.REMEDY}")
+    layers = [{part: arrays[f"int8.layer{i}.{part}"] for part in _INT8} for i in range(len(recipe.shapes))]
+    for layer in layers:
+        positive = (layer["scale"] > 0).all() and (layer["weight_scale"] > 0).all()
+        if not positive or not ((layer["zero_point"] >= -128) & (layer["zero_point"] <= 127)).all():
+            raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
+    int8 = network_of(layers, recipe)
+    check_range(int8.layers, source)
+    model = StreamModel(recipe, {name: arrays[name] for name in recipe.weight_shapes()}, int8,
+                        arrays["tflite"].tobytes(), metadata)
+    _check_metadata(model, source)
+    return model
+
+
+def _recipe(table: object, source: str) -> Recipe:
+    wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; {archive.REMEDY}")
+    try:
+        recipe = Recipe(**{**table, "dilations": tuple(table["dilations"])})
+        numbers = [recipe.width, recipe.first_taps, recipe.taps, *recipe.dilations]
+    except (KeyError, TypeError):
+        raise wrong from None
+    whole = all(isinstance(v, int) and not isinstance(v, bool) for v in numbers)
+    if not whole or not 1 <= len(recipe.dilations) <= 9 or not all(1 <= d <= 256 for d in recipe.dilations):
+        raise wrong
+    if not all(low <= getattr(recipe, name) <= high for name, (low, high) in _LIMITS.items()) or recipe.width % 4:
+        raise wrong
+    return recipe
+
+
+def _check_metadata(model: StreamModel, source: str) -> None:
+    lag = model.metadata.get("lag_s")
+    settings = asdict(model.decoder).values()
+    if not all(isinstance(v, (int, float)) and np.isfinite(v) for v in (lag, *settings)):
+        raise AirTouchError(f"{source}: decoder settings or lag are not numbers; {archive.REMEDY}")

@@ -1,0 +1,177 @@
+"""The streaming network: quantised, saved, run; against tflite-micro, NumPy and its own windowed form."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from airtouch import kernels, logs
+from airtouch.detector import best
+from airtouch.detector.stream import batches, model as model_file, quantisation
+from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import COLUMNS, FlightLog
+from airtouch.reference.int8_network import quantise
+from airtouch.reference.motion_channels import NAMES
+from airtouch.reference.stream_int8 import run_stream
+
+SMALL = Recipe(width=8, dilations=(1, 2, 4), steps=40, batch=4, crop=512, warm_up=64, sparsity=0.5)
+
+
+def made_flight(seed: int = 0, n: int = 2500) -> FlightLog:
+    """Hover noise with a platform under samples 1200 to 1700."""
+    rng = np.random.default_rng(seed)
+    over = (np.arange(n) >= 1200) & (np.arange(n) < 1700)
+    pwm = 47000 + 1500 * rng.standard_normal((n, 4)) - 1500 * over[:, None]
+    pwm[:150] = 0
+    columns = {"t_s": np.arange(n) * 0.01, "zrange_m": np.where(over, 0.05, 0.8)}
+    columns["zrange_m"][:150] = 0.02
+    for i, axis in enumerate("xyz"):
+        columns[f"acc_{axis}_mps2"] = rng.normal(9.81 if i == 2 else 0, 0.2 + 0.4 * over)
+        columns[f"gyro_{axis}_radps"] = rng.normal(0, 0.1 + 0.3 * over)
+    columns |= {f"m{i + 1}_pwm": pwm[:, i] for i in range(4)}
+    return FlightLog(columns, {"source": f"made{seed}.csv", "sample_period_s": 0.01})
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A small model, trained for a moment on made flights."""
+    pytest.importorskip("tensorflow")
+    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
+
+
+def test_the_same_arguments_give_the_same_bits(small):
+    again = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
+    assert again.to_bytes() == small.to_bytes()
+
+
+def test_pruned_blocks_are_whole_and_exact(small):
+    for i in range(1, 1 + len(SMALL.dilations)):
+        blocks = small.int8.layers[i].weights.reshape(-1, 4)
+        assert np.mean(~blocks.any(axis=1)) >= SMALL.sparsity - 1e-9
+
+
+def test_c_equals_numpy_and_tflite_micro_on_windows(small):
+    _check_against_tflite_micro(small, batches.channels_of(made_flight(5))[0], 200)
+
+
+def test_the_shipped_model_equals_tflite_micro_on_real_windows(flights):
+    model = best.load(None)
+    windows = 0
+    for path in sorted((flights / "airtouch").glob("*_h8*.csv.gz"))[:10]:
+        windows += _check_against_tflite_micro(model, batches.channels_of(logs.read(path))[0], 100)
+    print(f"bit for bit equal to tflite-micro on {windows} windows of real flights")
+
+
+def _check_against_tflite_micro(model, x: np.ndarray, count: int) -> int:
+    """The stream's row at a sample equals tflite-micro over the window that ends there."""
+    runtime = pytest.importorskip("tflite_micro.python.tflite_micro.runtime")
+    first = model.int8.convs[0].layer
+    quantised = quantise(x, first.input_scale, first.input_zero_point)
+    streamed = kernels.run_stream(model.int8, quantised)
+    assert np.array_equal(streamed, run_stream(model.int8, quantised))
+    interpreter = runtime.Interpreter.from_bytes(model.tflite, arena_size=1 << 20)
+    length = model.recipe.receptive_samples
+    rows = np.linspace(-(-length // STRIDE), len(streamed) - 1, count).astype(int)
+    for row in rows:
+        end = row * STRIDE + 1
+        interpreter.set_input(quantised[end - length:end].reshape(1, 1, length, CHANNELS), 0)
+        interpreter.invoke()
+        assert np.array_equal(interpreter.get_output(0).ravel(), streamed[row])
+    return len(rows)
+
+
+def test_the_float_network_is_what_was_quantised(small):
+    """int8 logits follow the float ones within a few steps of the output scale."""
+    x = batches.channels_of(made_flight(6))[0]
+    rows = []
+    y = x.astype(np.float64)
+    for i, (taps, _, _) in enumerate(SMALL.shapes[:-1]):
+        dilation = (1, *SMALL.dilations)[i]
+        padded = np.vstack([np.zeros(((taps - 1) * dilation, y.shape[1])), y])
+        kernel = small.weights[f"layer{i}.kernel"]
+        y = sum(padded[k * dilation:][:len(y)] @ kernel[k] for k in range(taps)) + small.weights[f"layer{i}.bias"]
+        y = np.maximum(y, 0)[::STRIDE if i == 0 else 1]
+        rows += [y] if i else []
+    last = len(SMALL.shapes) - 1
+    logits = np.hstack(rows) @ small.weights[f"layer{last}.kernel"].reshape(-1, 3) + small.weights[f"layer{last}.bias"]
+    head = small.int8.head
+    first = small.int8.convs[0].layer
+    out = kernels.run_stream(small.int8, quantise(x, first.input_scale, first.input_zero_point))
+    error = np.abs(head.output_scale * (out.astype(float) - head.output_zero_point) - logits)
+    assert np.median(error) < 3 * head.output_scale
+
+
+def test_it_is_causal_and_never_looks_at_the_range(small):
+    log = made_flight(7)
+    whole = best.run(log, small)
+    cut = best.run(log.slice(0, 1500), small)
+    assert cut.edges == [e for e in whole.edges if e.sample < 1500]
+    assert np.array_equal(cut.probability, whole.probability[:1500])
+    blind = FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
+    assert best.run(blind, small).edges == whole.edges
+
+
+def test_a_mirrored_flight_has_mirrored_channels():
+    """Reflection of the whole drone in its x-z plane: positions y, rotations about x and z turn over."""
+    log = made_flight(8)
+    mirrored = log.with_columns({
+        "acc_y_mps2": -log["acc_y_mps2"], "gyro_x_radps": -log["gyro_x_radps"],
+        "gyro_z_radps": -log["gyro_z_radps"], "m1_pwm": log["m4_pwm"], "m4_pwm": log["m1_pwm"],
+        "m2_pwm": log["m3_pwm"], "m3_pwm": log["m2_pwm"]})
+    assert np.allclose(batches.channels_of(mirrored)[0], batches.channels_of(log)[0] * batches.MIRROR, atol=1e-5)
+    assert len(batches.MIRROR) == len(NAMES) == CHANNELS and "zrange_m" in COLUMNS
+
+
+def test_the_file_gives_the_model_back(small, tmp_path):
+    small.save(tmp_path / "m.npz")
+    again = best.load(tmp_path / "m.npz")
+    assert again.to_bytes() == small.to_bytes() and again.digest == small.digest
+    with pytest.raises(AirTouchError, match="--force"):
+        small.save(tmp_path / "m.npz")
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.data())
+def test_a_damaged_file_is_one_clear_line(small, data):
+    content = bytearray(small.to_bytes())
+    for _ in range(data.draw(st.integers(1, 8))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    content = bytes(content[:data.draw(st.integers(0, len(content)))])
+    try:
+        best.run(made_flight(0, 500), model_file.parse(content, "m.npz"))
+    except AirTouchError as error:
+        assert "\n" not in str(error) and "m.npz" in str(error) or "model" in str(error)
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda m: replace(m, recipe=replace(m.recipe, width=12)), "another shape"),
+    (lambda m: replace(m, recipe=replace(m.recipe, dilations=(1, 2, 999))), "shape is missing"),
+    (lambda m: replace(m, metadata={**m.metadata, "lag_s": "soon"}), "not numbers"),
+    (lambda m: replace(m, metadata={**m.metadata, "decoder": {"a": 1}}), "decoder settings"),
+])
+def test_a_wrong_model_is_named(small, change, said):
+    with pytest.raises(AirTouchError, match=said):
+        model_file.parse(change(small).to_bytes(), "m.npz")
+
+
+def test_a_model_of_the_other_detector_is_refused(small):
+    from airtouch.detector import model_file as paper
+
+    with pytest.raises(AirTouchError, match="this detector needs"):
+        paper.parse(small.to_bytes(), "m.npz")
+    assert io.BytesIO(small.to_bytes()).read(2) == b"PK"
+
+
+def test_unknown_settings_are_refused():
+    with pytest.raises(AirTouchError, match="known: width"):
+        best.fit([made_flight()], epochs=3)
+
+
+def test_representative_windows_cover_every_flight():
+    recipe = Recipe(width=8, dilations=(1,))
+    found = quantisation.windows([np.full((50, CHANNELS), k) for k in range(4)], recipe, 8)
+    assert found.shape == (8, recipe.receptive_samples, CHANNELS)
+    assert sorted(set(found[:, 0, 0])) == [0, 1, 2, 3]
