@@ -9,7 +9,7 @@ from airtouch.parameters import DEFAULT
 from airtouch.reference.finite import hold_finite
 
 BIN_TOLERANCE = 1e-3  #: a bin this close to the band's edge, in bins, is within the band
-_CHUNK = 1 << 10  # rows at a time: fast, and no flight fills the memory
+_CHUNK = 1 << 10  # rows at a time
 
 
 def band_bins(sample_rate_hz: float, window: int, band_hz: tuple[float, float]) -> tuple[int, int]:
@@ -73,7 +73,7 @@ def band_power(
         for channel, values in enumerate(clean.T):
             windows = sliding_window_view(np.ascontiguousarray(values), window)[::hop]
             for start in range(0, len(ends), _CHUNK):
-                part = np.ascontiguousarray(windows[start:start + _CHUNK]) @ basis
+                part = windows[start:start + _CHUNK] @ basis
                 power[start:start + _CHUNK, channel] = np.square(part).sum(axis=1)
     if hop == 1:
         power = np.concatenate([np.full((len(clean) - len(ends), clean.shape[1]), np.nan), power])
