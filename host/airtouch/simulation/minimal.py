@@ -17,7 +17,7 @@ SAMPLE_STEPS = 5  #: physics steps a logged sample, 100 Hz
 CRUISE_M = 0.8  #: height over the floor
 PLATFORM_M = 0.75  #: length of the platform along the path
 RANGE_STEPS = 12  #: physics steps a range reading, 24 ms
-TURBULENCE = 0.3  #: moment noise over a surface: rms, share of the ground effect's own moment
+TURBULENCE = 1.0  #: moment noise over a surface: rms, share of the ground effect's own moment
 SIGNS_X = np.array([1.0, -1.0, -1.0, 1.0])  #: motors front right, rear right, rear left, front left
 SIGNS_Y = np.array([-1.0, -1.0, 1.0, 1.0])
 SIGNS_YAW = np.array([-1.0, 1.0, -1.0, 1.0])
@@ -117,7 +117,7 @@ def fly(plan: list[Mission], seed: int = 0, vehicle: vehicles.Vehicle | None = N
             goal = np.clip(np.stack([-want_y, want_x, np.zeros(n)], axis=1) / g0, -0.3, 0.3)
         error = goal - attitude
         sum_attitude = np.clip(sum_attitude + error * STEP_S, -0.5, 0.5) * motors_on[:, None]
-        turn = inertia * (180.0 * error + 60.0 * sum_attitude - 16.0 * rates - 0.02 * (rates - before) / STEP_S)
+        turn = inertia * (300.0 * error + 60.0 * sum_attitude - 30.0 * rates - 1.5 * (rates - before) / STEP_S)
         before = rates
         share = turn / (4.0 * np.array([arm, arm, v.yaw_torque_over_thrust_m]))
         wanted = (lift / 4)[:, None] + share[:, :1] * SIGNS_Y - share[:, 1:2] * SIGNS_X + share[:, 2:] * SIGNS_YAW
@@ -139,7 +139,7 @@ def fly(plan: list[Mission], seed: int = 0, vehicle: vehicles.Vehicle | None = N
         ratio = floor + covered * (over - floor)
         force = thrust * ratio
         gust = gust + STEP_S / 0.02 * (white[k, :, :4] * 3.2 - gust)
-        strength = (TURBULENCE * hover_n * (ratio - 1.0).mean(axis=1) + 3e-4)[:, None] * motors_on[:, None]
+        strength = (TURBULENCE * hover_n * (ratio - 1.0).mean(axis=1) + 1e-3)[:, None] * motors_on[:, None]
 
         torque = np.stack([arm * (force * SIGNS_Y).sum(1), -arm * (force * SIGNS_X).sum(1),
                            v.yaw_torque_over_thrust_m * (force * SIGNS_YAW).sum(1)], axis=1)

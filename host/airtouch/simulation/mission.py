@@ -25,12 +25,17 @@ MAX_FLIGHT_S = 3600.0
 class _Pen:
     """Draws set-points row after row."""
 
-    def __init__(self, start: Sequence[float], yaw_rad: float, position: bool) -> None:
+    def __init__(self, start: Sequence[float], yaw_rad: float, position: bool, world: World) -> None:
         self.rows: list[np.ndarray] = []
-        self.at = np.array([start[0], start[1], 0.0])
+        self.world = world
+        self.at = np.array([start[0], start[1], self.top(start)])
         self.yaw, self.position = yaw_rad, position
         self.motors = 0.0
-        self.checked: list[tuple[int, int, str]] = []
+
+    def top(self, place: Sequence[float]) -> float:
+        """Height of the surface at (x, y), m."""
+        w = self.world
+        return top_at(w.corners, w.first, w.surface, w.box, place[0], place[1])
 
     def move(self, to: np.ndarray, seconds: float) -> None:
         n = max(int(round(seconds * RATE_HZ)), 1)
@@ -63,7 +68,7 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
     if control not in ("velocity", "position"):
         raise AirTouchError(f"{where}: control is velocity or position, not {control!r}")
     start = _pair(mission.get("start_m", [0.0, 0.0]), where, "start_m")
-    pen = _Pen(start, math.radians(mission.get("yaw_deg", 0.0)), control == "position")
+    pen = _Pen(start, math.radians(mission.get("yaw_deg", 0.0)), control == "position", world)
     if not mission.get("step"):
         raise AirTouchError(f"{where}: a mission needs steps")
     for i, step in enumerate(mission["step"]):
@@ -85,7 +90,7 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
         first = pen.count
         _run(pen, kind, step, place)
         if kind in ("hover", "go", "zigzag"):
-            _check_path(pen, first, world, place)
+            _check_path(pen, first, place)
     return np.ascontiguousarray(np.concatenate(pen.rows))
 
 
@@ -117,17 +122,17 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
                 to = np.array([corner[0] + x, y, corner[2]])
                 pen.move(to, np.linalg.norm(to - pen.at) / step["speed_mps"])
     else:
-        pen.move(np.array([pen.at[0], pen.at[1], -0.1]), step.get("time_s", 3.0))
+        pen.move(np.array([pen.at[0], pen.at[1], pen.top(pen.at) - 0.1]), step.get("time_s", 3.0))
         pen.motors = 0.0
         pen.move(pen.at, 0.5)
 
 
-def _check_path(pen: _Pen, first: int, world: World, place: str) -> None:
+def _check_path(pen: _Pen, first: int, place: str) -> None:
     rows = np.concatenate(pen.rows)[first::5]
     if rows[0, c.MOTORS] == 0.0:
         raise AirTouchError(f"{place}: it has not taken off")
     for row in rows:
-        top = top_at(world.corners, world.first, world.surface, world.box, row[c.X], row[c.Y])
+        top = pen.top((row[c.X], row[c.Y]))
         if row[c.Z] < top:
             raise AirTouchError(f"{place}: at ({row[c.X]:.2f}, {row[c.Y]:.2f}) m it would fly at {row[c.Z]:.2f} m "
                                 f"through a surface {top:.2f} m high")

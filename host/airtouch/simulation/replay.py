@@ -1,0 +1,164 @@
+"""Recorded motor commands through the same motors, rigid body and effects as in flight.
+
+Nothing is integrated but what the motors and the effects remember: attitude, velocity
+and height come from the log where it has them. The diagnosis compares the result with
+what the IMU measured.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import float64, from_dtype, int64, njit, types, uint64
+
+from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, VELOCITY, FlightLog
+from airtouch.simulation import battery, loop, motors, rigid_body, sensors
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Active
+from airtouch.simulation.effects.effect import MEMORY, PARAMETERS, WrenchFunction, wrench
+from airtouch.simulation.flight import prepare
+from airtouch.simulation.plant import DTYPE, hover_speed
+from airtouch.simulation.random_stream import stream
+from airtouch.simulation.rotation import as_matrix
+from airtouch.vehicle import Vehicle
+
+FAR_M = 10.0  #: height where none is known: out of ground effect
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What the model says of each sample: specific_force (n, 3) m/s^2 and torque (n, 3) N m, body axes,
+
+    angular_acceleration (n, 3) rad/s^2, rotor_speed (n, 4) rad/s, volts (n,).
+    """
+
+    specific_force: np.ndarray
+    torque: np.ndarray
+    angular_acceleration: np.ndarray
+    rotor_speed: np.ndarray
+    volts: np.ndarray
+
+
+@njit(types.void(from_dtype(DTYPE)[::1], float64[:, ::1], float64[:, ::1], float64[::1],
+                 types.UniTuple(WrenchFunction, loop.SLOTS), int64, float64[:, ::1], uint64[:, ::1],
+                 float64[:, ::1], float64[:, ::1], float64[::1]), cache=True, nogil=True)
+def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, streams, out, speeds, volts_out):
+    plant = plant_array[0]
+    speed, target, wrench_now = np.zeros(4), np.zeros(4), np.zeros(4)
+    command, memory, force = np.zeros((loop.RING, 4)), np.zeros((loop.SLOTS, MEMORY)), np.zeros(6)
+    charge, battery_volts = plant.battery_charge, plant.nominal_voltage
+    command[:] = pwm[0]
+    for i in range(4):
+        speed[i] = motors.target_speed(plant, pwm[0, i], plant.nominal_voltage)
+    for k in range(len(signals)):
+        s = signals[k]
+        h = s[at.STEP]
+        volts = battery.supply(plant, battery_volts)
+        if np.isfinite(measured_volts[k]):
+            volts = measured_volts[k]
+        volts_out[k] = volts
+        power = 0.0
+        for i in range(4):
+            thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
+            power += plant.power_per_thrust15 * thrust * np.sqrt(thrust)
+            s[at.ROTOR_SPEED + i], speeds[k, i] = speed[i], speed[i]
+            s[at.THRUST + i] = thrust * plant.gain[i]
+            command[k % loop.RING, i] = pwm[k, i]
+            given = sensors.delayed(command, k, plant.actuator_delay / h, i)
+            target[i] = motors.target_speed(plant, given, volts)
+        for i in range(6):
+            force[i] = 0.0
+        for i in range(used):
+            effects[i](parameters[i], s, memory[i], streams[i], force)
+        rigid_body.thrust_wrench(plant, speed, wrench_now)
+        out[k, 0], out[k, 1] = force[0] / plant.mass, force[1] / plant.mass
+        out[k, 2] = (force[2] + wrench_now[0]) / plant.mass
+        spin, spin_rate = 0.0, 0.0
+        for i in range(4):
+            tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
+            spin += rigid_body.SPIN[i] * plant.rotor_inertia * speed[i]
+            spin_rate += rigid_body.SPIN[i] * plant.rotor_inertia * (target[i] - speed[i]) / tau
+            speed[i] = target[i] + (speed[i] - target[i]) * np.exp(-h / tau)
+        out[k, 3] = force[3] + wrench_now[1] - s[at.RATES + 1] * spin
+        out[k, 4] = force[4] + wrench_now[2] + s[at.RATES] * spin
+        out[k, 5] = force[5] + wrench_now[3] - spin_rate
+        charge, battery_volts = battery.drain(plant, charge, power, h)
+
+
+@wrench
+def _nothing(p, s, memory, stream, out):
+    pass
+
+
+def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), period_s: float = 0.01) -> np.ndarray:
+    """The signals (n, COUNT) that effects see, from what a log holds.
+
+    Where it has no attitude the vehicle is taken as level, without velocity as standing,
+    without a down range as far from any surface.
+    """
+    plant, _ = prepare(vehicle, active)
+    row, n = plant[0], len(log)
+    s = np.zeros((n, at.COUNT))
+    s[:, at.TIME], s[:, at.STEP] = np.arange(n) * period_s, period_s
+    s[:, at.MASS], s[:, at.GRAVITY] = row["mass"], row["gravity"]
+    s[:, at.ROTOR_X:at.ROTOR_X + 4] = row["rotor_x"] - row["com"][0]
+    s[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
+    s[:, at.ROTOR_RADIUS], s[:, at.ROTOR_SPACING] = row["rotor_radius"], row["rotor_spacing"]
+    s[:, at.HOVER_SPEED] = hover_speed(plant)
+    turn = as_matrix(*(log[c] for c in ATTITUDE)) if log.has(*ATTITUDE) else np.tile(np.eye(3), (n, 1, 1))
+    s[:, at.ROTATION:at.ROTATION + 9] = turn.reshape(n, 9)
+    if log.has(*VELOCITY):
+        s[:, at.VELOCITY:at.VELOCITY + 3] = np.einsum("nji,nj->ni", turn, log.stack(VELOCITY))
+    if log.has(*GYRO):
+        s[:, at.RATES:at.RATES + 3] = log.stack(GYRO)
+    if log.has(*ACC):
+        s[:, at.ACCELERATION:at.ACCELERATION + 3] = np.einsum("nij,nj->ni", turn, log.stack(ACC))
+        s[:, at.ACCELERATION + 2] -= row["gravity"]
+    height = log["zrange_m"] + row["range_below_rotors"] if log.has("zrange_m") else np.full(n, np.nan)
+    height = np.where(np.isfinite(height), height, FAR_M)
+    tilt = np.einsum("ni,ij->nj", turn[:, 2, :2], np.stack([row["rotor_x"], row["rotor_y"]]))
+    for place in (at.LOWER_HEIGHT, at.UPPER_HEIGHT):
+        s[:, place:place + 4] = height[:, None] + tilt
+    for place in (at.LOWER_FACTOR, at.UPPER_FACTOR, at.LOWER_ROUGHNESS, at.UPPER_ROUGHNESS):
+        s[:, place:place + 4] = 1.0
+    s[:, at.HEIGHT] = height
+    return s
+
+
+def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, period_s: float = 0.01,
+        signals: np.ndarray | None = None, seed: int = 0) -> Replay:
+    """Replay a log's motor commands through a vehicle with effects switched on.
+
+    signals: (n, COUNT) where more is known than `signals_of` finds in the log. A logged
+    battery voltage is used where the vehicle declares the voltage of its thrust curve.
+    Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands.
+    """
+    log.require(*PWM)
+    plant, acting = prepare(vehicle, active)
+    s = np.ascontiguousarray(signals_of(log, vehicle, active, period_s) if signals is None else signals)
+    n = len(s)
+    volts = np.full(n, np.nan)
+    if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
+        volts = log["vbat_V"].copy()
+    functions = tuple(a.effect.wrench for a in acting) + (_nothing,) * (loop.SLOTS - len(acting))
+    parameters, streams = np.zeros((loop.SLOTS, PARAMETERS)), np.zeros((loop.SLOTS, 1), np.uint64)
+    for i, a in enumerate(acting):
+        parameters[i], streams[i] = a.effect.vector(a.values), stream(seed, 0, a.effect.name)
+    out, speeds, volts_out = np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n)
+    pwm = np.ascontiguousarray(np.nan_to_num(log.stack(PWM)))
+    _run(plant, s, pwm, volts, functions, len(acting), parameters, streams, out, speeds, volts_out)
+    row = plant[0]
+    rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
+    turning = (out[:, 3:] - np.cross(rates, inertia * rates)) / inertia
+    force = out[:, :3] + row["acc_bias"]
+    return Replay(force, out[:, 3:], turning, speeds, volts_out)
+
+
+def wrench_of(active: Active, signals: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Force and torque (n, 6), N and N m in body axes, of one effect on given signals (n, COUNT)."""
+    out, memory = np.zeros((len(signals), 6)), np.zeros(MEMORY)
+    rng = stream(seed, 0, active.effect.name)
+    parameters = active.effect.vector(active.values)
+    for k in range(len(signals)):
+        active.effect.wrench(parameters, signals[k], memory, rng, out[k])
+    return out

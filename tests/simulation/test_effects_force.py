@@ -1,0 +1,127 @@
+"""Effects that push: each against its closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from airtouch.logs.flight_log import PWM
+from airtouch.simulation import effects, replay, scenario
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects.ground_effect import thrust_ratio
+
+MASS, GRAVITY = 0.0362, 9.81
+
+
+def wrench(name, values, signals):
+    return replay.wrench_of(effects.activate({name: values})[0], signals)
+
+
+def over_platform(range_m):
+    return scenario.parse(f"""
+name = "over-platform"
+[[platform]]
+size_m = [4.0, 4.0]
+top_m = 0.5
+[[mission.step]]
+do = "take-off"
+height_m = {0.5 + range_m}
+[[mission.step]]
+do = "hover"
+time_s = 14.0
+""", "over-platform")
+
+
+def test_ground_effect_is_the_published_curve():
+    """The published formula, written out as printed, and its values for the cf2x's geometry."""
+    radius, d = 0.0231348, 0.0561
+    heights = np.array([0.04, 0.06, 0.08, 0.12])
+    b = np.sqrt(2) * d
+    printed = 1 / (1 - (radius / (4 * heights)) ** 2 - radius**2 * heights / np.sqrt((d**2 + 4 * heights**2) ** 3)
+                   - radius**2 / 2 * heights / np.sqrt((2 * d**2 + 4 * heights**2) ** 3)
+                   - 2 * radius**2 * heights / np.sqrt((b**2 + 4 * heights**2) ** 3) * 2.0)
+    got = np.array([1 + thrust_ratio(h, radius, d, 2.0, 0.0) for h in heights])
+    np.testing.assert_allclose(got, printed, rtol=1e-12)
+    np.testing.assert_allclose(100 * (got - 1), [11.6, 7.5, 5.0, 2.5], rtol=0.09)
+
+
+@pytest.mark.parametrize("range_m", [0.03, 0.06, 0.10])
+def test_hover_pwm_over_a_platform_follows_the_curve(steady, vehicle, range_m):
+    log = steady({"ground_effect": {"turbulence": 0.0}}, scene=over_platform(range_m))
+    ratio = np.mean([thrust_ratio(z + 0.025, vehicle.rotor_radius_m, math.sqrt(2) * vehicle.arm_m, 2.0, 0.0)
+                     for z in log["z_m"] - 0.5])
+    thrust = vehicle.thrust(log.stack(PWM)).sum(axis=1).mean() * (1 + ratio)
+    assert thrust == pytest.approx(MASS * GRAVITY, rel=2e-3)
+
+
+def test_ground_effect_grows_with_the_share_of_the_disc_that_is_covered(signals):
+    signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = 0.05
+    values = {"turbulence": 0.0}
+    forces = []
+    for share in (0.0, 0.5, 1.0):
+        signals[:, at.COVER:at.COVER + 4] = share
+        forces.append(wrench("ground_effect", values, signals)[0, 2])
+    assert forces[1] == pytest.approx(0.5 * (forces[0] + forces[2]), rel=1e-9)
+    signals[:, at.COVER:at.COVER + 4] = (1.0, 0.0, 0.0, 1.0)  # the two front rotors: the nose goes up
+    assert wrench("ground_effect", values, signals)[0, 4] < 0.0
+
+
+def test_ground_effect_turbulence_has_its_rms(signals):
+    signals = np.repeat(signals[:1], 20000, axis=0)
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.05
+    calm = wrench("ground_effect", {"turbulence": 0.0}, signals)[0, 2]
+    rough = wrench("ground_effect", {"turbulence": 0.3}, signals)[:, 2]
+    assert rough.std() / calm == pytest.approx(0.3 / 2, rel=0.1)  # four rotors, each on its own
+
+
+def test_rotor_drag_is_linear(signals):
+    signals[:, at.VELOCITY:at.VELOCITY + 3] = (1.0, -2.0, 0.5)
+    got = wrench("rotor_drag", {"horizontal": 0.01, "vertical": 0.02}, signals)[0]
+    np.testing.assert_allclose(got, [-0.01, 0.02, -0.01, 0, 0, 0], atol=1e-12)
+
+
+def test_wind_gives_the_tilt_that_drag_implies(steady):
+    log = steady({"wind": {"x": -1.0, "y": 0.5, "drag": 0.0147}})
+    weight = MASS * GRAVITY
+    assert log["pitch_rad"].mean() == pytest.approx(math.atan(0.0147 * 1.0 / weight), rel=0.03)
+    assert log["roll_rad"].mean() == pytest.approx(math.atan(0.0147 * 0.5 / weight), rel=0.03)
+
+
+def test_gusts_have_the_dryden_spectrum(signals):
+    signals = np.repeat(signals[:1], 200_000, axis=0)
+    signals[:, at.STEP] = 0.01
+    tau, rms, drag = 0.5, 0.4, 0.01
+    air = wrench("gust", {"rms": rms, "length": tau, "airspeed": 1.0, "drag": drag}, signals)[:, :2] / drag
+    f, power = welch(air.T, fs=100.0, nperseg=8192)
+    band = (f > 0.05) & (f < 3.0)
+    w = 2 * np.pi * f[band] * tau
+    along = 4 * rms**2 * tau / (1 + w**2)
+    across = 2 * rms**2 * tau * (1 + 3 * w**2) / (1 + w**2) ** 2
+    for measured, formula in zip(power[:, band], (along, across), strict=True):
+        assert abs(np.mean(10 * np.log10(measured / formula))) < 0.3
+        assert np.std(10 * np.log10(measured / formula)) < 1.5
+
+
+def test_blade_flapping_tilts_the_thrust_back(signals):
+    signals[:, at.VELOCITY] = 2.0
+    got = wrench("blade_flapping", {"tilt": 0.01, "hub": 0.005, "above": 0.01}, signals)[0]
+    back = MASS * GRAVITY * 0.02
+    np.testing.assert_allclose(got, [-back, 0, 0, 0, -0.015 * back, 0], atol=1e-12)
+
+
+def test_slung_load_hangs_and_swings_at_its_period(signals):
+    signals = np.repeat(signals[:1], 15000, axis=0)
+    signals[:, at.ACCELERATION] = np.where(np.arange(15000) < 50, 1.0, 0.0)  # a push sets it swinging
+    length, load = 0.3, 0.002
+    got = wrench("slung_load", {"load": load, "length": length, "damping": 0.0}, signals)
+    assert got[5000:, 2].mean() == pytest.approx(-load * GRAVITY, rel=0.02)
+    swing = got[2500:, 0] - got[2500:, 0].mean()
+    crossings = np.flatnonzero((swing[:-1] < 0) & (swing[1:] >= 0))
+    period = np.diff(crossings).mean() * 0.002
+    assert period == pytest.approx(2 * math.pi * math.sqrt(length / GRAVITY), rel=0.02)
+
+
+def test_slung_load_is_carried_in_hover(steady, vehicle):
+    log = steady({"slung_load": {"load": 0.003, "length": 0.15}})
+    assert vehicle.thrust(log.stack(PWM)).sum(1).mean() == pytest.approx((MASS + 0.003) * GRAVITY, rel=3e-3)

@@ -1,0 +1,162 @@
+"""Effects on sensors, log and controller: each against its closed form."""
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from airtouch.logs import true_edges
+from airtouch.logs.flight_log import ACC, GYRO, PWM
+from airtouch.simulation import controller, flight, radio, scenario, sensors
+from airtouch.simulation.plant import from_vehicle
+
+SWEEP = """
+name = "sweep"
+[[platform]]
+size_m = [1.5, 4.0]
+centre_m = [2.0, 0.0]
+top_m = 0.7
+[[mission.step]]
+do = "take-off"
+height_m = 0.78
+[[mission.step]]
+do = "hover"
+time_s = 8.0
+[[mission.step]]
+do = "go"
+distance_m = 4.0
+speed_mps = 0.3
+"""
+
+
+@pytest.fixture(scope="module")
+def sweep(quiet):
+    scene = scenario.parse(SWEEP, "sweep")
+
+    def fly(effects=()):
+        log = flight.fly(scene, quiet, 3, 0, effects=effects)
+        assert not isinstance(log, flight.Diverged), str(log)
+        return log
+    return fly
+
+
+def test_imu_bias_shows_as_the_mean(steady):
+    values = {"acc_x": 0.2, "acc_y": -0.1, "acc_z": 0.3, "gyro_x": 0.02, "gyro_y": 0.01, "gyro_z": -0.03}
+    biased = flight_on_ground({"imu_bias": values})
+    plain = flight_on_ground(())
+    for name, value in values.items():
+        column = f"{name}_mps2" if name.startswith("acc") else f"{name}_radps"
+        assert (biased[column] - plain[column]).mean() == pytest.approx(value, abs=1e-6)
+
+
+def flight_on_ground(effects):
+    from airtouch import vehicle as vehicles
+    scene = scenario.parse('[[mission.step]]\ndo = "wait"\ntime_s = 20.0\n', "ground")
+    return flight.fly(scene, vehicles.load(), 5, 0, effects=effects)
+
+
+@pytest.mark.parametrize("factor", [0.0, 1.0, 4.0])
+def test_imu_noise_has_its_rms(vehicle, factor):
+    log = flight_on_ground({"imu_noise": {"factor": factor}})
+    still = log.slice(100, len(log))
+    np.testing.assert_allclose(still.stack(ACC).std(0), factor * vehicle.acc_noise_rms_mps2, rtol=0.12, atol=1e-3)
+    np.testing.assert_allclose(still.stack(GYRO).std(0), factor * vehicle.gyro_noise_rms_radps, rtol=0.12, atol=1e-3)
+
+
+def test_vibration_folds_to_the_rotors_alias(steady):
+    apart = [("weak_motor", {"rotor": i, "thrust_loss": 0.004 * i}) for i in (1, 2, 3)]  # four lines, not one
+    log = steady([("vibration", {"amplitude": 1.0, "gyro": 0.05}), *apart])
+    turns = log["rpm_1"].mean() / 60.0
+    alias = abs(turns - 100.0 * round(turns / 100.0))
+    f, power = welch(log["acc_x_mps2"], fs=100.0, nperseg=400)
+    assert f[np.argmax(power)] == pytest.approx(alias, abs=4.0)
+    # four lines of half the amplitude each: total rms = amplitude / sqrt(2)
+    assert log["acc_x_mps2"].std() == pytest.approx(1.0 / np.sqrt(2), rel=0.25)
+
+
+def test_latency_of_a_ring_is_exact_and_continuous():
+    ring = np.arange(64.0)[:, None]
+    assert sensors.delayed(ring, 40, 0.0, 0) == 40.0
+    assert sensors.delayed(ring, 40, 7.25, 0) == pytest.approx(32.75)
+    assert sensors.delayed(ring, 2, 3.0, 0) == 63.0
+
+
+def test_sensor_latency_moves_the_command_behind_the_gyro(vehicle, hover):
+    """The derivative term answers every gyro sample; with a delay it answers an older one."""
+    def lag(delay):
+        log = flight.fly(hover, vehicle, 1, 0, effects={"sensor_latency": {"delay": delay},
+                                                        "controller_gain": {"rate": 0.25, "attitude": 0.3}})
+        log = log.slice(800, len(log))
+        roll = log["m3_pwm"] + log["m4_pwm"] - log["m1_pwm"] - log["m2_pwm"]
+        gyro = np.diff(log["gyro_x_radps"], prepend=0.0)
+        roll = roll - np.convolve(roll, np.ones(9) / 9, "same")
+        return np.argmin([np.dot(gyro[:-10], np.roll(roll, -k)[:-10]) for k in range(6)])
+    assert lag(0.0) == 0
+    assert lag(0.02) == 2
+
+
+def test_time_jitter_has_its_rms_and_never_runs_backwards():
+    table = np.zeros((5000, 2))
+    table[:, 0] = 0.01 * np.arange(5000)
+    truth = table[:, 0].copy()
+    out = radio.received(table, 0.002, 0.0, 1.0, np.random.default_rng(0))
+    assert np.std(out[:, 0] - truth) == pytest.approx(0.002, rel=0.05)
+    assert np.all(np.diff(radio.received(table, 0.05, 0.0, 1.0, np.random.default_rng(1))[:, 0]) >= 0.0)
+
+
+def test_packet_loss_has_its_share_and_bursts():
+    table = 0.01 * np.arange(100_000)[:, None]
+    out = radio.received(table, 0.0, 0.05, 4.0, np.random.default_rng(0))[:, 0]
+    assert 1 - len(out) / 100_000 == pytest.approx(0.05, rel=0.1)
+    gaps = np.round(np.diff(out) / 0.01).astype(int) - 1
+    assert gaps[gaps > 0].mean() == pytest.approx(4.0, rel=0.1)
+
+
+def test_range_residual_shifts_the_height_over_the_platform(sweep):
+    plain, shifted = sweep(), sweep({"range_step": {"residual": 0.03, "kick": 0.0}})
+    over = slice(true_edges(plain)[0].sample + 350, true_edges(plain)[1].sample)
+    assert (shifted["z_m"] - plain["z_m"])[over].mean() == pytest.approx(0.03, abs=0.012)
+
+
+def test_range_kick_acts_once_at_each_edge(sweep):
+    plain, kicked = sweep(), sweep({"range_step": {"residual": 0.0, "kick": 0.05}})
+    difference = np.abs(kicked.stack(PWM).mean(1) - plain.stack(PWM).mean(1))
+    first = true_edges(plain)[0].sample
+    assert difference[:first - 3].max() == 0.0
+    assert difference[first - 3:first + 20].max() > 500.0
+
+
+def test_flow_scale_slows_the_drone_down_over_the_platform(sweep):
+    log = sweep({"flow_scale": {"share": 0.1}})
+    edges = true_edges(log)
+    before = log["vx_mps"][edges[0].sample - 100:edges[0].sample].mean()
+    settled = slice(edges[0].sample + 300, edges[0].sample + 400)
+    assert before == pytest.approx(0.3, rel=0.05)
+    true_height = (log["z_m"] - 0.7)[settled].mean()
+    scale = 1 + 0.1 * (0.78 / true_height - 1)
+    assert log["vx_mps"][settled].mean() == pytest.approx(0.3 / scale, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "field"), [("rate", "rate_gain"), ("attitude", "attitude_gain")])
+def test_controller_gain_scales_the_loops(vehicle, name, field):
+    def turn(gain):
+        plant = from_vehicle(vehicle)
+        plant[field] = gain
+        memory, pwm = np.zeros(controller.SIZE), np.zeros(4)
+        memory[controller.DESIRED], memory[controller.THRUST] = 2.0, 40000.0
+        controller.attitude_loop(plant[0], memory, 0.0, 0.0, 0.0, np.zeros(3), pwm)
+        return pwm[2] + pwm[3] - pwm[0] - pwm[1]
+    assert turn(2.0) == pytest.approx(2.0 * turn(1.0), rel=1e-6)
+
+
+def test_position_and_height_gain_scale_the_outer_loops(vehicle):
+    def wanted(**gains):
+        plant = from_vehicle(vehicle)
+        for field, value in gains.items():
+            plant[field] = value
+        memory, row = np.zeros(controller.SIZE), np.zeros(controller.SETPOINT_SIZE)
+        row[controller.VX], row[controller.Z] = 0.1, 0.05
+        controller.position_loop(plant[0], memory, row, np.zeros(3), np.zeros(3), 0.0)
+        return memory[controller.DESIRED + 1], memory[controller.THRUST] - plant[0]["thrust_base"]
+    pitch, thrust = wanted()
+    assert wanted(position_gain=2.0) == pytest.approx((2 * pitch, thrust))
+    assert wanted(height_gain=2.0)[1] == pytest.approx(4 * thrust, rel=0.05)  # two loops in series

@@ -1,0 +1,123 @@
+"""Effects on the vehicle and its motors: each against its closed form."""
+
+import numpy as np
+import pytest
+
+from airtouch.logs.flight_log import PWM, FlightLog
+from airtouch.simulation import battery, effects, replay
+from airtouch.simulation.plant import from_vehicle
+
+WEIGHT = 0.0362 * 9.81
+
+
+def thrusts(log, vehicle):
+    return vehicle.thrust(log.stack(PWM)).mean(axis=0)
+
+
+def command(pwm):
+    pwm = np.asarray(pwm, dtype=float)
+    if pwm.ndim == 1:
+        pwm = np.tile(pwm[:, None], (1, 4))
+    return FlightLog({name: pwm[:, i] for i, name in enumerate(PWM)})
+
+
+def ran(pwm, vehicle, chosen=(), period_s=0.002):
+    return replay.run(command(pwm), vehicle, effects.activate(chosen), period_s=period_s)
+
+
+def test_mass_and_thrust_coefficient_are_carried_by_more_thrust(steady, vehicle):
+    assert thrusts(steady(), vehicle).sum() == pytest.approx(WEIGHT, rel=1e-3)
+    assert thrusts(steady({"mass": {"fraction": 0.1}}), vehicle).sum() == pytest.approx(1.1 * WEIGHT, rel=1e-3)
+    lossy = thrusts(steady({"thrust_coefficient": {"loss": 0.1}}), vehicle).sum()
+    assert lossy == pytest.approx(WEIGHT / 0.9, rel=1e-3)
+
+
+@pytest.mark.parametrize("rotor", [1, 2, 3, 4])
+def test_weak_motor_gets_more_command_and_the_others_none(steady, vehicle, rotor):
+    got = thrusts(steady({"weak_motor": {"rotor": rotor, "thrust_loss": 0.12}}), vehicle)
+    expected = np.full(4, WEIGHT / 4)
+    expected[rotor - 1] /= 0.88
+    np.testing.assert_allclose(got, expected, rtol=3e-3)
+
+
+def test_two_weak_motors_are_two_entries(steady, vehicle):
+    pair = [("weak_motor", {"rotor": 1, "thrust_loss": 0.1}), ("weak_motor", {"rotor": 3, "thrust_loss": 0.05})]
+    expected = WEIGHT / 4 / np.array([0.9, 1.0, 0.95, 1.0])
+    np.testing.assert_allclose(thrusts(steady(pair), vehicle), expected, rtol=3e-3)
+
+
+def test_centre_of_mass_is_carried_by_the_rotors_nearer_to_it(steady, vehicle):
+    half = vehicle.arm_m / np.sqrt(2)
+    got = thrusts(steady({"com_offset": {"x": 0.002, "y": -0.001}}), vehicle)
+    front, right = got[[0, 3]].sum() / got.sum(), got[[0, 1]].sum() / got.sum()
+    assert front == pytest.approx(0.5 + 0.5 * 0.002 / half, rel=3e-3)
+    assert right == pytest.approx(0.5 + 0.5 * 0.001 / half, rel=3e-3)
+
+
+def test_inertia_slows_the_turn(vehicle):
+    pwm = np.tile([42000.0, 42000.0, 46000.0, 46000.0], (200, 1))
+    nominal = ran(pwm, vehicle).angular_acceleration[-1]
+    heavy = ran(pwm, vehicle, {"inertia": {"fraction": 0.5}}).angular_acceleration[-1]
+    np.testing.assert_allclose(heavy, nominal / 1.5, rtol=1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_motor_lag_has_its_time_constant(vehicle, factor):
+    pwm = np.r_[np.full(100, 30000.0), np.full(400, 45000.0)]
+    speed = ran(pwm, vehicle, {"motor_lag": {"factor": factor}}).rotor_speed[:, 0]
+    share = (speed - speed[0]) / (speed[-1] - speed[0])
+    when = 0.002 * (np.argmax(share >= 1 - np.exp(-1)) - 100)
+    assert when == pytest.approx(factor * vehicle.motor_time_constant_s, abs=0.003)
+
+
+def test_motor_lag_may_differ_between_rise_and_fall(vehicle):
+    pwm = np.r_[np.full(500, 45000.0), np.full(400, 30000.0)]
+    speed = ran(pwm, vehicle, {"motor_lag": {"factor": 1.0, "fall": 2.0}}).rotor_speed[:, 0]
+    share = (speed - speed[0]) / (speed[-1] - speed[0])
+    assert 0.002 * (np.argmax(share >= 1 - np.exp(-1)) - 500) == pytest.approx(0.12, abs=0.003)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.013, 0.03])
+def test_actuator_delay_shifts_the_thrust(vehicle, delay):
+    pwm = np.r_[np.full(100, 30000.0), np.full(400, 45000.0)]
+    early = ran(pwm, vehicle).rotor_speed[:, 0]
+    late = ran(pwm, vehicle, {"actuator_delay": {"delay": delay}}).rotor_speed[:, 0]
+    t = 0.002 * np.arange(500)
+    half = 0.5 * (early[0] + early[-1])
+    assert np.interp(half, late, t) - np.interp(half, early, t) == pytest.approx(delay, abs=0.0012)
+
+
+def test_motor_noise_has_its_rms_and_colour(steady):
+    rms, time = 0.05, 0.02
+    log = steady({"motor_noise": {"rms": rms, "time": time}, "controller_gain": {"rate": 0.7}})
+    quiet = steady()
+    force = log["acc_z_mps2"] - quiet["acc_z_mps2"].mean()
+    # four rotors each on their own: rms / 2 of the weight; the loop and 10 ms sampling change little
+    assert force.std() == pytest.approx(9.81 * rms / 2, rel=0.2)
+    lagged = np.corrcoef(force[:-1], force[1:])[0, 1]
+    assert lagged == pytest.approx(np.exp(-0.01 / time), abs=0.15)
+
+
+def test_battery_solves_its_circuit(vehicle):
+    plant = from_vehicle(vehicle)[0]
+    charge, volts = battery.drain(plant, 0.6, 6.0, 1.0)
+    current = 6.0 / volts
+    assert volts == pytest.approx(battery.open_circuit(0.6) - plant["battery_resistance"] * current, rel=1e-12)
+    assert 0.6 - charge == pytest.approx(current / plant["battery_capacity"], rel=1e-9)
+
+
+def test_battery_sag_raises_the_command_with_the_square_of_the_voltage(steady, vehicle):
+    log = steady({"battery_sag": {"charge": 0.5}})
+    scaled = vehicle.thrust(log.stack(PWM)).sum(1) * (log["vbat_V"] / vehicle.nominal_voltage_v) ** 2
+    assert scaled.mean() == pytest.approx(WEIGHT, rel=2e-3)
+    mean = log.stack(PWM).mean(1)
+    assert mean[-100:].mean() > mean[:100].mean()
+
+
+def test_firmware_compensation_undoes_the_sag(quiet, steady):
+    from dataclasses import replace
+    on = replace(quiet, battery_compensation=1.0)
+    sagging = steady({"battery_sag": {"charge": 0.3}}, vehicle=on)
+    scaled = on.thrust(sagging.stack(PWM)).sum(1) * (sagging["vbat_V"] / on.nominal_voltage_v) ** 2
+    assert scaled.mean() == pytest.approx(WEIGHT, rel=2e-3)
+    assert sagging["z_m"].std() < 0.01

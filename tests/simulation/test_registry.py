@@ -1,0 +1,141 @@
+"""The registry: names, bounds, units, strength, and an effect of a user's own."""
+
+import numpy as np
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation import effects, flight, replay, scenario
+from airtouch.simulation import signals as at
+
+GAP_LIST = {
+    "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise", "thrust_coefficient",
+    "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load", "imu_bias", "imu_noise", "vibration",
+    "sensor_latency", "actuator_delay", "time_jitter", "packet_loss", "range_step", "flow_scale", "controller_gain",
+}
+SHORT = """
+name = "short"
+[[platform]]
+size_m = [1.0, 2.0]
+centre_m = [0.8, 0.0]
+top_m = 0.45
+[[mission.step]]
+do = "take-off"
+height_m = 0.5
+time_s = 1.0
+[[mission.step]]
+do = "hover"
+time_s = 1.0
+[[mission.step]]
+do = "go"
+distance_m = 1.0
+speed_mps = 0.4
+"""
+
+
+@pytest.fixture(scope="module")
+def short(vehicle):
+    scene = scenario.parse(SHORT, "short")
+    return lambda chosen=(): flight.fly(scene, vehicle, 2, 0, effects=chosen)
+
+
+def as_table(log):
+    return np.nan_to_num(np.column_stack([log[c] for c in log.columns]))
+
+
+def test_the_list_is_the_specification():
+    assert set(effects.NAMES) == GAP_LIST
+    assert set(effects.EFFECTS) >= GAP_LIST
+
+
+def test_every_parameter_says_what_it_is():
+    for effect in effects.EFFECTS.values():
+        assert effect.summary
+        assert (effect.settings is None) != (effect.wrench is None)
+        assert any(p.neutral is not None for p in effect.parameters), effect.name
+        for p in effect.parameters:
+            assert p.unit and p.summary and p.low <= p.default <= p.high, (effect.name, p.name)
+            assert p.neutral is None or p.low <= p.neutral <= p.high
+
+
+@pytest.mark.parametrize("name", sorted(GAP_LIST))
+def test_strength_goes_to_zero_continuously(short, name):
+    effect = effects.get(name)
+    plain = as_table(short())
+    off = short({name: effect.scaled(effect.values(), 0.0)})
+    np.testing.assert_array_equal(as_table(off), plain)
+    if name == "packet_loss":
+        return
+    distance = []
+    for strength in (1e-4, 1e-2):
+        log = short({name: effect.scaled(effect.values(), strength)})
+        distance.append(np.max(np.abs(as_table(log) - plain) / (np.std(plain, axis=0) + 1e-3)))
+    assert 0.0 < distance[0] < 0.5, distance
+
+
+def test_order_given_does_not_matter(short):
+    chosen = [("mass", {"fraction": 0.1}), ("wind", {"x": 0.2}), ("gust", {})]
+    np.testing.assert_array_equal(as_table(short(chosen)), as_table(short(chosen[::-1])))
+
+
+def test_switching_an_effect_on_leaves_other_draws_alone(short):
+    one = as_table(short({"imu_noise": {"factor": 1.0}}))
+    np.testing.assert_array_equal(one, as_table(short()))
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("thunder:x=1", "no effect 'thunder'"),
+    ("wind:x=0.3", "needs the unit m/s"),
+    ("wind:x=0.3km/h", "needs the unit m/s"),
+    ("wind:q=0.3m/s", "no parameter 'q'"),
+    ("wind:x=99m/s", "out of bounds"),
+    ("weak_motor:thrust_loss=0.1kg", "needs no unit"),
+    ("weak_motor:rotor=2.5", "whole number"),
+    ("wind:x", "parameter=value"),
+])
+def test_bad_effects_get_one_clear_line(text, said):
+    with pytest.raises(AirTouchError, match=said) as error:
+        effects.parse(text)
+    assert "\n" not in str(error.value)
+
+
+def test_command_line_form():
+    assert effects.parse("wind:x=0.3m/s, y=-1 m/s")[1] == {"x": 0.3, "y": -1.0, "z": 0.0, "drag": 0.0147}
+    assert effects.parse("weak_motor:rotor=2,thrust_loss=0.1") == ("weak_motor", {"rotor": 2.0, "thrust_loss": 0.1})
+    assert effects.parse("mass") == ("mass", {"fraction": 0.1})
+
+
+OWN = '''
+"""A made-up effect: a magnet in the floor that pulls with the square of closeness."""
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Effect, Parameter, wrench
+
+
+@wrench
+def pull(p, s, memory, stream, out):
+    out[2] -= p[0] / (1.0 + (s[at.HEIGHT] / p[1]) ** 2)
+
+
+EFFECT = Effect(
+    "magnet", "a magnet in the floor",
+    (Parameter("force", "N", 0.01, 0.0, 0.1, 0.0, "at the floor"),
+     Parameter("reach", "m", 0.2, 0.01, 1.0, None, "height at which half is left")),
+    wrench=pull)
+'''
+
+
+def test_an_effect_of_your_own_is_one_short_file(tmp_path, short, vehicle, signals):
+    assert len(OWN.splitlines()) < 60
+    path = tmp_path / "magnet.py"
+    path.write_text(OWN)
+    (effect,) = effects.load_file(path)
+    try:
+        pulled, plain = short({"magnet": {"force": 0.02}}), short()
+        more = vehicle.thrust(pulled.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1) - vehicle.thrust(
+            plain.stack([f"m{i}_pwm" for i in range(1, 5)])).sum(1)
+        assert more[150:].mean() > 0.001
+        signals[:, at.HEIGHT] = 0.2
+        force = replay.wrench_of(effects.activate({"magnet": {"force": 0.02}})[0], signals)
+        np.testing.assert_allclose(force[:, 2], -0.01)
+    finally:
+        effects.unregister("magnet")
+    assert effect.name not in effects.EFFECTS
