@@ -29,9 +29,9 @@ def test_folder_of_flights(generated, tmp_path):
     assert result.exit_code == 0, result.output
     table = json.loads(out.read_text(), parse_constant=no_constant)
     assert KEYS <= set(table) and set(table["hit"]) == {"0.05", "0.10", "0.25"}
-    assert table["flights"] == 4 and table["edges"] == 8
+    assert table["flights"] == 4 and table["edges"] == sum(len(f["edges"]) for f in table["per_flight"]) >= 8
     matched = [e for f in table["per_flight"] for e in f["edges"] if e["detected_sample"] is not None]
-    assert table["missed"] == pytest.approx(1 - len(matched) / 8)
+    assert table["missed"] == pytest.approx(1 - len(matched) / table["edges"])
     assert table["false_count"] == sum(len(f["false"]) for f in table["per_flight"])
     for f in table["per_flight"]:
         assert f["detections"] == len(f["false"]) + sum(e["detected_sample"] is not None for e in f["edges"])

@@ -15,7 +15,7 @@ from airtouch.detector.dataset import FlightFile
 from airtouch.detector.summary import summarise
 from airtouch.errors import AirTouchError
 
-TRAIN, TEST, EPOCHS = 36, 12, 5  #: as much as fits in the time on two cores
+TRAIN, TEST, EPOCHS, STEPS = 36, 12, 5, 400  #: as much as fits in the time on two cores
 GENERATED = 32  #: flights, where none are recorded
 SHOWN = 4  #: flights plotted in the report
 
@@ -47,8 +47,9 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     click.echo(f"  {where}: {len(train)} to train on, {len(test)} held out, split by flight")
     training, left_out = readable(train)
 
-    steps.say(f"Training: network of the paper, {epochs} epochs, pruned, then quantised to int8")
-    models = {name: fit(name, training, epochs) for name in registry.DETECTORS}
+    steps.say(f"Training, short: {epochs} epochs, pruned, quantised to int8; thresholds from training flights")
+    short = {"paper": {"epochs": epochs}, "best": {"steps": STEPS}}
+    models = {name: fit(name, training, short.get(name, {})) for name in sorted(registry.DETECTORS, key=order)}
 
     steps.say("Export: C sources for the GAP8")
     export(models["paper"], out)
@@ -56,9 +57,9 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     steps.say("Detection on the held-out flights, through the C kernels and the C int8 network")
     results: dict[str, list[evaluate.Result]] = {}
     for name, model in models.items():
-        results[name] = []
-        _, failures = evaluate.evaluate(test, registry.get(name), model,
-                                        lambda r, to=results[name]: to.append(r) if isinstance(r, evaluate.Result) else None)
+        outcomes: list[evaluate.Result | AirTouchError] = []
+        _, failures = evaluate.evaluate(test, registry.get(name), model, outcomes.append)
+        results[name] = [r for r in outcomes if isinstance(r, evaluate.Result)]
         left_out += [f for f in failures if f not in left_out]
     if not results["paper"]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
@@ -131,16 +132,21 @@ def readable(files: Sequence[FlightFile]) -> tuple[list[Any], list[tuple[str, st
     return list(found.values()), left_out
 
 
-def fit(name: str, training: Sequence[Any], epochs: int) -> Any:
-    """A detector's model, with a bar while its network is trained."""
-    if name == "baseline":
-        return registry.get(name).fit(training)
-    with click.progressbar(length=epochs, label=f"  {name}") as bar:
+def fit(name: str, training: Sequence[Any], options: dict[str, Any]) -> Any:
+    """A detector's model, with a bar for its longest stage."""
+    with click.progressbar(length=1000, label=f"  {name:8}", show_percent=True) as bar:
         def told(stage: str, done: int, total: int, note: str) -> None:
-            if stage == "epochs":
-                bar.update(1)
+            if stage != "features":
+                bar.update(1000 * done // total - bar.pos)
 
-        return registry.get(name).fit(training, epochs=epochs, progress=told)
+        model = registry.get(name).fit(training, progress=told, **options)
+        bar.update(1000 - bar.pos)
+        return model
+
+
+def order(name: str) -> int:
+    """The paper's detector first, its baseline second, others after."""
+    return ("paper", "baseline").index(name) if name in ("paper", "baseline") else 2
 
 
 def export(model: Any, out: Path) -> None:

@@ -1,0 +1,52 @@
+"""`airtouch demo` from the outside, on few generated flights and one epoch."""
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+from airtouch.cli import demo, flights
+from airtouch.errors import AirTouchError
+
+
+def run(*arguments):
+    return CliRunner().invoke(demo.command, [str(a) for a in arguments])
+
+
+@pytest.mark.slow
+def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
+    pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
+    monkeypatch.setattr(demo, "find_flights", lambda: None)
+    monkeypatch.setattr(demo, "GENERATED", 8)
+    out = tmp_path / "demo"
+    result = run("--out", out, "--epochs", 1)
+    assert result.exit_code == 0, result.output
+    assert len(re.findall(r"^\[ *\d+ s\] \d\. ", result.output, re.M)) == 5
+    assert "paper" in result.output and "baseline" in result.output and "false/min" in result.output
+    assert (out / "report.html").stat().st_size > 100_000
+    assert (out / "model" / "airtouch_model.c").exists() and (out / "model" / "paper.npz").exists()
+    again = run("--out", out)
+    assert isinstance(again.exception, AirTouchError) and "--force" in str(again.exception)
+
+
+def test_few_flights_are_too_few(generated, tmp_path):
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / "f.csv").write_text("1,2\n")
+    result = run("--out", tmp_path / "o", "--flights", tmp_path / "one")
+    assert isinstance(result.exception, AirTouchError) and "too few" in str(result.exception)
+
+
+def test_split_is_by_flight(generated, tmp_path):
+    train, test, _ = demo.flights_of(tmp_path, generated, None)
+    assert train and test and not {f.path for f in train} & {f.path for f in test}
+
+
+def test_where_flights_are_looked_for(tmp_path, monkeypatch):
+    monkeypatch.setenv("AIRTOUCH_FLIGHTS", str(tmp_path))
+    assert flights.find_flights() == tmp_path
+    (tmp_path / "airtouch").mkdir()
+    (tmp_path / "airtouch" / "manifest.csv").write_text("file\n")
+    assert flights.find_flights() == tmp_path / "airtouch"
+    monkeypatch.setenv("AIRTOUCH_FLIGHTS", str(tmp_path / "none"))
+    with pytest.raises(AirTouchError, match="no such folder"):
+        flights.find_flights()

@@ -1,0 +1,86 @@
+"""The report: self-contained, well formed, with the figures of the summary in it."""
+
+import html.parser
+import re
+
+import numpy as np
+import pytest
+
+from airtouch.detector.dataset import Condition
+from airtouch.detector.score import score_flight
+from airtouch.detector.summary import summarise
+from airtouch.detector.trace import Detection, Trace
+from airtouch.errors import AirTouchError
+from airtouch.logs import Edge
+from airtouch.logs.flight_log import FlightLog
+from airtouch.report import figures
+from airtouch.report.columns import COLUMNS, cell
+from airtouch.report.write import ShownFlight, answer, in_words, write_report
+
+N = 600
+EDGES = [Edge(200, "entry", 0.8, 0.05), Edge(400, "exit", 0.05, 0.8)]
+
+
+def shown(name="a<b>.csv", detections=(Detection(210, "entry", 0.9), Detection(50, "exit", 0.8))):
+    rng = np.random.default_rng(0)
+    log = FlightLog({"zrange_m": np.full(N, 0.8)}, {"source": name})
+    signals = {"channels": rng.normal(size=(N, 9)), "band_power": rng.exponential(size=(N, 9)),
+               "force": rng.normal(size=(N, 3)), "cfar_power": rng.exponential(size=N),
+               "threshold": np.r_[np.full(65, np.nan), np.full(N - 65, 3.0)], "alert": np.arange(N) == 300}
+    signals["band_power"][:200] = np.nan
+    trace = Trace(np.r_[np.full(300, np.nan), rng.uniform(size=N - 300)], list(detections), signals)
+    condition = Condition(height="low", angle_deg=0.0, wind="none", speed_mps=0.2)
+    score = score_flight(name, condition, EDGES, np.ones(N, bool), trace.probability, trace.edges)
+    return ShownFlight(log, trace, EDGES, score, {"baseline": Trace(np.full(N, np.nan), [Detection(90, "edge")])})
+
+
+class Checker(html.parser.HTMLParser):
+    """Collects open tags and everything that is loaded."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.loaded = [], []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+        self.loaded += [value for key, value in attrs if key in ("src", "href")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_report_is_one_file_with_the_figures(tmp_path):
+    flight = shown()
+    path = tmp_path / "report.html"
+    scores = {"paper": [flight.score, flight.score], "baseline": []}
+    write_report(path, "A & B", scores, [flight], parameters={"p_fa": 1e-6}, command="airtouch demo",
+                 left_out=[("x.csv", "x.csv: the file is empty")])
+    text = path.read_text()
+    checker = Checker()
+    checker.feed(text)
+    assert not checker.open and checker.loaded and all(v.startswith("data:image/png;base64,") for v in checker.loaded)
+    assert "http" not in re.sub(r"base64,[^\"]*", "", text)
+    assert "A &amp; B" in text and "a&lt;b&gt;.csv" in text and "<b>.csv" not in text
+    table = summarise(scores["paper"])
+    for key, form in COLUMNS.values():
+        assert cell(table, key, form).split("\n")[0] in text
+    assert "x.csv: the file is empty" in text and "viewport" in text
+    with pytest.raises(AirTouchError, match="--force"):
+        write_report(path, "again", scores, [flight], parameters={}, command="x")
+
+
+def test_words_say_misses_and_false_edges():
+    flight = shown()
+    assert in_words(flight.score) == ("entry at 2.00 s found 0.10 s late (0.020 m); exit at 4.00 s missed; "
+                                      "1 false edges.")
+    said = answer("paper", summarise([flight.score]))
+    assert "1 missed (50%)" in said and "1 false (10.0 a minute)" in said and "0.020 m" in said
+
+
+def test_plots_are_made_of_whatever_is_there():
+    flight = shown()
+    bare = Trace(np.full(N, np.nan), [])
+    for image in (figures.flight(flight.log, bare, None, {}), figures.reliability({"none": []}),
+                  figures.reliability({"paper": [flight.score]}), figures.error_distribution({"paper": [flight.score]})):
+        assert image.startswith(b"\x89PNG") and len(image) > 5000
