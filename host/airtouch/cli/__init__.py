@@ -15,6 +15,7 @@ COMMANDS = {
     "export": ("export", "Write a trained network as C sources for the GAP8."),
     "evaluate": ("evaluate", "Score a detector on flights with known edges."),
     "crossval": ("crossval", "Cross-validate a detector by flight."),
+    "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
     "dataset": ("dataset", "Fetch the authors' public flights."),
     "demo": ("demo", "Run the whole pipeline and write an HTML report."),
 }

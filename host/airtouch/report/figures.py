@@ -38,7 +38,7 @@ def flight(log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: M
     panes += [_probability, _edges]
     panes += [_force, _cfar] if "force" in trace.signals else []
     panes += [_range] if log.has("zrange_m") else []
-    with _style():
+    with style():
         figure = Figure(figsize=(7.2, 1.15 * len(panes) + 0.9), layout="constrained")
         axes = figure.subplots(len(panes), 1, sharex=True, squeeze=False)[:, 0]
         t = np.arange(len(log)) * SAMPLE_PERIOD_S
@@ -53,7 +53,7 @@ def flight(log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: M
 
 def reliability(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
     """How often the drone was over a platform when the detector said so with probability p."""
-    with _style():
+    with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
         ax.plot([0, 1], [0, 1], color=MUTED, lw=1, ls="--", label="perfect")
@@ -75,7 +75,7 @@ def reliability(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
 
 def error_distribution(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
     """Share of all true edges found within a distance; misses keep the curve below 1."""
-    with _style():
+    with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
         for (name, some), colour in zip(scores.items(), (FOUND, OTHER, TRUE), strict=False):
@@ -168,7 +168,7 @@ def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> No
         ax.legend(loc="upper left", ncols=3, fontsize=6, frameon=False)
 
 
-def _style():
+def style():
     import matplotlib
 
     return matplotlib.rc_context(STYLE)

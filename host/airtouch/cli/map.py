@@ -1,0 +1,78 @@
+"""`airtouch map`: the edges of a flight in the plane."""
+
+import json
+from pathlib import Path
+
+import click
+
+from airtouch import logs
+from airtouch.cli import scores as show
+from airtouch.detector import dataset, evaluate, registry
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+
+
+@click.command(name="map")
+@click.argument("flight", type=click.Path(path_type=Path))
+@click.option("--detector", default="best", show_default=True, help="Which detector feels the edges.")
+@click.option("--model", type=click.Path(path_type=Path), help="Trained model (.npz); the shipped one if left out.")
+@click.option("--truth", is_flag=True, help="Map the true edges of the down range instead of the detector's.")
+@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+              help="Speed for dead reckoning where the log has no position and the manifest no speed.")
+@click.option("--heading", default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
+@click.option("--sigma", type=click.FloatRange(0, 5, min_open=True), metavar="S",
+              help="Timing error of a detection; the model's own if left out.")
+@click.option("--out", type=click.Path(path_type=Path), help="GeoJSON to write; the plot goes beside it as .png.")
+@click.option("--force", is_flag=True, help="Replace both.")
+def command(flight: Path, detector: str, model: Path | None, truth: bool, speed: float | None, heading: float,
+            sigma: float | None, out: Path | None, force: bool) -> None:
+    """Map the edges of FLIGHT: points, and for a zig-zag the outlines of the platforms below.
+
+    \b
+    airtouch map flights/airtouch/imu_data_0126-1906.csv.gz
+    airtouch map zigzag.csv --out map.geojson
+
+    Positions come from x_m, y_m where the log has them; else from the commanded speed, which places edges
+    along the track only. Each edge has a 1-sigma: the detector's timing error times the speed there.
+    """
+    try:
+        from airtouch.detector import edge_map
+    except ImportError:
+        raise AirTouchError("maps need shapely: pip install 'airtouch[map]'") from None
+    out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
+    picture = out.with_suffix(".png")
+    for path in (out, picture):
+        show.check_free(path, force)
+    (file,) = dataset.collect([flight], speed)
+    log = logs.read(flight)
+    xy, measured = edge_map.track(log, speed or file.condition.speed_mps, heading)
+    if truth:
+        found, lag, model_sigma = logs.true_edges(log), 0.0, 0.01
+    else:
+        evaluate.check(log)
+        module = registry.get(detector)
+        trained = module.load(model)
+        found, lag = module.run(log, trained).edges, module.lag_s(trained)
+        model_sigma = getattr(trained, "metadata", {}).get("sigma_s", edge_map.ASSUMED_SIGMA_S)
+    points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found],
+                                  sigma_s=sigma or model_sigma, lag_s=lag)
+    if not measured and points:
+        xy = xy - [points[0].x_m, points[0].y_m]
+        points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found],
+                                      sigma_s=sigma or model_sigma, lag_s=lag)
+    platforms = edge_map.platforms(points)
+    position = "logged" if measured else "dead reckoning, from the first edge"
+    content = edge_map.geojson(points, platforms, {
+        "flight": flight.name, "detector": "truth" if truth else detector, "position": position,
+        "lag_s": lag, "sigma_s": sigma or model_sigma})
+    from airtouch.report.map_figure import edge_map as draw
+
+    write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)
+    write_bytes(draw(xy, points, platforms, f"{flight.name}: {len(points)} edges ({position})"), picture, force)
+    for point in points:
+        click.echo(f"{point.kind:5} at {point.sample * 0.01:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
+                   f"1-sigma {point.sigma_m:.3f} m")
+    for number, platform in enumerate(platforms):
+        if platform.outline is not None:
+            click.echo(f"platform {number}: {platform.outline.area:.3f} m^2, outline 1-sigma {platform.sigma_m:.3f} m")
+    click.echo(f"written: {out}, {picture}")
