@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 from shapely.geometry import LineString
+from shapely.plotting import patch_from_polygon
 
 from airtouch.detector.edge_map import EdgePoint, Platform
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
@@ -22,8 +23,7 @@ def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Pl
             if platform.outline is not None:
                 ring = np.array(platform.outline.exterior.coords)
                 band = platform.outline.boundary.buffer(2 * platform.sigma_m)
-                for part in getattr(band, "geoms", [band]):
-                    ax.fill(*np.array(part.exterior.coords).T, color=TRUE, alpha=0.12, lw=0)
+                ax.add_patch(patch_from_polygon(band, facecolor=TRUE, alpha=0.15, lw=0))
                 ax.plot(*ring.T, color=TRUE, lw=1.6, label="outline")
             for line in (platform.near, platform.far):
                 if isinstance(line, LineString):
@@ -39,7 +39,7 @@ def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Pl
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles))
-        ax.legend(unique.values(), unique.keys(), loc="upper right", frameon=False)
+        figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
         return png(figure)
 
 
