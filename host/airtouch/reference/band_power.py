@@ -1,7 +1,6 @@
 """FC-FE: the power of a signal within one frequency band (paper, section 4.2)."""
 
 import numpy as np
-from scipy.signal.windows import hann
 
 from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
@@ -77,7 +76,7 @@ def band_power(
 
 def _windowed_basis(window: int, first: int, last: int) -> np.ndarray:
     """(window, 2 bins): cosines, then sines, such that the squared projections sum to the power."""
-    taper = hann(window, sym=False)
+    taper = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(window) / window)  # Hann, periodic
     bins = np.arange(first, last + 1)
     sides = np.where(2 * bins == window, 1.0, 2.0)
     scale = np.sqrt(sides / (window * np.square(taper).sum()))

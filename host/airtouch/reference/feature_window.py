@@ -1,7 +1,6 @@
 """Normalisation of the fused features: per window, as in the authors' data, and streaming."""
 
 import numpy as np
-from scipy.signal import lfilter
 
 from airtouch.errors import AirTouchError
 from airtouch.reference.finite import FLOAT32_MAX, hold_finite
@@ -73,6 +72,8 @@ def deviation_from_mean(x: np.ndarray, time_constant: float) -> np.ndarray:
         raise AirTouchError(f"exponential mean: the time constant must be positive, not {time_constant}")
     if len(x) == 0:
         return np.zeros(0)
+    from scipy.signal import lfilter  # slow to import, and only needed here
+
     recursion = [1.0, -np.exp(-1.0 / time_constant)]
     level = x - x[0]
     mean = lfilter([1.0], recursion, level) / lfilter([1.0], recursion, np.ones(len(x)))
