@@ -45,7 +45,8 @@ static void maxPool(const layerFloat_t *layer, const float *input, float *output
   const int32_t rowStride = layer->inColumns * channels;
   for (int32_t row = 0; row < layer->outRows; row++) {
     for (int32_t column = 0; column < layer->outColumns; column++) {
-      const float *block = input + row * layer->kernelRows * rowStride + column * layer->kernelColumns * channels;
+      const float *block =
+          input + row * layer->kernelRows * rowStride + column * layer->kernelColumns * channels;
       for (int32_t channel = 0; channel < channels; channel++) {
         float largest = block[channel];
         for (int32_t i = 0; i < layer->kernelRows; i++) {

@@ -1,5 +1,6 @@
 """Model files: what was saved comes back, anything else is one clear line."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,7 +87,9 @@ def arrays_of(model: model_file.Model) -> dict[str, np.ndarray]:
     ("tflite", None, "TFLite"),
     ("conv1.kernel", None, "no array"),
 ])
-def test_a_wrong_array_is_named(model: model_file.Model, tmp_path: Path, name: str, change, said: str) -> None:
+def test_a_wrong_array_is_named(
+    model: model_file.Model, tmp_path: Path, name: str, change: Callable | None, said: str
+) -> None:
     arrays = arrays_of(model)
     if change is None:
         del arrays[name]

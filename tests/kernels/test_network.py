@@ -105,7 +105,8 @@ def test_probability_is_the_softmax_of_the_logits() -> None:
     model = random_model()
     windows = random_windows(50)
     logits = c_network.infer_int8(model, windows).astype(float) * model.int8.layers[-1].output_scale
-    np.testing.assert_allclose(c_network.probability(model, windows), softmax(logits, axis=1)[:, 1], rtol=1e-12)
+    expected = softmax(logits, axis=1)[:, 1]
+    np.testing.assert_allclose(c_network.probability(model, windows), expected, rtol=1e-12)
 
 
 @settings(max_examples=60, deadline=None)
@@ -131,9 +132,9 @@ def test_blocks_of_four_give_back_the_weights(outputs: int, blocks: int, density
 def test_requantise_rounds_twice(accumulator: int, mantissa: int, exponent: int) -> None:
     product = math.floor(Fraction(accumulator * mantissa, 2**31) + Fraction(1, 2))
     away = math.floor(abs(Fraction(product, 2**exponent)) + Fraction(1, 2))
-    found = int8_network.rounding_shift_right(
-        int8_network.rounding_doubling_high_multiply(np.array(accumulator, np.int32), np.array(mantissa, np.int32)),
-        np.array(exponent))
+    high = int8_network.rounding_doubling_high_multiply(
+        np.array(accumulator, np.int32), np.array(mantissa, np.int32))
+    found = int8_network.rounding_shift_right(high, np.array(exponent))
     assert int(found) == (-away if product < 0 else away)
 
 

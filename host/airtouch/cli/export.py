@@ -10,9 +10,11 @@ from airtouch.kernels.network import parameter_bytes
 
 @click.command(name="export")
 @click.argument("model", required=False, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("gap8/model"), show_default=True,
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False),
+              default=Path("gap8/model"), show_default=True,
               help="Folder to write to, or to check.")
-@click.option("--check", "only_check", is_flag=True, help="Write nothing; refuse a folder that is stale or foreign.")
+@click.option("--check", "only_check", is_flag=True,
+              help="Write nothing; refuse a folder that is stale or foreign.")
 @click.option("--force", is_flag=True, help="Replace files that differ.")
 def command(model: Path | None, out: Path, only_check: bool, force: bool) -> None:
     """Write MODEL (.npz; the shipped one if left out) as C: weights, shapes, scales, golden vectors.

@@ -21,10 +21,10 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--detector", default="paper", show_default=True, help="Which detector to train.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
               help="Model file to write.")
-@click.option("--epochs", type=click.IntRange(1), help="At most so many; the detector's own number if left out.")
+@click.option("--epochs", type=click.IntRange(1), help="At most so many; the detector's own if left out.")
 @click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
               help="Share of zeros in the first dense layer; 0.8 if left out.")
-@click.option("--block", type=click.Choice(["1", "4"]), help="Prune single weights or blocks of four; 4 if left out.")
+@click.option("--block", type=click.Choice(["1", "4"]), help="Prune single weights or blocks; 4 if left out.")
 @click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="Weight of the disturbance-force loss.")
 @click.option("--seed", default=0, show_default=True, help="Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
@@ -33,7 +33,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
 
     Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Flights that cannot be used are named and
-    left out, and the exit code is 2. A share of the flights is held out to stop in time, and to choose the decoding.
+    left out, and the exit code is 2. A share of the flights is held out to stop in time, and to
+    choose the decoding.
     """
     check_free(out, force)
     module = registry.get(detector)

@@ -63,8 +63,8 @@ def check(model: Model, folder: Path, name: str = "") -> None:
             raise AirTouchError(f"{path}: stale or foreign, made from model {found[:12]}, "
                                 f"the current one is {model.digest[:12]}; {again}")
         if text != expected:
-            raise AirTouchError(f"{path}: made from this model, but edited since or written by another version or "
-                                f"under another name; {again}")
+            raise AirTouchError(f"{path}: made from this model, but edited since, or written by another "
+                                f"version or under another name; {again}")
 
 
 def golden_vectors(network: Int8Network) -> tuple[np.ndarray, np.ndarray]:
@@ -121,7 +121,8 @@ def _model_source(network: Int8Network) -> str:
         "const networkInt8_t airtouchNetwork = {", "    .layers = layers,",
         f"    .layerCount = {len(network.layers)},",
         f"    .inputScale = {_float(first.input_scale)},", f"    .inputZeroPoint = {first.input_zero_point},",
-        f"    .outputScale = {_float(last.output_scale)},", f"    .outputZeroPoint = {last.output_zero_point},",
+        f"    .outputScale = {_float(last.output_scale)},",
+        f"    .outputZeroPoint = {last.output_zero_point},",
         "};", ""])
 
 
@@ -173,7 +174,8 @@ extern const int8_t airtouchGoldenOutputs[{outputs.size}];
 
 
 def _golden_source(inputs: np.ndarray, outputs: np.ndarray) -> str:
-    return ('#include "airtouch_golden.h"\n\n' + _array("int8_t", "airtouchGoldenInputs", inputs.ravel(), False)
+    return ('#include "airtouch_golden.h"\n\n'
+            + _array("int8_t", "airtouchGoldenInputs", inputs.ravel(), False)
             + _array("int8_t", "airtouchGoldenOutputs", outputs.ravel(), False)).rstrip("\n") + "\n"
 
 

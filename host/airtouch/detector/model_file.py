@@ -90,7 +90,8 @@ def parse(data: bytes, source: str) -> Model:
     _check_int8(int8, source)
     network = network_of_arrays(int8)
     check_range(network.layers, source)
-    return Model({name: arrays[name] for name in weight_shapes()}, network, arrays["tflite"].tobytes(), metadata)
+    weights = {name: arrays[name] for name in weight_shapes()}
+    return Model(weights, network, arrays["tflite"].tobytes(), metadata)
 
 
 def _check_int8(arrays: dict[str, np.ndarray], source: str) -> None:
@@ -105,7 +106,7 @@ def check_range(layers: Sequence[Int8Layer], source: str) -> None:
     for layer in layers:
         if layer.kind == "max_pool":
             continue
-        real = np.float64(layer.input_scale) * layer.weight_scale.astype(np.float64) / np.float64(layer.output_scale)
+        real = layer.weight_scale.astype(np.float64) * (layer.input_scale / layer.output_scale)
         weights = np.abs(layer.weights.astype(np.int64)).reshape(len(layer.bias), -1).sum(axis=1)
         largest = np.abs(layer.bias.astype(np.int64)) + 256 * weights
         if (largest * np.maximum(real, 1.0) * 2.0 >= 2.0**31).any():

@@ -116,7 +116,8 @@ def network_of_arrays(arrays: dict[str, np.ndarray]) -> Int8Network:
         at += 1
         layers.append(Int8Layer(kind, before, after, kernel, scale, zero_point,
                                 float(arrays["scale"][at]), int(arrays["zero_point"][at]), relu,
-                                arrays[f"{name}.weights"], arrays[f"{name}.bias"], arrays[f"{name}.weight_scale"]))
+                                arrays[f"{name}.weights"], arrays[f"{name}.bias"],
+                                arrays[f"{name}.weight_scale"]))
     return Int8Network(tuple(layers))
 
 
@@ -129,7 +130,8 @@ def arrays_of_network(network: Int8Network) -> dict[str, np.ndarray]:
         arrays[f"{name}.weight_scale"] = layer.weight_scale
     first = weighted[0]
     arrays["scale"] = np.array([first.input_scale] + [la.output_scale for la in weighted], dtype=np.float32)
-    arrays["zero_point"] = np.array([first.input_zero_point] + [la.output_zero_point for la in weighted], np.int32)
+    zero_points = [first.input_zero_point] + [la.output_zero_point for la in weighted]
+    arrays["zero_point"] = np.array(zero_points, dtype=np.int32)
     return arrays
 
 

@@ -77,16 +77,20 @@ def train_paper(
     held = held_out(len(flights), seed)
     kept = ~np.isin(windows.flight, held)
     if not kept.any() or len(np.unique(windows.over[kept])) < 2:
-        raise AirTouchError("training: the flights hold no windows both over and beside a platform; give more flights")
-    weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block, df_lambda, told)
+        raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
+                            "give more flights")
+    weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block,
+                               df_lambda, told)
     int8, tflite = quantisation.quantise(weights, windows.x[kept])
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
-        "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block, "lambda": df_lambda,
+        "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block,
+        "lambda": df_lambda,
         "flights": [os.path.basename(log.source) for log in flights],
         "held_out": [os.path.basename(flights[i].source) for i in held], "data_sha256": data_hash(windows),
     })
-    return Model(weights, int8, tflite, {**model.metadata, "held_out_accuracy": accuracy(model, windows.select(~kept))})
+    judged = accuracy(model, windows.select(~kept))
+    return Model(weights, int8, tflite, {**model.metadata, "held_out_accuracy": judged})
 
 
 def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Windows:
@@ -96,7 +100,8 @@ def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Window
         parts.append(windows_of(log, flight_features(log), index))
         progress("features", index + 1, len(flights), os.path.basename(log.source))
     if not sum(len(part.x) for part in parts):
-        raise AirTouchError("training: no flight holds a full window in the air; 3 s of flight at 100 Hz are needed")
+        raise AirTouchError("training: no flight holds a full window in the air; "
+                            "3 s of flight at 100 Hz are needed")
     return Windows(*(np.concatenate([getattr(part, name) for part in parts])
                      for name in ("x", "over", "alert", "flight")))
 
@@ -113,7 +118,8 @@ def windows_of(log: FlightLog, features: Features, index: int = 0) -> Windows:
     ends = ends[usable]
     over = over_platform(logs.true_edges(log), len(log))
     x = reference.z_score_window(raw[usable]) if len(ends) else raw[usable]
-    return Windows(x.astype(np.float32), over[ends].astype(np.float32), features.alert[ends].astype(np.float32),
+    return Windows(x.astype(np.float32), over[ends].astype(np.float32),
+                   features.alert[ends].astype(np.float32),
                    np.full(len(ends), index, np.int32))
 
 
@@ -150,7 +156,7 @@ def class_weights(over: np.ndarray) -> tuple[float, float]:
 
 
 def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
-    """Learning rate: cosine from peak / 25 up over 30 % of the steps, cosine down to peak / 10^4 (Smith 2018)."""
+    """Learning rate: cosine from peak / 25 up over 30 % of the steps, down to peak / 10^4 (Smith 2018)."""
     position = min(step / steps, 1.0)
     if position < 0.3:
         start, stop, part = peak / 25.0, peak, position / 0.3
@@ -177,7 +183,8 @@ def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, blo
     told = keras.callbacks.LambdaCallback(
         on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
     callbacks = [schedule, told] + ([stopping] if len(held.x) else [])
-    history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks, shuffle=False,
+    history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
+                        shuffle=False,
                         validation_data=_batches(held, shuffle=False) if len(held.x) else None)
     return network.weights_of_keras(model), len(history.history["loss"])
 

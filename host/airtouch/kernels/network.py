@@ -71,7 +71,8 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
         "bias": pointer("float", bias)})
     size = checked(lib.networkFloatBatchArena(flat))
     outputs = np.empty((len(x), int(np.prod(layers[-1].output_shape))), dtype=np.float32)
-    lib.networkFloatBatch(flat, pointer("float", x), len(x), ffi.new("float[]", size), pointer("float", outputs))
+    lib.networkFloatBatch(flat, pointer("float", x), len(x), ffi.new("float[]", size),
+                          pointer("float", outputs))
     return outputs
 
 
@@ -141,7 +142,8 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[object, list[np.ndarray]]:
     weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
                               zip(zip(*packed), (np.int8, np.uint16, np.uint8)))
     bias = _joined([layer.folded_bias() for layer in weighted], np.int32)
-    multiplier, shift = (_joined(parts, dtype) for parts, dtype in zip(zip(*multipliers), (np.int32, np.int8)))
+    multiplier, shift = (_joined(parts, dtype)
+                         for parts, dtype in zip(zip(*multipliers), (np.int32, np.int8)))
     shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
@@ -164,7 +166,8 @@ def _windows(shape: tuple[int, int, int], windows: np.ndarray) -> np.ndarray:
     windows = np.asarray(windows)
     size = int(np.prod(shape))
     if windows.ndim < 2 or int(np.prod(windows.shape[1:])) != size:
-        raise AirTouchError(f"network: needs windows (n, {shape[0]}, {shape[1] * shape[2]}), not {windows.shape}")
+        raise AirTouchError(f"network: needs windows (n, {shape[0]}, {shape[1] * shape[2]}), "
+                            f"not {windows.shape}")
     return windows.reshape(len(windows), size)
 
 

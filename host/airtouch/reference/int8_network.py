@@ -166,7 +166,7 @@ def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def runs_sparse(layer: Int8Layer) -> bool:
-    """Whether blocks of four (five bytes each, two for each output's count) take less room than all weights."""
+    """Whether blocks of four (five bytes each, two an output for their count) take less room."""
     if layer.kind != "dense" or layer.weights.shape[1] % 4:
         return False
     _, counts, skips = sparse_blocks(layer.weights)
