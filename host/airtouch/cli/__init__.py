@@ -16,6 +16,7 @@ COMMANDS = {
     "evaluate": ("evaluate", "Score a detector on flights with known edges."),
     "crossval": ("crossval", "Cross-validate a detector by flight."),
     "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
+    "simulate": ("simulate", "Fly a scenario in the simulator and write flight logs."),
     "dataset": ("dataset", "Fetch the authors' public flights."),
     "demo": ("demo", "Run the whole pipeline and write an HTML report."),
 }

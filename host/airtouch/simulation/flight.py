@@ -18,6 +18,7 @@ from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
 from airtouch.vehicle import Vehicle
 
+DECIMALS = 6  #: of logged values, in their SI units
 Chosen = Mapping[str, Mapping[str, float]] | Sequence[Any]
 
 
@@ -103,7 +104,7 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     if ending != loop.OK:
         return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / 100.0)
     rng = np.random.default_rng([seed, flight, 7])
-    table = received(table, *radio, rng)
+    table = np.round(received(table, *radio, rng), DECIMALS)
     meta = {
         "source": f"{name}_{seed}_{flight:06d}", "format": "simulated", "sample_period_s": 0.01, "acc_frame": "body",
         "vehicle": vehicle.name, "scenario": name, "seed": seed, "flight": flight, "condition": plan.values,

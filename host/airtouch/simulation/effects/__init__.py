@@ -6,14 +6,13 @@ one of your own; `load_file` registers those of a Python file.
 
 import importlib
 import re
-import runpy
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
-__all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "parse", "register",
+__all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "load_text", "parse", "register",
            "unregister", "wrench"]
 
 NAMES = (
@@ -38,6 +37,8 @@ def unregister(name: str) -> None:
     """Take an effect out (the diagnosis is tested on effects that it does not know)."""
     get(name)
     del EFFECTS[name]
+    for key in [k for k, found in _LOADED.items() if any(e.name == name for e in found)]:
+        del _LOADED[key]
 
 
 def get(name: str) -> Effect:
@@ -99,8 +100,26 @@ def load_file(path: str | Path) -> list[Effect]:
     """Register every `Effect` that a Python file defines at its top level, and return them."""
     if not Path(path).is_file():
         raise AirTouchError(f"{path}: no such file of effects")
-    found = [v for v in runpy.run_path(str(path)).values() if isinstance(v, Effect)]
-    fresh = [e for e in found if EFFECTS.get(e.name) is not e]
+    return load_text(Path(path).read_text(encoding="utf-8"), str(path))
+
+
+def load_text(text: str, source: str = "effect file") -> list[Effect]:
+    """Register the effects of Python source; a second time with the same text changes nothing."""
+    key = hash(text)
+    if key in _LOADED:
+        return _LOADED[key]
+    scope: dict[str, object] = {"__name__": "airtouch_effects"}
+    try:
+        exec(compile(text, source, "exec"), scope)
+    except AirTouchError:
+        raise
+    except Exception as error:
+        raise AirTouchError(f"{source}: {type(error).__name__}: {str(error).splitlines()[0]}") from None
+    found = [v for v in scope.values() if isinstance(v, Effect)]
     if not found:
-        raise AirTouchError(f"{path}: defines no Effect")
-    return [register(e) for e in fresh]
+        raise AirTouchError(f"{source}: defines no Effect")
+    _LOADED[key] = [register(e) for e in found]
+    return _LOADED[key]
+
+
+_LOADED: dict[int, list[Effect]] = {}

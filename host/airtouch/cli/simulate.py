@@ -1,0 +1,112 @@
+"""`airtouch simulate`: fly a scenario many times and write the flight logs."""
+
+from pathlib import Path
+
+import click
+
+from airtouch.errors import AirTouchError
+
+
+def _list_effects(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if not value:
+        return
+    from airtouch.simulation.effects import EFFECTS
+
+    for effect in EFFECTS.values():
+        click.echo(f"{effect.name}: {effect.summary}")
+        for p in effect.parameters:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            click.echo(f"    {p.name} = {p.default:g}{unit}  ({p.low:g} to {p.high:g}{unit}) {p.summary}")
+    ctx.exit()
+
+
+def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if not value:
+        return
+    from airtouch.simulation import scenario
+
+    for name in scenario.names():
+        click.echo(f"{name}: {scenario.load(name).summary}")
+    ctx.exit()
+
+
+@click.command("simulate")
+@click.argument("scenario")
+@click.option("--flights", "-n", default=1, show_default=True, help="How many flights.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder for the logs.")
+@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Name or .toml file.")
+@click.option("--effect", "chosen", multiple=True, metavar="NAME[:P=V...]",
+              help="Switch an effect on, as in wind:x=0.3m/s; a scenario's own of that name is replaced.")
+@click.option("--without", multiple=True, metavar="NAME", help="Switch an effect of the scenario off.")
+@click.option("--effect-file", "files", multiple=True, help="Python file with an effect of your own.")
+@click.option("--seed", default=0, show_default=True, help="Of the whole batch.")
+@click.option("--workers", type=int, help="Threads; default one a core.")
+@click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler.")
+@click.option("--force", is_flag=True, help="Remove flights of another request from --out.")
+@click.option("--list-effects", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects,
+              help="Every effect with its parameters, and exit.")
+@click.option("--list-scenarios", is_flag=True, is_eager=True, expose_value=False, callback=_list_scenarios,
+              help="Every scenario that comes with the package, and exit.")
+def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[str, ...], without: tuple[str, ...],
+            files: tuple[str, ...], seed: int, workers: int | None, dask: str | None, force: bool) -> None:
+    """Fly SCENARIO (a built-in name or a .toml file) and write one log a flight.
+
+    The same command continues after a kill. Flights that diverge are reported with their
+    number and never written; the exit code is then 1.
+    """
+    from airtouch import vehicle as vehicles
+    from airtouch.simulation import batch, cluster, effects, store
+    from airtouch.simulation import scenario as scenarios
+    from airtouch.simulation.flight import choose
+
+    if flights < 1 or seed < 0 or (workers is not None and workers < 1):
+        raise AirTouchError("--flights and --workers must be 1 or more, --seed 0 or more")
+    plugins = [_read(path) for path in files]
+    for path in files:
+        effects.load_file(path)
+    scene, craft = scenarios.load(scenario), vehicles.load(vehicle)
+    pairs = [effects.parse(text) for text in chosen]
+    choose(scenarios.draw_flight(scene, seed, 0), pairs, without)
+    request = {"scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)), "vehicle": vars(craft),
+               "effects": pairs, "without": list(without), "seed": seed,
+               "effect_files": [store.digest(text) for text in plugins]}
+    store.open_folder(out, request, force)
+    todo = store.missing(out, scene.name, seed, flights)
+    if len(todo) < flights:
+        click.echo(f"{flights - len(todo)} of {flights} flights are there already")
+    if dask:
+        client = cluster.connect(dask)
+        results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
+                                  plugins=plugins)
+    else:
+        results = batch.flights(scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed, workers=workers)
+    _write(results, len(todo), out, scene.name)
+    there = flights - len(store.missing(out, scene.name, seed, flights))
+    lost = [f for f in store.failures(out) if f["flight"] < flights]
+    store.write_manifest(out, scene, seed, flights)
+    click.echo(f"{there - len(lost)} flights in {out}")
+    if lost:
+        for f in lost[:20]:
+            click.echo(f"airtouch: flight {f['flight']} of seed {f['seed']} diverged: {f['reason']} after "
+                       f"{f['time_s']:.2f} s; not written", err=True)
+        if len(lost) > 20:
+            click.echo(f"airtouch: and {len(lost) - 20} more, in {out / store.FAILED}", err=True)
+        raise SystemExit(1)
+
+
+def _write(results, count: int, out: Path, name: str) -> None:
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from airtouch.simulation import store
+
+    with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()) as bar:
+        task = bar.add_task("flights", total=count)
+        for result in results:
+            store.save(out, name, result)
+            bar.advance(task)
+
+
+def _read(path: str) -> str:
+    if not Path(path).is_file():
+        raise AirTouchError(f"{path}: no such file of effects")
+    return Path(path).read_text(encoding="utf-8")

@@ -1,0 +1,78 @@
+"""Many flights: deterministic per seed whatever the number of workers, bounded memory."""
+
+import itertools
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from collections import deque
+from pathlib import Path
+
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import scenario as scenarios
+from airtouch.simulation.flight import Chosen, Diverged, fly
+from airtouch.simulation.scenario import Scenario
+from airtouch.vehicle import Vehicle
+
+AHEAD = 4  #: flights in work or waiting, for each worker
+
+
+def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *, vehicle: Vehicle | str | Path | None = None,
+            effects: Chosen = (), without: Sequence[str] = (), seed: int = 0,
+            workers: int | None = None) -> Iterator[FlightLog | Diverged]:
+    """Fly and yield flights one by one, in order; at most AHEAD per worker are held in memory.
+
+    scenario, vehicle: objects, built-in names or .toml paths. count: how many flights, or
+    their numbers. A flight depends on (scenario, vehicle, effects, without, seed, its
+    number) only. workers: threads (the loop runs outside Python's lock); default one a core.
+    Raises AirTouchError for bad input before the first flight.
+    """
+    scene = scenario if isinstance(scenario, Scenario) else scenarios.load(scenario)
+    craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or "crazyflie-2.1-flow")
+    numbers = range(count) if isinstance(count, int) else count
+    workers = workers or available_cores()
+    if workers < 1:
+        raise AirTouchError("workers must be 1 or more")
+
+    def one(number: int) -> FlightLog | Diverged:
+        return fly(scene, craft, seed, number, effects=effects, without=without)
+
+    return _in_order(one, iter(numbers), workers)
+
+
+def _in_order(one, numbers: Iterator[int], workers: int) -> Iterator[FlightLog | Diverged]:
+    if workers == 1:
+        yield from map(one, numbers)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        waiting: deque[Future] = deque(pool.submit(one, n) for n in itertools.islice(numbers, AHEAD * workers))
+        try:
+            while waiting:
+                result = waiting.popleft().result()
+                waiting.extend(pool.submit(one, n) for n in itertools.islice(numbers, 1))
+                yield result
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+def simulate(scenario: Scenario | str | Path, vehicle: Vehicle | str | Path | None = None, effects: Chosen = (),
+             seeds: int | Iterable[int] = 1, *, without: Sequence[str] = (), seed: int = 0,
+             workers: int | None = None) -> list[FlightLog]:
+    """Fly `seeds` flights (how many, or their numbers) and return their logs.
+
+    Raises AirTouchError that names the first flight that does not end well.
+    """
+    logs = []
+    for result in flights(scenario, seeds, vehicle=vehicle, effects=effects, without=without, seed=seed,
+                          workers=workers):
+        if isinstance(result, Diverged):
+            raise AirTouchError(str(result))
+        logs.append(result)
+    return logs
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,110 @@
+"""A folder of simulated flights: what was asked for, what is there, what went wrong.
+
+`run.json` holds the request; a second run with another request is refused. A flight is
+written under a temporary name and renamed, so a file that is there is whole, and after a
+kill the same command flies only what is missing. Flights that diverged are listed in
+`diverged.jsonl` and have no file.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.flight import Diverged
+from airtouch.simulation.scenario import Scenario, draw_flight
+
+REQUEST, FAILED, MANIFEST = "run.json", "diverged.jsonl", "manifest.csv"
+
+
+def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -> None:
+    """Make the folder, or continue one of the same request.
+
+    Raises AirTouchError when it holds flights of another request and `force` is not given;
+    with force these flights are removed.
+    """
+    text = json.dumps(request, indent=1, sort_keys=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AirTouchError(f"{folder}: cannot make this folder: {error.strerror}") from None
+    known = folder / REQUEST
+    if known.is_file() and known.read_text() == text:
+        return
+    old = [*folder.glob("*.csv.gz"), *folder.glob("*.jsonl")]
+    if old or known.is_file():
+        if not force:
+            raise AirTouchError(f"{folder}: holds flights of another request; choose another --out, or --force")
+        for path in old:
+            path.unlink()
+    temporary = folder / f".{REQUEST}.{os.getpid()}"
+    temporary.write_text(text)
+    temporary.replace(known)
+
+
+def path_of(folder: Path, scenario: str, seed: int, flight: int) -> Path:
+    """File of one flight."""
+    return folder / f"{Path(scenario).name}_{seed}_{flight:06d}.csv.gz"
+
+
+def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
+    """Numbers of the flights that are neither there nor known to diverge."""
+    done = {p.name for p in folder.glob("*.csv.gz")}
+    gone = {d["flight"] for d in failures(folder)}
+    return [n for n in range(count) if n not in gone and path_of(folder, scenario, seed, n).name not in done]
+
+
+def failures(folder: Path) -> list[dict[str, Any]]:
+    """Flights that diverged, by number; a line cut short by a kill is skipped."""
+    path = folder / FAILED
+    found = {}
+    for line in path.read_text().splitlines() if path.is_file() else []:
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        found[entry["flight"]] = entry
+    return [found[n] for n in sorted(found)]
+
+
+def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | None:
+    """Write a flight, or note one that diverged. A flight that is already there stays."""
+    if isinstance(result, Diverged):
+        with open(folder / FAILED, "a", encoding="utf-8") as file:
+            file.write(json.dumps(vars(result)) + "\n")
+        return None
+    path = path_of(folder, scenario, result.meta["seed"], result.meta["flight"])
+    if not path.exists():
+        logs.write(result, path, force=True)
+    return path
+
+
+def write_manifest(folder: Path, scenario: Scenario, seed: int, count: int) -> None:
+    """`manifest.csv` beside the flights, as `evaluate` and `crossval` read it.
+
+    speed_mps, height, angle_deg and wind are the scenario's values speed, clearance, angle
+    and wind; folds go round by flight number.
+    """
+    lines = ["file,use,fold,height,angle_deg,wind,speed_mps"]
+    for number in range(count):
+        path = path_of(folder, scenario.name, seed, number)
+        if not path.exists():
+            continue
+        values = draw_flight(scenario, seed, number).values
+        height = f"{1000 * values['clearance']:.0f}mm" if "clearance" in values else ""
+        cells = [path.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
+                 values.get("speed", "")]
+        lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))
+    temporary = folder / f".{MANIFEST}.{os.getpid()}"
+    temporary.write_text("\n".join(lines) + "\n")
+    temporary.replace(folder / MANIFEST)
+
+
+def digest(text: str) -> str:
+    """Short name of a text, for requests."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
