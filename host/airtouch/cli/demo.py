@@ -15,7 +15,7 @@ from airtouch.detector.dataset import FlightFile
 from airtouch.detector.summary import summarise
 from airtouch.errors import AirTouchError
 
-TRAIN, TEST, EPOCHS, STEPS = 36, 12, 5, 400  #: as much as fits in the time on two cores
+TRAIN, TEST, EPOCHS, STEPS = 52, 18, 8, 800  #: as much as fits in the time on two cores
 GENERATED = 32  #: flights, where none are recorded
 SHOWN = 4  #: flights plotted in the report
 

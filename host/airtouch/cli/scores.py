@@ -27,7 +27,7 @@ def table(rows: dict[str, dict[str, Any]], title: str) -> Table:
 def console() -> Console:
     """Standard output, wide enough for the table where it is not a terminal."""
     found = Console()
-    return found if found.is_terminal else Console(width=150)
+    return found if found.is_terminal else Console(width=170)
 
 
 def left_out(failures: list[tuple[str, str]], scored: int) -> None:
