@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from airtouch.errors import AirTouchError
-from airtouch.kernels import stream
+from airtouch.kernels.stream import arena_bytes, run_stream as run_c
 from airtouch.reference.int8_network import Int8Layer
 from airtouch.reference.stream_int8 import StreamConv, StreamNetwork, run_stream
 
@@ -38,7 +38,7 @@ def test_c_equals_numpy(seed, width, taps, stride, first_skip, sparsity, dilatio
     net = network(seed, width=width, taps=taps, dilations=tuple(dilations), stride=stride,
                   first_skip=first_skip, sparsity=sparsity)
     x = np.random.default_rng(seed).integers(-128, 128, (samples, net.channels)).astype(np.int8)
-    assert np.array_equal(stream.run_stream(net, x), run_stream(net, x))
+    assert np.array_equal(run_c(net, x), run_stream(net, x))
 
 
 def test_an_output_depends_on_the_receptive_field_and_nothing_else():
@@ -64,7 +64,7 @@ def _bump(x, row, step):
 def test_the_windowed_form_gives_the_same_bits():
     net = network(3, sparsity=0.5)
     x = np.random.default_rng(4).integers(-128, 128, (300, net.channels)).astype(np.int8)
-    streamed = stream.run_stream(net, x)
+    streamed = run_c(net, x)
     length = net.receptive_samples + -(net.receptive_samples - 1) % net.stride  # whole strides before the last
     for end in range(length + -length % net.stride + 1, len(x), 7 * net.stride):
         assert np.array_equal(run_stream(net, x[end - length:end])[-1], streamed[(end - 1) // net.stride])
@@ -73,9 +73,9 @@ def test_the_windowed_form_gives_the_same_bits():
 def test_bad_networks_are_refused():
     good = network(5)
     with pytest.raises(AirTouchError, match="needs samples"):
-        stream.run_stream(good, np.zeros((10, 5), np.int8))
+        run_c(good, np.zeros((10, 5), np.int8))
     wider = StreamNetwork(good.convs[:1] + network(6, width=12).convs[1:], good.head, 2, 1)
     with pytest.raises(AirTouchError, match="layer 1 does not fit"):
-        stream.arena_bytes(wider)
+        arena_bytes(wider)
     with pytest.raises(AirTouchError, match="layer 4 does not fit"):
-        stream.arena_bytes(StreamNetwork(good.convs, good.head, 2, 2))
+        arena_bytes(StreamNetwork(good.convs, good.head, 2, 2))

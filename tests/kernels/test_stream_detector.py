@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 from airtouch import logs
 from airtouch.detector.channels import level_acceleration
 from airtouch.errors import AirTouchError
-from airtouch.kernels import stream_detector as c
+from airtouch import kernels as c
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.edge_decoder import DecoderConfig, edge_decoder
 from airtouch.reference.int8_network import quantise

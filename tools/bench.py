@@ -1,0 +1,179 @@
+"""Benchmarks against the peers, each in the same run: `make bench`.
+
+Every pair is timed in turn (A B A B ...), after one warm-up; the ratio is the median of the pairs'.
+"""
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.signal import ShortTimeFFT
+
+from airtouch import kernels, logs
+from airtouch.cli.flights import find_flights
+from airtouch.detector import best, dataset, paper
+from airtouch.detector.channels import nine_channels
+from airtouch.detector.features import flight_features
+from airtouch.detector.stream.batches import channels_of
+from airtouch.detector.stream.recipe import CHANNELS, STRIDE
+from airtouch.kernels.network import run_int8
+from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT
+from airtouch.reference.int8_network import quantise
+
+PAIRS = 7
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Wall time of one call."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def compare(ours: Callable[[], object], peer: Callable[[], object]) -> tuple[float, float, float]:
+    """Median seconds of ours and of the peer, and median ratio peer / ours."""
+    ours(), peer()
+    pairs = [(seconds(ours), seconds(peer)) for _ in range(PAIRS)]
+    return (*(statistics.median(column) for column in zip(*pairs)), statistics.median(b / a for a, b in pairs))
+
+
+def flights(limit: int) -> list[FlightLog]:
+    """Recorded flights where there are any, else made ones."""
+    folder = find_flights()
+    if folder is not None:
+        return [logs.read(file.path) for file in dataset.collect([folder])[:limit]]
+    from airtouch.simulation.minimal import simulate
+
+    return [simulate(seed) for seed in range(min(limit, 8))]
+
+
+def scipy_band_power(x: np.ndarray) -> np.ndarray:
+    """The same band power by SciPy's short-time Fourier transform, hop 1, all bins of it: (windows, c)."""
+    n = DEFAULT.band_window
+    transform = ShortTimeFFT(np.hanning(n + 1)[:-1], 1, DEFAULT.sample_rate_hz, scale_to="psd", fft_mode="onesided2X")
+    power = transform.spectrogram(x, axis=0, p0=n // 2, p1=len(x) - n // 2 + 1)
+    chosen = (transform.f >= DEFAULT.band_low_hz) & (transform.f <= DEFAULT.band_high_hz)
+    return np.moveaxis(power[chosen].sum(axis=0) * transform.delta_f, -1, 0)
+
+
+def bench_band_power(table: Table, some: list[FlightLog]) -> None:
+    """FC-FE of nine channels, a flight."""
+    inputs = [nine_channels(log) for log in some]
+    ours = kernels.band_power(inputs[0])[DEFAULT.band_window - 1:]
+    peer = scipy_band_power(inputs[0].astype(np.float64))
+    error = np.abs(ours - peer).max(axis=0) / np.abs(peer).max(axis=0)
+    assert error.max() < 1e-3, f"the two do not compute the same: {error}"
+    a, b, ratio = compare(lambda: [kernels.band_power(x) for x in inputs],
+                          lambda: [scipy_band_power(x) for x in inputs])
+    row(table, "band power, 9 channels, a flight", a / len(some), b / len(some), ratio,
+        "scipy.signal.ShortTimeFFT", f"n = {len(some)} flights")
+
+
+def bench_pipelines(table: Table, some: list[FlightLog]) -> None:
+    """Whole detectors against real time."""
+    flown = sum(len(log) for log in some) / 100
+    for name, detector in (("paper", paper), ("best", best)):
+        model = detector.load(None)
+        detector.run(some[0], model)
+        spent = statistics.median(seconds(lambda: [detector.run(log, model) for log in some]) for _ in range(3))
+        table.add_row(f"{name} detector, a flight", f"{1e3 * spent / len(some):.2f} ms", "", f"{flown / spent:.0f}x",
+                      "real time", f"n = {len(some)} flights, {flown:.0f} s")
+
+
+def bench_inference(table: Table, some: list[FlightLog]) -> None:
+    """int8 networks, one window: both ours against tflite-micro and LiteRT on the same file."""
+    model = paper.load(None)
+    fused = [flight_features(log).fused for log in some]
+    windows = np.concatenate([f[np.isfinite(f).all(axis=1)][:1000].reshape(-1, 100, 3) for f in fused])[:200]
+    first = model.int8.layers[0]
+    q = quantise(np.stack([kernels.z_score_window(w) for w in windows]), first.input_scale, first.input_zero_point)
+    row_of_peers(table, "paper network, a window", lambda: run_int8(model.int8, q), model.tflite, q[..., None])
+    stream = best.load(None)
+    channels = channels_of(some[0])[0]
+    layer = stream.int8.convs[0].layer
+    quantised = quantise(channels, layer.input_scale, layer.input_zero_point)
+    length = stream.recipe.receptive_samples
+    ends = np.linspace(length, len(quantised), 40).astype(int)
+    cut = np.stack([quantised[e - length:e] for e in ends]).reshape(-1, 1, length, CHANNELS)
+    part = quantised[:STRIDE * len(cut)]  # as many rows computed as the peers compute windows
+    row_of_peers(table, "best network, a step", lambda: kernels.run_stream(stream.int8, part), stream.tflite, cut)
+
+
+def row_of_peers(table: Table, name: str, ours: Callable[[], object], tflite: bytes, q: np.ndarray) -> None:
+    """One row a peer; q holds one quantised input a window."""
+    for peer, invoke in (("tflite-micro", micro(tflite)), ("LiteRT", litert(tflite))):
+        if invoke is None:
+            continue
+        a, b, ratio = compare(ours, lambda: [invoke(x[None]) for x in q])
+        row(table, name, a / len(q), b / len(q), ratio, peer, f"n = {len(q)}")
+
+
+def micro(content: bytes) -> Callable | None:
+    """tflite-micro's interpreter as a function."""
+    from tflite_micro.python.tflite_micro import runtime
+
+    interpreter = runtime.Interpreter.from_bytes(content, arena_size=1 << 20)
+
+    def invoke(x: np.ndarray) -> np.ndarray:
+        interpreter.set_input(x, 0)
+        interpreter.invoke()
+        return interpreter.get_output(0)
+
+    return invoke
+
+
+def litert(content: bytes) -> Callable | None:
+    """LiteRT's interpreter on one thread, None where it is not installed."""
+    try:
+        from ai_edge_litert.interpreter import Interpreter
+    except ImportError:
+        return None
+    interpreter = Interpreter(model_content=content, num_threads=1)
+    interpreter.allocate_tensors()
+    source, result = interpreter.get_input_details()[0]["index"], interpreter.get_output_details()[0]["index"]
+
+    def invoke(x: np.ndarray) -> np.ndarray:
+        interpreter.set_tensor(source, x)
+        interpreter.invoke()
+        return interpreter.get_tensor(result)
+
+    return invoke
+
+
+def bench_training(table: Table, some: list[FlightLog]) -> None:
+    """Training of the shipped models' size, once."""
+    for name, detector in (("paper", paper), ("best", best)):
+        spent = seconds(lambda: detector.fit(some, seed=0))
+        table.add_row(f"training {name}", f"{spent:.0f} s", "", "", "", f"n = {len(some)} flights")
+
+
+def row(table: Table, name: str, ours: float, peer: float, ratio: float, what: str, note: str) -> None:
+    """One comparison."""
+    table.add_row(name, f"{1e6 * ours:.1f} us", f"{1e6 * peer:.1f} us", f"{ratio:.1f}x", what, note)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--flights", type=int, default=20, help="how many (default 20)")
+    parser.add_argument("--train", action="store_true", help="time the training on all of them as well")
+    options = parser.parse_args()
+    some = flights(options.flights)
+    table = Table(title=f"Benchmarks, median of {PAIRS} pairs, one thread", title_justify="left")
+    for name in ("what", "ours", "peer", "faster", "peer is", ""):
+        table.add_column(name)
+    bench_band_power(table, some)
+    bench_pipelines(table, some)
+    bench_inference(table, some)
+    if options.train:
+        bench_training(table, flights(1000))
+    Console(width=130).print(table)
+
+
+if __name__ == "__main__":
+    main()
