@@ -28,7 +28,8 @@ def flights(client: Any, scenario: Scenario, numbers: Sequence[int], *, vehicle:
         return client.submit(_one, scenario, vehicle, seed, number, effects, tuple(without), tuple(plugins),
                              pure=False, retries=3, key=f"airtouch-{scenario.name}-{seed}-{number}")
 
-    running = as_completed([send() for _ in range(min(AHEAD, len(waiting)))])
+    with client.as_current():
+        running = as_completed([send() for _ in range(min(AHEAD, len(waiting)))])
     for future in running:
         result = future.result()
         future.release()

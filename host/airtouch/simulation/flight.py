@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
-from airtouch.simulation import loop
+from airtouch.simulation import controller, loop
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.effect import PARAMETERS, wrench
@@ -103,6 +103,9 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
                             len(acting), parameters, streams, core, table)
     if ending != loop.OK:
         return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / 100.0)
+    climb = plan.setpoints[:, controller.Z].max() - plan.setpoints[0, controller.Z]
+    if np.ptp(table[:, loop.PLACE + 2]) < 0.5 * climb:
+        return Diverged(name, seed, flight, "it did not take off", len(table) / 100.0)
     rng = np.random.default_rng([seed, flight, 7])
     table = np.round(received(table, *radio, rng), DECIMALS)
     meta = {
