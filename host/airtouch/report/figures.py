@@ -11,7 +11,7 @@ from airtouch.detector.calibration import BINS, expected_calibration_error
 from airtouch.detector.channels import NAMES
 from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore
 from airtouch.detector.trace import Trace
-from airtouch.logs import Edge
+from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
 
 TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
@@ -26,12 +26,14 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def flight(log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace]) -> bytes:
+def flight(
+    log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace], name: str = "detected"
+) -> bytes:
     """One flight from signals to edges, all panes over the same seconds.
 
     Signals, band power, probability with detected and true edges, disturbance force
     with its FR-CFAR threshold, down range. Panes whose signal the trace lacks are left out.
-    others: detectors whose edges are shown below those of `trace`.
+    others: detectors whose edges are shown below those of `trace`, which is called `name`.
     """
     panes = [_accelerations, _rates, _motors] if "channels" in trace.signals else []
     panes += [_band_power] if "band_power" in trace.signals else []
@@ -43,7 +45,7 @@ def flight(log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: M
         axes = figure.subplots(len(panes), 1, sharex=True, squeeze=False)[:, 0]
         t = np.arange(len(log)) * SAMPLE_PERIOD_S
         for ax, pane in zip(axes, panes, strict=True):
-            pane(ax, t, log, trace, others)
+            pane(ax, t, log, trace, {name: trace, **others})
             for edge in edges or ():
                 ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=TRUE, lw=1.2, ls="--", alpha=0.8)
             ax.margins(x=0)
@@ -124,8 +126,7 @@ def _probability(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: objec
     ax.set_ylabel("P(over)", fontsize=8)
 
 
-def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, others: Mapping[str, Trace]) -> None:
-    rows = {"detected": trace, **others}
+def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, rows: Mapping[str, Trace]) -> None:
     for row, (name, some) in enumerate(rows.items()):
         for kind, marker in KINDS.items():
             samples = [e.sample for e in some.edges if e.kind == kind]
@@ -139,7 +140,8 @@ def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, others: Mappin
 def _force(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
     force = trace.signals["force"][:, 2] * 1000
     ax.plot(t, force, lw=0.6)
-    _finish(ax, "force f_w,z\nmN", force, legend=False)
+    flying = airborne(log)  # on the ground it is the weight
+    _finish(ax, "force f_w,z\nmN", force[flying] if flying.any() else force, legend=False)
 
 
 def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:

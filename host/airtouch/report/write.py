@@ -58,7 +58,7 @@ def write_report(
                     f"{first} by wind": summary.by_wind(scores[first])},
         errors=embed(figures.error_distribution(scores)), reliability=embed(figures.reliability(scores)),
         flights=[{"name": f.score.file, "text": in_words(f.score),
-                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others))} for f in flights],
+                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)
 
