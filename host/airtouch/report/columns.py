@@ -4,10 +4,10 @@ from typing import Any
 
 #: column -> (key of the summary, format); misses and false edges always stand beside the error
 COLUMNS = {
-    "mean |error|, m": ("mean_abs_error_m", "{:.3f}"),
-    "s": ("mean_abs_error_s", "{:.2f}"),
     "missed": ("missed", "{:.0%}"),
     "false/min": ("false_per_minute", "{:.1f}"),
+    "mean |error|, m": ("mean_abs_error_m", "{:.3f}"),
+    "s": ("mean_abs_error_s", "{:.2f}"),
     "in 0.05 m": ("hit/0.05", "{:.0%}"),
     "in 0.10 m": ("hit/0.10", "{:.0%}"),
     "in 0.25 m": ("hit/0.25", "{:.0%}"),
