@@ -17,7 +17,8 @@ from airtouch.detector import crossval, dataset, evaluate
 @click.option("--detector", default="paper", show_default=True, help="paper, baseline, ...")
 @click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
               help="Drop edges without an FR-CFAR alert.")
-@click.option("--epochs", type=click.IntRange(1), help="Training epochs; the detector's own number if left out.")
+@click.option("--epochs", type=click.IntRange(1),
+              help="Training epochs; the detector's own number if left out.")
 @click.option("--seed", default=0, show_default=True, help="Of training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")
@@ -30,7 +31,8 @@ from airtouch.detector import crossval, dataset, evaluate
 @click.option("--ledger", type=click.Path(path_type=Path),
               help="Append a line to this file: how often the folds were looked at.")
 def command(folder: Path | None, detector: str, physical_filter: bool, epochs: int | None, seed: int,
-            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool, ledger: Path | None) -> None:
+            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
+            ledger: Path | None) -> None:
     """Cross-validate a detector over the folds of FOLDER's manifest.csv, split by flight.
 
     Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
@@ -57,8 +59,9 @@ def command(folder: Path | None, detector: str, physical_filter: bool, epochs: i
     if random_windows:
         leak = crossval.random_windows(files, seed=seed, epochs=random_epochs)
         result["random_windows"] = leak
-        screen.print(f"random split of windows (leaks): balanced window accuracy {leak['balanced_accuracy']:.1%} on "
-                     f"{leak['windows']} windows after {leak['epochs']} epochs; "
+        screen.print("random split of windows (leaks): balanced window accuracy "
+                     f"{leak['balanced_accuracy']:.1%} on {leak['windows']} windows "
+                     f"after {leak['epochs']} epochs; "
                      f"by flight {result['balanced_accuracy']:.1%}")
     if json_path:
         show.write_json(json_path, result, force)
@@ -72,7 +75,8 @@ def command(folder: Path | None, detector: str, physical_filter: bool, epochs: i
 
 def note(ledger: Path, title: str, result: dict) -> None:
     """One line more in the ledger of looks at the folds."""
-    figures = {key: result[key] for key in ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy")}
+    named = ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy")
+    figures = {key: result[key] for key in named}
     line = f"- {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {title}: {json.dumps(figures)}\n"
     with ledger.open("a", encoding="utf-8") as handle:
         handle.write(line)

@@ -24,7 +24,7 @@ SHOWN = 4  #: flights plotted in the report
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/demo"), show_default=True,
               help="Folder for the report, the model and generated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
-              help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else they are generated.")
+              help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else generated.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
               help="Commanded speed of flights whose manifest does not say.")
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
@@ -47,9 +47,10 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     click.echo(f"  {where}: {len(train)} to train on, {len(test)} held out, split by flight")
     training, left_out = readable(train)
 
-    steps.say(f"Training, short: {epochs} epochs, pruned, quantised to int8; thresholds from training flights")
+    steps.say(f"Training, short: {epochs} epochs, pruned, int8; thresholds from training flights")
     short = {"paper": {"epochs": epochs}, "best": {"steps": STEPS}}
-    models = {name: fit(name, training, short.get(name, {})) for name in sorted(registry.DETECTORS, key=order)}
+    names = sorted(registry.DETECTORS, key=order)
+    models = {name: fit(name, training, short.get(name, {})) for name in names}
 
     steps.say("Export: C sources for the GAP8")
     export(models["paper"], out)
@@ -86,7 +87,9 @@ class Steps:
         click.echo(f"\n[{time.monotonic() - self.started:4.0f} s] {self.number}. {what}")
 
 
-def flights_of(out: Path, folder: Path | None, speed: float | None) -> tuple[list[FlightFile], list[FlightFile], str]:
+def flights_of(
+    out: Path, folder: Path | None, speed: float | None
+) -> tuple[list[FlightFile], list[FlightFile], str]:
     """(training flights, held-out flights, what they are)."""
     folder = folder or find_flights()
     if folder is not None:
@@ -94,7 +97,8 @@ def flights_of(out: Path, folder: Path | None, speed: float | None) -> tuple[lis
     else:
         files, where = generated(out / "flights"), f"flights from the built-in generator ({out / 'flights'})"
     if len(files) < 4:
-        raise AirTouchError(f"{folder}: {len(files)} flights are too few to train and to test; at least 4 are needed")
+        raise AirTouchError(f"{folder}: {len(files)} flights are too few to train and to test; "
+                            "at least 4 are needed")
     fold = [i if f.condition.fold is None else f.condition.fold for i, f in enumerate(files)]
     test = [f for f, k in zip(files, fold, strict=True) if k % 4 == 0]
     train = [f for f, k in zip(files, fold, strict=True) if k % 4 != 0]
@@ -167,11 +171,14 @@ def write(path: Path, where: str, results: dict[str, list[evaluate.Result]], mod
 
     first = sorted(results["paper"], key=badness)
     chosen = [first[i * (len(first) - 1) // max(SHOWN - 1, 1)] for i in range(min(SHOWN, len(first)))]
-    by_file = {name: {r.score.file: r.trace for r in some} for name, some in results.items() if name != "paper"}
+    others = {name: {r.score.file: r.trace for r in some} for name, some in results.items()
+              if name != "paper"}
     shown = [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
-                         {name: traces[r.score.file] for name, traces in by_file.items() if r.score.file in traces})
+                         {name: found[r.score.file] for name, found in others.items()
+                          if r.score.file in found})
              for r in chosen]
-    write_report(path, f"AirTouch demo: {where}", {n: [r.score for r in some] for n, some in results.items()}, shown,
+    scores = {name: [r.score for r in some] for name, some in results.items()}
+    write_report(path, f"AirTouch demo: {where}", scores, shown,
                  parameters={f"{n}: {key}": value for n, model in models.items()
                              for key, value in registry.get(n).parameters(model).items()},
                  command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)

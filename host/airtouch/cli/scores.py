@@ -15,12 +15,14 @@ from airtouch.report.columns import COLUMNS, cell
 def table(rows: dict[str, dict[str, Any]], title: str) -> Table:
     """A table of summaries, one row each, with intervals."""
     result = Table(title=title, title_justify="left", show_lines=True, caption_justify="left",
-                   caption="second line: 95 % interval, bootstrap by flight. A miss has no detection within 1.5 s; "
-                           "a detection serves one edge, the others are false. Hits: share of all true edges.")
+                   caption="second line: 95 % interval, bootstrap by flight. A miss has no detection within "
+                           "1.5 s; a detection serves one edge, the others are false. "
+                           "Hits: share of all true edges.")
     for name in ("", "flights", "edges", *COLUMNS):
         result.add_column(name, justify="left" if not name else "right")
     for name, row in rows.items():
-        result.add_row(name, str(row["flights"]), str(row["edges"]), *(cell(row, *how) for how in COLUMNS.values()))
+        cells = (cell(row, *how) for how in COLUMNS.values())
+        result.add_row(name, str(row["flights"]), str(row["edges"]), *cells)
     return result
 
 

@@ -121,7 +121,8 @@ def derivative(values: np.ndarray, smoothing: int) -> np.ndarray:
     first = int(known[0])
     total = np.concatenate([[0.0], np.cumsum(values[first:])])
     means = (total[smoothing:] - total[:-smoothing]) / smoothing
-    result[first + 2 * smoothing - 1:] = (means[smoothing:] - means[:-smoothing]) / (smoothing * SAMPLE_PERIOD_S)
+    difference = means[smoothing:] - means[:-smoothing]
+    result[first + 2 * smoothing - 1:] = difference / (smoothing * SAMPLE_PERIOD_S)
     return result
 
 

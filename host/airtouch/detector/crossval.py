@@ -27,7 +27,8 @@ def folds_of(files: Sequence[FlightFile]) -> dict[int, list[FlightFile]]:
     folds: dict[int, list[FlightFile]] = {}
     for file in files:
         if file.condition.fold is None:
-            raise AirTouchError(f"{file.path}: no fold in the manifest beside it; add a column 'fold' (0, 1, ...)")
+            raise AirTouchError(f"{file.path}: no fold in the manifest beside it; "
+                                "add a column 'fold' (0, 1, ...)")
         folds.setdefault(file.condition.fold, []).append(file)
     if len(folds) < 2:
         raise AirTouchError("cross-validation needs at least two folds; the manifest's column 'fold' has "
@@ -43,14 +44,16 @@ def crossval(
     seed: int = 0,
     options: dict[str, Any] | None = None,
     physical_filter: bool = True,
+    detector: Detector | None = None,
     tell: Tell = lambda _: None,
 ) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
     """(scores of all flights, one entry a fold, flights left out).
 
     Finished folds are kept in `out` and not done again for the same flights, settings and version.
     options go to the detector's `fit`. physical_filter False chooses the decoding again without it.
+    detector: one that is not registered, under the name given.
     """
-    detector = get(name)
+    detector = detector or get(name)
     if not physical_filter and not hasattr(detector, "retune"):
         raise AirTouchError(f"{name} has no physical filter to switch off")
     folds = folds_of(files)
@@ -72,7 +75,8 @@ def crossval(
                 model = detector.retune(model, train, False)
             results = [evaluate.evaluate_flight(f, readable[f.path], detector, model).score for f in test]
             entry = {"fold": fold, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
-                     "seconds": round(time.monotonic() - started, 1), "per_flight": [s.as_dict() for s in results]}
+                     "seconds": round(time.monotonic() - started, 1),
+                     "per_flight": [s.as_dict() for s in results]}
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
         else:
             tell(f"fold {fold}: done before, {cache.name}")
@@ -98,7 +102,7 @@ def readable_flights(files: Sequence[FlightFile]) -> tuple[dict[Path, FlightLog]
 
 def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, seed: int,
                   options: dict[str, Any]) -> Any:
-    """The fold's model from `path`, else trained now and kept there where the detector's models can be saved."""
+    """The fold's model from `path`, else trained now and kept there, where it can be saved."""
     if path.exists():
         return detector.load(path)
     model = detector.fit(flights, seed=seed, **options)
@@ -136,7 +140,8 @@ def cache_key(name: str, files: Sequence[FlightFile], fold: int, seed: int, opti
     total = hashlib.sha256(f"{__version__} {name} {fold} {seed} {sorted(options.items())}".encode())
     for file in files:
         stat = os.stat(file.path) if file.path.exists() else None
-        total.update(f"{file.path.name} {file.condition} {stat and (stat.st_size, stat.st_mtime_ns)}".encode())
+        content = stat and (stat.st_size, stat.st_mtime_ns)
+        total.update(f"{file.path.name} {file.condition} {content}".encode())
     return total.hexdigest()[:12]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from airtouch.errors import AirTouchError
 
 MANIFEST = "manifest.csv"
+SUFFIXES = (".csv", ".csv.gz", ".parquet")  #: what counts as a log in a folder without one
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ def read_manifest(path: Path) -> dict[str, Condition]:
         with path.open(encoding="utf-8-sig", newline="") as handle:
             reader = csv.DictReader(handle)
             if "file" not in (reader.fieldnames or ()):
-                raise AirTouchError(f"{path}:1: no column 'file' in the header; the first line must name the columns")
+                raise AirTouchError(f"{path}:1: no column 'file' in the header; "
+                                    "the first line must name the columns")
             conditions: dict[str, Condition] = {}
             for row in reader:
                 place = f"{path}:{reader.line_num}"
@@ -90,9 +92,10 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
     if listed:
         files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
     else:
-        files = sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith((".csv", ".csv.gz", ".parquet")))
+        files = sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith(SUFFIXES))
     if not files:
-        raise AirTouchError(f"{folder}: no flights in this folder (.csv, .csv.gz or .parquet, clean in its manifest)")
+        raise AirTouchError(f"{folder}: no flights in this folder "
+                            "(.csv, .csv.gz or .parquet, clean in its manifest)")
     return files
 
 
@@ -110,4 +113,5 @@ def _condition(row: dict[str, str | None], place: str) -> Condition:
     speed = number("speed_mps")
     if speed is not None and not 0 < speed < 100:
         raise AirTouchError(f"{place}: speed_mps is {speed:g}, it must be above 0 and below 100")
-    return Condition(text("use"), number("fold", int), text("height"), number("angle_deg"), text("wind"), speed)
+    return Condition(text("use"), number("fold", int), text("height"), number("angle_deg"), text("wind"),
+                     speed)

@@ -64,7 +64,8 @@ def check(log: FlightLog) -> None:
             raise AirTouchError(f"{log.source}: {name} is constant in flight; the sensor or the log is stuck")
     for a in range(3):
         if np.corrcoef(used[:, a], used[:, 3 + a])[0, 1] > 0.999999:
-            raise AirTouchError(f"{log.source}: {NAMES[3 + a]} is a copy of {NAMES[a]}; log the gyro or leave it out")
+            raise AirTouchError(f"{log.source}: {NAMES[3 + a]} is a copy of {NAMES[a]}; "
+                                "log the gyro or leave it out")
 
 
 def truth(log: FlightLog) -> list[logs.Edge] | None:

@@ -84,15 +84,26 @@ def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = Tru
         edges = unfiltered(settings.probability_entry, settings.probability_exit, settings.dwell_samples, i)
         return filtered(edges, seen[i][2], settings.alert_hold) if physical_filter else edges
 
+    holds = HOLD if physical_filter else HOLD[:1]
     candidates = [
-        replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell, alert_hold=hold)
-        for entry, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, HOLD if physical_filter else HOLD[:1])
-        if leave < entry
+        replace(DEFAULT, probability_entry=enter, probability_exit=leave, dwell_samples=dwell,
+                alert_hold=hold)
+        for enter, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, holds)
+        if leave < enter
     ]
     settings, lag, score = tuning.choose(candidates, truth, detect)
     return replace(model, metadata={
         **model.metadata, "parameters": asdict(settings), "lag_s": lag, "physical_filter": physical_filter,
         "tuned_on": [os.path.basename(log.source) for log in flights], "tuned_timed_f1": score})
+
+
+def candidates(physical_filter: bool) -> list[Parameters]:
+    """The decoding settings that tuning chooses from."""
+    return [
+        replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell, alert_hold=hold)
+        for entry, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, HOLD if physical_filter else HOLD[:1])
+        if leave < entry
+    ]
 
 
 def load(path: Path | None) -> Model:
@@ -108,7 +119,8 @@ def lag_s(model: Model | None) -> float:
 def parameters(model: Model | None) -> dict[str, Any]:
     """Pipeline and decoding settings, and how the network was trained."""
     metadata = (model or load(None)).metadata
-    named = ("seed", "epochs", "epochs_run", "sparsity", "block", "lambda", "physical_filter", "tuned_timed_f1")
+    named = ("seed", "epochs", "epochs_run", "sparsity", "block", "lambda", "physical_filter",
+             "tuned_timed_f1")
     return {**metadata.get("parameters", asdict(DEFAULT)), **{k: metadata[k] for k in named if k in metadata}}
 
 
@@ -120,12 +132,14 @@ def decoding(model: Model) -> tuple[Parameters, bool]:
         raise AirTouchError("the model's parameters are not those of this version; train it again") from None
 
 
-def pipeline(log: FlightLog, settings: Parameters, probability: np.ndarray | None, filtered: bool) -> EdgeEvents:
+def pipeline(
+    log: FlightLog, settings: Parameters, probability: np.ndarray | None, physical: bool
+) -> EdgeEvents:
     """One flight through the C pipeline."""
     return kernels.edge_pipeline(
         level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicles.load(),
         vbat_v=log["vbat_V"] if log.has("vbat_V") else None, thrust_axis=thrust_axis(log),
-        probability=probability, config=EdgePipelineConfig(settings, physical_filter=filtered))
+        probability=probability, config=EdgePipelineConfig(settings, physical_filter=physical))
 
 
 def signals(features: Features) -> dict[str, np.ndarray]:

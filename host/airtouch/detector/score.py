@@ -166,7 +166,7 @@ def score_flight(
     if not np.isfinite(probability).any():
         known, said = airborne, over_platform(detections, len(airborne))
     windows = tuple(
-        int(np.count_nonzero(mask)) for mask in (known & over & said, known & over, known & ~over & ~said, known & ~over)
+        int(np.count_nonzero(known & mask)) for mask in (over & said, over, ~over & ~said, ~over)
     )
     bins = reliability(np.where(airborne, probability, np.nan), over)
     return FlightScore(file, condition, edges, false, len(detections), airborne_s, windows, bins)

@@ -9,7 +9,7 @@ from airtouch.detector.calibration import expected_calibration_error
 from airtouch.detector.dataset import Condition
 from airtouch.detector.score import HIT_RADII_M, FlightScore
 
-#: Classes of height that are also reported together: 75 to 85 mm, where the lift is too weak to carry the edge.
+#: Height classes also reported together: 75 to 85 mm, where the lift is too weak to carry the edge.
 HIGH = ("h82", "h85")
 
 
@@ -69,7 +69,10 @@ def by_height(scores: Sequence[FlightScore]) -> dict[str, dict]:
 
 def by_angle(scores: Sequence[FlightScore]) -> dict[str, dict]:
     """By the approach angle in degrees."""
-    return breakdown(scores, lambda s: None if s.condition.angle_deg is None else f"{s.condition.angle_deg:+g}")
+    def angle(score: FlightScore) -> str | None:
+        return None if score.condition.angle_deg is None else f"{score.condition.angle_deg:+g}"
+
+    return breakdown(scores, angle)
 
 
 def by_wind(scores: Sequence[FlightScore]) -> dict[str, dict]:
@@ -118,7 +121,8 @@ def _statistics(sums: Sums) -> dict[str, np.ndarray]:
         "mean_error_s": _ratio(sums["signed_s"], sums["n"]),
         "missed": _ratio(sums["missed"], sums["true"]),
         "false_per_minute": _ratio(sums["false"], sums["minutes"]),
-        "balanced_accuracy": 0.5 * (_ratio(sums["over_found"], sums["over"]) + _ratio(sums["rest_found"], sums["rest"])),
+        "balanced_accuracy": 0.5 * (
+            _ratio(sums["over_found"], sums["over"]) + _ratio(sums["rest_found"], sums["rest"])),
     }
     for kind in ("entry", "exit"):
         for unit in ("m", "s"):

@@ -16,7 +16,8 @@ def lag(flights: Iterable[Flight]) -> float:
     """Median seconds from a true edge to its detection (positive is late); 0 without any match."""
     delays = []
     for true, detections in flights:
-        for i, j in match([e.sample for e in true], [d.sample for d in detections], TOLERANCE_S / SAMPLE_PERIOD_S):
+        places = [d.sample for d in detections]
+        for i, j in match([e.sample for e in true], places, TOLERANCE_S / SAMPLE_PERIOD_S):
             delays.append((detections[j].sample - true[i].sample) * SAMPLE_PERIOD_S)
     return float(np.median(delays)) if delays else 0.0
 

@@ -27,7 +27,8 @@ def png(figure: Figure) -> bytes:
 
 
 def flight(
-    log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace], name: str = "detected"
+    log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace],
+    name: str = "detected",
 ) -> bytes:
     """One flight from signals to edges, all panes over the same seconds.
 
@@ -84,7 +85,8 @@ def error_distribution(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
             edges = [e for s in some for e in s.edges]
             errors = np.sort([abs(e.error_m) for e in edges if e.error_m is not None])
             if edges:
-                ax.step(np.r_[0.0, errors, 1.0], np.r_[0.0, np.arange(1, len(errors) + 1), len(errors)] / len(edges),
+                found = np.r_[0.0, np.arange(1, len(errors) + 1), len(errors)]
+                ax.step(np.r_[0.0, errors, 1.0], found / len(edges),
                         where="post", color=colour, label=f"{name}, {len(edges)} edges")
         ax.set(xlim=(0, 0.5), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges",
                title="Edges found within a distance")
@@ -147,7 +149,8 @@ def _force(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> 
 def _cfar(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
     power = np.maximum(trace.signals["cfar_power"].astype(float), 1e-12)
     ax.semilogy(t, power, lw=0.6, label="tested")
-    ax.semilogy(t, np.maximum(trace.signals["threshold"].astype(float), 1e-12), lw=0.9, color=OTHER, label="threshold T")
+    threshold = np.maximum(trace.signals["threshold"].astype(float), 1e-12)
+    ax.semilogy(t, threshold, lw=0.9, color=OTHER, label="threshold T")
     alert = trace.signals["alert"].astype(bool)
     ax.plot(t[alert], power[alert], ".", ms=5, color="black", label="alert")
     ax.set_ylim(max(float(np.nanpercentile(power, 5)), 1e-10), None)

@@ -50,7 +50,8 @@ def write_report(
     first = next(iter(scores))
     summaries = {name: summary.summarise(some) for name, some in scores.items()}
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
-    template = environment.from_string((resources.files("airtouch.report") / "report.html").read_text("utf-8"))
+    source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
+    template = environment.from_string(source)
     page = template.render(
         title=title, answer=answer(first, summaries[first]), summaries=summaries, columns=COLUMNS, cell=cell,
         breakdowns={f"{first} by height": summary.by_height(scores[first]),
@@ -66,11 +67,13 @@ def write_report(
 def answer(name: str, table: Mapping[str, Any]) -> str:
     """The result in one sentence."""
     if not table["edges"]:
-        return f"{name}: {table['detections']} edges detected on {table['flights']} flights; the truth is not known."
+        return (f"{name}: {table['detections']} edges detected on {table['flights']} flights; "
+                "there is no true edge to compare with.")
     error = table["mean_abs_error_m"]
     found = "none was found" if error is None else f"mean distance error of those found {error:.3f} m"
-    return (f"{name} on {table['flights']} flights with {table['edges']} edges: {table['missed_count']} missed "
-            f"({table['missed']:.0%}), {table['false_count']} false ({table['false_per_minute']:.1f} a minute), {found}.")
+    return (f"{name} on {table['flights']} flights with {table['edges']} edges: "
+            f"{table['missed_count']} missed ({table['missed']:.0%}), {table['false_count']} false "
+            f"({table['false_per_minute']:.1f} a minute), {found}.")
 
 
 def in_words(score: FlightScore) -> str:
@@ -82,7 +85,8 @@ def in_words(score: FlightScore) -> str:
         else:
             metres = "" if edge.error_m is None else f" ({abs(edge.error_m):.3f} m)"
             side = "early" if edge.error_s > 0 else "late"
-            parts.append(f"{edge.kind} at {edge.true_sample / 100:.2f} s found {abs(edge.error_s):.2f} s {side}{metres}")
+            parts.append(f"{edge.kind} at {edge.true_sample / 100:.2f} s found "
+                         f"{abs(edge.error_s):.2f} s {side}{metres}")
     false = score.note if score.false is None else f"{len(score.false)} false edges"
     return "; ".join([*parts, false]) + "."
 

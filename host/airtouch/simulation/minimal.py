@@ -10,7 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.flight_log import (
+    ACC,
+    ACC_WORLD,
+    ATTITUDE,
+    GYRO,
+    POSITION,
+    PWM,
+    VELOCITY,
+    FlightLog,
+)
 
 STEP_S = 0.002  #: physics and attitude loop, 500 Hz
 SAMPLE_STEPS = 5  #: physics steps a logged sample, 100 Hz
@@ -117,13 +126,15 @@ def fly(plan: list[Mission], seed: int = 0, vehicle: vehicles.Vehicle | None = N
             goal = np.clip(np.stack([-want_y, want_x, np.zeros(n)], axis=1) / g0, -0.3, 0.3)
         error = goal - attitude
         sum_attitude = np.clip(sum_attitude + error * STEP_S, -0.5, 0.5) * motors_on[:, None]
-        turn = inertia * (300.0 * error + 60.0 * sum_attitude - 30.0 * rates - 1.5 * (rates - before) / STEP_S)
+        turning = (rates - before) / STEP_S
+        turn = inertia * (300.0 * error + 60.0 * sum_attitude - 30.0 * rates - 1.5 * turning)
         before = rates
         share = turn / (4.0 * np.array([arm, arm, v.yaw_torque_over_thrust_m]))
-        wanted = (lift / 4)[:, None] + share[:, :1] * SIGNS_Y - share[:, 1:2] * SIGNS_X + share[:, 2:] * SIGNS_YAW
+        wanted = (lift / 4)[:, None] + share[:, :1] * SIGNS_Y - share[:, 1:2] * SIGNS_X
+        wanted = wanted + share[:, 2:] * SIGNS_YAW
         wanted = np.clip(wanted, c0, 2.2 * hover_n) * motors_on[:, None]
-        pwm = np.where(wanted > 0, (-c1 + np.sqrt(c1 * c1 + 4 * c2 * np.maximum(wanted - c0, 0))) / (2 * c2), 0.0)
-        pwm = np.clip(np.round(pwm), 0, 65535)
+        root = np.sqrt(c1 * c1 + 4 * c2 * np.maximum(wanted - c0, 0))
+        pwm = np.clip(np.round(np.where(wanted > 0, (root - c1) / (2 * c2), 0.0)), 0, 65535)
         volts += STEP_S * (-0.004 * motors_on)
         made = np.where(pwm > 0, (c0 + c1 * pwm + c2 * pwm * pwm) * gain * (volts / 4.0)[:, None] ** 2, 0.0)
         thrust = thrust + STEP_S / v.motor_time_constant_s * (made - thrust)
@@ -160,13 +171,13 @@ def fly(plan: list[Mission], seed: int = 0, vehicle: vehicles.Vehicle | None = N
             s = sensor[k // SAMPLE_STEPS]
             noisy = s[:, :3] * v.acc_noise_rms_mps2 + bias[:, :3]
             world = specific + noisy
-            body = np.stack([world[:, 0] - attitude[:, 1] * world[:, 2], world[:, 1] + attitude[:, 0] * world[:, 2],
-                             world[:, 2] + attitude[:, 1] * world[:, 0] - attitude[:, 0] * world[:, 1]], axis=1)
+            roll, pitch, (wx, wy, wz) = attitude[:, 0], attitude[:, 1], world.T
+            body = np.stack([wx - pitch * wz, wy + roll * wz, wz + pitch * wx - roll * wy], axis=1)
             gyro = rates + s[:, 3:6] * v.gyro_noise_rms_radps + bias[:, 3:]
             seen = np.maximum(range_m + s[:, 6] * v.range_noise_rms_m, 0.0)
             out[k // SAMPLE_STEPS] = np.concatenate(
-                [np.full((n, 1), t), body, gyro, pwm, seen[:, None], volts[:, None], position, velocity, attitude,
-                 world, end_s[:, None]], axis=1)
+                [np.full((n, 1), t), body, gyro, pwm, seen[:, None], volts[:, None], position, velocity,
+                 attitude, world, end_s[:, None]], axis=1)
 
         rates = rates + STEP_S * (torque - np.cross(rates, inertia * rates)) / inertia * lifted[:, None]
         rates = rates * lifted[:, None]
@@ -180,9 +191,7 @@ def fly(plan: list[Mission], seed: int = 0, vehicle: vehicles.Vehicle | None = N
 
 def _log(table: np.ndarray, mission: Mission, seed: int, index: int) -> FlightLog:
     """One flight of the batch, cut to its own length."""
-    names = ("t_s", "acc_x_mps2", "acc_y_mps2", "acc_z_mps2", "gyro_x_radps", "gyro_y_radps", "gyro_z_radps",
-             "m1_pwm", "m2_pwm", "m3_pwm", "m4_pwm", "zrange_m", "vbat_V", "x_m", "y_m", "z_m", "vx_mps", "vy_mps",
-             "vz_mps", "roll_rad", "pitch_rad", "yaw_rad", "acc_world_x_mps2", "acc_world_y_mps2", "acc_world_z_mps2")
+    names = ("t_s", *ACC, *GYRO, *PWM, "zrange_m", "vbat_V", *POSITION, *VELOCITY, *ATTITUDE, *ACC_WORLD)
     rows = table[: int(table[0, -1] * 100)]
     meta = {"source": f"generated_{seed}_{index:03d}", "format": "generated", "sample_period_s": 0.01,
             "acc_frame": "body", "vehicle": "crazyflie-2.1-flow", "warnings": [], "condition": vars(mission)}
