@@ -34,13 +34,18 @@ class Vehicle:
     range_noise_rms_m: float = 0.002
     gravity_mps2: float = 9.81
     nominal_voltage_v: float | None = None
+    voltage_exponent: float = 2.0  #: thrust at a PWM grows with (V / nominal V) to this power
     thrust_per_speed2: float = 0.0  #: N/(rad/s)^2 of one rotor
     rotor_inertia_kg_m2: float = 0.0  #: rotor and propeller
     motor_fall_time_constant_s: float = 0.0  #: of a rotor slowing down
     battery_cells: float = 1.0
     battery_capacity_ah: float = 0.25
     battery_resistance_ohm: float = 0.12
-    power_per_thrust15: float = 70.0  #: electrical power over thrust^1.5 of one rotor, W/N^1.5
+    power_per_thrust15: float = 85.0  #: electrical power over thrust^1.5 of one rotor, W/N^1.5
+    acc_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)  #: noise of each axis over the rms above
+    gyro_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    flow_noise_mps: tuple[float, float, float] = (0.02, 0.02, 0.0)  #: velocity estimate's error forward, left, up
+    flow_noise_time_s: float = 0.05  #: its correlation time
     acc_lowpass_hz: float = 0.0  #: of the logged accelerometer; 0: none
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
     derivative_on_error: float = 0.0  #: 1: rate derivative on the error (firmware before 2024)
@@ -51,6 +56,10 @@ class Vehicle:
         c0, c1, c2 = self.thrust_of_pwm_n
         pwm = np.asarray(pwm, dtype=np.float64)
         return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
+
+
+#: fields of three numbers
+TRIPLES = ("inertia_kg_m2", "thrust_of_pwm_n", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps")
 
 
 def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
@@ -85,7 +94,7 @@ def parse(text: str, source: str) -> Vehicle:
         raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(fields)}")
     values = {}
     for name, value in table.items():
-        if name in ("inertia_kg_m2", "thrust_of_pwm_n"):
+        if name in TRIPLES:
             if not (isinstance(value, list) and len(value) == 3 and all(_is_number(v) for v in value)):
                 raise AirTouchError(f"{source}: {name} must be three numbers")
             values[name] = tuple(float(v) for v in value)

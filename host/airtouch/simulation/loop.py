@@ -34,8 +34,8 @@ _LOOP = types.Tuple((int64, int64))(
 
 
 @njit(cache=True)
-def fill_signals(plant, state, acceleration, speed, corners, first, surface, box, h, t, hover, s, patch):
-    """The signals that effects see, for a state (13,) and rotor speeds (4,)."""
+def fill_signals(plant, state, slope, speed, corners, first, surface, box, h, t, hover, s, patch):
+    """The signals that effects see, for a state (13,), its slope and rotor speeds (4,)."""
     s[at.TIME], s[at.STEP], s[at.MASS], s[at.GRAVITY] = t, h, plant.mass, plant.gravity
     s[at.ROTOR_RADIUS], s[at.ROTOR_SPACING], s[at.HOVER_SPEED] = plant.rotor_radius, plant.rotor_spacing, hover
     q = state[6:10]
@@ -43,7 +43,7 @@ def fill_signals(plant, state, acceleration, speed, corners, first, surface, box
     s[at.VELOCITY], s[at.VELOCITY + 1], s[at.VELOCITY + 2] = vx, vy, vz
     for i in range(3):
         s[at.RATES + i] = state[10 + i]
-        s[at.ACCELERATION + i] = acceleration[i]
+        s[at.ACCELERATION + i] = slope[3 + i]
     r = at.ROTATION
     from_quaternion(q, s, r)
     lowest = 1e9
@@ -101,8 +101,11 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     sensors.lowpass_coefficients(plant.acc_lowpass, h, acc_filter)
     sensors.lowpass_coefficients(plant.gyro_lowpass, h, gyro_filter)
     acc_rms = plant.acc_noise / sensors.noise_gain(acc_filter)
+    drift = np.zeros(3)
+    drift_decay = math.exp(-LOG_STEPS * h / plant.flow_noise_time)
+    drift_fresh = math.sqrt(1.0 - drift_decay * drift_decay)
     ranges = np.full(4, np.nan)
-    world_force = np.zeros(3)
+    world_force, seen_velocity = np.zeros(3), np.zeros(3)
 
     state[0], state[1] = setpoints[0, controller.X], setpoints[0, controller.Y]
     ground = world.top_at(corners, first, surface, box, state[0], state[1])
@@ -124,6 +127,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     flying = False
     decay = math.exp(-h / plant.motor_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
+    attitude, slope = state[6:10], work[0]
+    motor_stream, imu_stream, other_stream = streams[0], streams[1], streams[2]
     rows = table.shape[0]
     steps = rows * LOG_STEPS
     rigid_body.derivative(plant, state, patch[:4] * 0.0, 0.0, 0.0, force, work[0])
@@ -138,13 +143,13 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             lift += plant.thrust_per_speed2 * speed[i] * speed[i] * plant.gain[i]
         rx, ry, rz = -plant.com[0], -plant.com[1], -plant.com[2]
         wx, wy, wz = state[10], state[11], state[12]
-        dx, dy, dz = work[0, 10], work[0, 11], work[0, 12]
+        dx, dy, dz = slope[10], slope[11], slope[12]
         dot = wx * rx + wy * ry + wz * rz
         square = wx * wx + wy * wy + wz * wz
         acc[0] = force[0] / plant.mass + dy * rz - dz * ry + wx * dot - rx * square
         acc[1] = force[1] / plant.mass + dz * rx - dx * rz + wy * dot - ry * square
         acc[2] = (force[2] + lift) / plant.mass + dx * ry - dy * rx + wz * dot - rz * square
-        normals(streams[1], imu_n)
+        normals(imu_stream, imu_n)
         shake_x, shake_y, shake_z = 0.0, 0.0, 0.0
         if plant.vibration > 0.0:
             for i in range(4):
@@ -154,10 +159,10 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
                 shake_z += size * math.sin(phase[i] + 0.7)
         for i in range(3):
             shake = shake_x if i == 0 else (shake_y if i == 1 else shake_z)
-            value = acc[i] + plant.acc_bias[i] + acc_rms * imu_n[i]
+            value = acc[i] + plant.acc_bias[i] + acc_rms[i] * imu_n[i]
             value = sensors.lowpass(acc_filter, acc_memory[i], value) + shake
             acc[i] = min(max(value, -plant.acc_range), plant.acc_range)
-            value = state[10 + i] + plant.gyro_bias[i] + plant.gyro_noise * imu_n[3 + i]
+            value = state[10 + i] + plant.gyro_bias[i] + plant.gyro_noise[i] * imu_n[3 + i]
             value += plant.vibration_gyro * shake
             gyro[i] = min(max(value, -plant.gyro_range), plant.gyro_range)
             ring[k % RING, i] = acc[i]
@@ -173,7 +178,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         # --- other sensors
         if t >= next_range:
             next_range += sensors.RANGE_PERIOD_S
-            normals(streams[2], other_n)
+            normals(other_stream, other_n)
             eye = state[2] - plant.range_below_rotors
             spot = max(sensors.CONE_TANGENT * (eye - ground), 0.002)
             world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
@@ -181,7 +186,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             spot = max(sensors.CONE_TANGENT * (eye - near), 0.002)
             world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
             top = patch[world.UPPER_TOP] if patch[world.COVER] >= sensors.CONE_COVER else patch[world.LOWER_TOP]
-            roll, pitch, _ = euler(state[6:10])
+            roll, pitch, _ = euler(attitude)
             tilt = max(math.cos(roll) * math.cos(pitch), 0.3)
             down = max((eye - top) / tilt + plant.range_noise * other_n[0], 0.0)
             if down > sensors.MAX_RANGE_M:
@@ -196,7 +201,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             last_down_top = top
         if t >= next_ranges:
             next_ranges += sensors.MULTIRANGER_PERIOD_S
-            _, _, yaw = euler(state[6:10])
+            _, _, yaw = euler(attitude)
             for i in range(4):
                 turn = (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)[i]
                 far = sensors.wall_distance(state[0], state[1], yaw + turn, room)
@@ -209,20 +214,25 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             wx, wy, wz = acc[0], acc[1], acc[2]
         world_force[0], world_force[1], world_force[2] = wx, wy, wz
         if k % LOG_STEPS == 0:
-            normals(streams[2], other_n)
+            normals(other_stream, other_n)
+            for i in range(3):
+                drift[i] = drift_decay * drift[i] + drift_fresh * plant.flow_noise[i] * other_n[i]
             height = max(state[2] - plant.range_below_rotors - last_down_top, 0.02)
             scale = 1.0 + plant.flow_share * (max(est[8], 0.0) / height - 1.0) if flying else 1.0
-            estimator.correct_flow(est, state[3] * scale + plant.flow_noise * other_n[0],
-                                   state[4] * scale + plant.flow_noise * other_n[1])
+            c, d = math.cos(est[2]), math.sin(est[2])
+            estimator.correct_flow(est, state[3] * scale + c * drift[0] - d * drift[1],
+                                   state[4] * scale + d * drift[0] + c * drift[1])
         volts = battery.supply(plant, battery_volts)
+        factor = motors.voltage_factor(plant, volts)
         if setpoint[controller.MOTORS] > 0.5:
             flying = True
             if k % controller.POSITION_STEPS == 0:
-                controller.position_loop(plant, pid_memory, setpoint, est[6:9], est[3:6], est[2])
+                seen_velocity[0], seen_velocity[1], seen_velocity[2] = est[3], est[4], est[5] + drift[2]
+                controller.position_loop(plant, pid_memory, setpoint, est[6:9], seen_velocity, est[2])
             controller.attitude_loop(plant, pid_memory, est[0], est[1], est[2], seen_gyro, pwm)
             if plant.compensate_battery > 0.5:
                 for i in range(4):
-                    pwm[i] = motors.compensated(plant, pwm[i], volts)
+                    pwm[i] = motors.compensated(plant, pwm[i], factor)
             controller.cap(pwm)
         else:
             flying = False
@@ -235,7 +245,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         if k % LOG_STEPS == 0:
             out = table[row]
             out[T] = row * LOG_STEPS * h
-            roll, pitch, yaw = euler(state[6:10])
+            roll, pitch, yaw = euler(attitude)
             out[ANGLES], out[ANGLES + 1], out[ANGLES + 2] = roll, pitch, yaw
             for i in range(3):
                 out[ACC + i], out[GYRO + i] = acc[i], gyro[i]
@@ -251,11 +261,11 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             command[k % RING, i] = pwm[i]
             if k == 0:
                 command[:, i] = pwm[i]
-        normals(streams[0], motor_n)
+        normals(motor_stream, motor_n)
         power = 0.0
         for i in range(4):
             given = sensors.delayed(command, k, plant.actuator_delay / h, i)
-            target[i] = motors.target_speed(plant, given, volts)
+            target[i] = motors.target_speed(plant, given, factor)
             flicker[i] = decay * flicker[i] + fresh * motor_n[i]
             plant.gain[i] = base_gain[i] * (1.0 + plant.motor_noise * flicker[i])
             thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
@@ -265,11 +275,11 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
 
         # --- effects, at the middle of the step
         for i in range(13):
-            middle[i] = state[i] + 0.5 * h * work[0, i]
+            middle[i] = state[i] + 0.5 * h * slope[i]
         for i in range(4):
             tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
             middle_speed[i] = speed[i] + 0.5 * h / tau * (target[i] - speed[i])
-        fill_signals(plant, middle, work[0, 3:6], middle_speed, corners, first, surface, box, h, t + 0.5 * h,
+        fill_signals(plant, middle, slope, middle_speed, corners, first, surface, box, h, t + 0.5 * h,
                      hover, s, patch)
         for i in range(6):
             force[i] = 0.0

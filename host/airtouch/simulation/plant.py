@@ -27,6 +27,7 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("gain", 4, 1.0, "thrust of each rotor over nominal"),
     ("thrust_curve", 3, 0.0, "N, N/PWM, N/PWM^2 at the nominal voltage"),
     ("nominal_voltage", 1, 3.8, "V"),
+    ("voltage_exponent", 1, 2.0, "thrust at a PWM over that at the nominal voltage, power of the voltage ratio"),
     ("motor_noise", 1, 0.0, "rms of thrust over its mean, each rotor on its own"),
     ("motor_noise_time", 1, 0.02, "s, correlation time of that noise"),
     ("actuator_delay", 1, 0.0, "s, from command to motor"),
@@ -35,9 +36,9 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("battery_capacity", 1, 900.0, "C"),
     ("battery_resistance", 1, 0.12, "ohm"),
     ("battery_cells", 1, 1.0, "in series"),
-    ("power_per_thrust15", 1, 70.0, "W per N^1.5 of each rotor"),
-    ("acc_noise", 1, 0.06, "m/s^2 rms, as logged"),
-    ("gyro_noise", 1, 0.006, "rad/s rms, as logged"),
+    ("power_per_thrust15", 1, 85.0, "W per N^1.5 of each rotor"),
+    ("acc_noise", 3, 0.06, "m/s^2 rms, as logged"),
+    ("gyro_noise", 3, 0.006, "rad/s rms, as logged"),
     ("acc_bias", 3, 0.0, "m/s^2"),
     ("gyro_bias", 3, 0.0, "rad/s"),
     ("acc_range", 1, 235.0, "m/s^2, saturation: 24 g"),
@@ -48,7 +49,8 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("vibration_gyro", 1, 0.05, "rad/s per m/s^2"),
     ("range_noise", 1, 0.002, "m rms"),
     ("range_below_rotors", 1, 0.025, "m, down range sensor below the rotor discs"),
-    ("flow_noise", 1, 0.02, "m/s rms at 100 Hz"),
+    ("flow_noise", 3, 0.02, "m/s rms, error of the measured velocity forward, left and up"),
+    ("flow_noise_time", 1, 0.05, "s, its correlation time"),
     ("flow_share", 1, 0.0, "how far optical flow is scaled by the estimated height, not the true distance"),
     ("range_residual", 1, 0.0, "m, platform compensation's error over the platform"),
     ("range_kick", 1, 0.0, "m, error of the one reading on which an edge is noticed"),
@@ -95,11 +97,14 @@ def from_vehicle(vehicle: Vehicle) -> np.ndarray:
     row["motor_rise"] = vehicle.motor_time_constant_s
     row["motor_fall"] = vehicle.motor_fall_time_constant_s or vehicle.motor_time_constant_s
     row["nominal_voltage"] = vehicle.nominal_voltage_v or 3.8 * vehicle.battery_cells
+    row["voltage_exponent"] = vehicle.voltage_exponent
     row["battery_capacity"] = 3600.0 * vehicle.battery_capacity_ah
     row["battery_resistance"] = vehicle.battery_resistance_ohm
     row["battery_cells"] = vehicle.battery_cells
     row["power_per_thrust15"] = vehicle.power_per_thrust15
-    row["acc_noise"], row["gyro_noise"] = vehicle.acc_noise_rms_mps2, vehicle.gyro_noise_rms_radps
+    row["acc_noise"] = vehicle.acc_noise_rms_mps2 * np.array(vehicle.acc_noise_ratio)
+    row["gyro_noise"] = vehicle.gyro_noise_rms_radps * np.array(vehicle.gyro_noise_ratio)
+    row["flow_noise"], row["flow_noise_time"] = vehicle.flow_noise_mps, vehicle.flow_noise_time_s
     row["range_noise"] = vehicle.range_noise_rms_m
     row["acc_lowpass"] = vehicle.acc_lowpass_hz
     hover = hover_pwm(vehicle)

@@ -49,7 +49,7 @@ def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, s
     charge, battery_volts = plant.battery_charge, plant.nominal_voltage
     command[:] = pwm[0]
     for i in range(4):
-        speed[i] = motors.target_speed(plant, pwm[0, i], plant.nominal_voltage)
+        speed[i] = motors.target_speed(plant, pwm[0, i], 1.0)
     for k in range(len(signals)):
         s = signals[k]
         h = s[at.STEP]
@@ -57,6 +57,7 @@ def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, s
         if np.isfinite(measured_volts[k]):
             volts = measured_volts[k]
         volts_out[k] = volts
+        factor = motors.voltage_factor(plant, volts)
         power = 0.0
         for i in range(4):
             thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
@@ -65,7 +66,7 @@ def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, s
             s[at.THRUST + i] = thrust * plant.gain[i]
             command[k % loop.RING, i] = pwm[k, i]
             given = sensors.delayed(command, k, plant.actuator_delay / h, i)
-            target[i] = motors.target_speed(plant, given, volts)
+            target[i] = motors.target_speed(plant, given, factor)
         for i in range(6):
             force[i] = 0.0
         for i in range(used):
