@@ -15,6 +15,7 @@ COMMANDS = {
     "export": ("export", "Write a trained network as C sources for the GAP8."),
     "evaluate": ("evaluate", "Score a detector on flights with known edges."),
     "crossval": ("crossval", "Cross-validate a detector by flight."),
+    "ablate": ("ablate", "Find what each part of the detectors is worth."),
     "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
     "simulate": ("simulate", "Fly a scenario in the simulator and write flight logs."),
     "dataset": ("dataset", "Fetch the authors' public flights."),

@@ -25,7 +25,6 @@ from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream_detector import StreamEvents
 from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.reference.edge_decoder import DecoderConfig
-from airtouch.reference.motion_channels import MotionConfig
 
 #: Chosen once, over the five folds of the authors' flights (host/docs/looks.md).
 DECODER = DecoderConfig(over_share=0.3, entry_score=1.9, exit_score=0.5, late_entry=1.7, late_exit=-1.6,
@@ -50,16 +49,18 @@ def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
 def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:
     """One flight through the C detector."""
     return kernels.stream_detector(level_acceleration(log), log.stack(GYRO), log.stack(PWM), model.int8,
-                                   MotionConfig(), model.decoder)
+                                   model.recipe.motion, model.decoder)
 
 
 def fit(
     flights: Sequence[FlightLog], seed: int = 0, *, recipe: Recipe | None = None, decoder: DecoderConfig = DECODER,
-    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", **changes: Any
+    most_flights: int | None = None, progress: Progress | None = None,
+    command: str = "airtouch.detector.best.fit", **changes: Any
 ) -> StreamModel:
     """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
 
     recipe: shape and training, changed by `changes` (fields of `Recipe`). decoder: its settings.
+    most_flights: train on so many at most, drawn by seed.
     Raises AirTouchError without TensorFlow, without flights with edges and for unknown fields.
     """
     from airtouch.detector.stream import batches, quantisation, training
@@ -68,6 +69,9 @@ def fit(
     told = progress or (lambda *_: None)
     recipe = _changed(recipe or Recipe(), changes)
     use_tensorflow(seed)
+    if most_flights is not None and most_flights < len(flights):
+        drawn = np.random.default_rng(seed).permutation(len(flights))[:most_flights]
+        flights = [flights[i] for i in sorted(drawn)]
     prepared = []
     for i, log in enumerate(flights):
         prepared.append(batches.flight_of(log, recipe))

@@ -54,8 +54,8 @@ def kernel_of_c(kernel: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(kernel, -1, 0))
 
 
-def build_keras(constraints: Mapping[str, object] | None = None) -> "keras.Model":
-    """The network in Keras, with a kernel constraint for each layer named."""
+def build_keras(constraints: Mapping[str, object] | None = None, rows: int = INPUT_SHAPE[0]) -> "keras.Model":
+    """The network in Keras, with a kernel constraint for each layer named, for windows of `rows` samples."""
     import keras
 
     constraints = constraints or {}
@@ -70,7 +70,7 @@ def build_keras(constraints: Mapping[str, object] | None = None) -> "keras.Model
                                   kernel_constraint=constraints.get(name))
 
     return keras.Sequential([
-        keras.Input(INPUT_SHAPE), conv("conv1"), keras.layers.MaxPooling2D((2, 1)),
+        keras.Input((rows, *INPUT_SHAPE[1:])), conv("conv1"), keras.layers.MaxPooling2D((2, 1)),
         conv("conv2"), keras.layers.MaxPooling2D((2, 1)), keras.layers.Flatten(),
         dense("dense1", "relu"), dense("dense2", None),
     ], name="airtouch_paper")

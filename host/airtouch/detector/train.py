@@ -166,15 +166,26 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
 
 
 def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-         progress: Progress) -> tuple[network.Weights, int]:
+                progress: Progress) -> tuple[network.Weights, int]:
     """The trained weights, and after how many epochs."""
+    model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress)
+    return network.weights_of_keras(model), len(losses)
+
+
+def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+              progress: Progress):  # noqa: ANN201 - (keras.Model, list[float])
+    """The trained Keras model and the loss on the held-out windows after each epoch (on the training
+    windows where none are held out). Windows may be of any length where sparsity is 0."""
     import keras
 
     train, held = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, held))
     batches = max(len(train.x) // BATCH, 1)
     pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
-    constraint, schedule = pruning.pruning(sparsity, batches * pruned_epochs, block)
-    model = network.build_keras({pruning.PRUNED: constraint})
+    constraints, callbacks = {}, []
+    if sparsity > 0:
+        constraint, schedule = pruning.pruning(sparsity, batches * pruned_epochs, block)
+        constraints, callbacks = {pruning.PRUNED: constraint}, [schedule]
+    model = network.build_keras(constraints, train.x.shape[1])
     rate = _rate_table(batches * epochs)
     model.compile(keras.optimizers.Adam(rate), loss=edge_loss(df_lambda, class_weights(train.over)),
                   steps_per_execution=min(BATCHES_A_CALL, batches))
@@ -182,11 +193,11 @@ def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, blo
                                              start_from_epoch=pruned_epochs)
     told = keras.callbacks.LambdaCallback(
         on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
-    callbacks = [schedule, told] + ([stopping] if len(held.x) else [])
+    callbacks += [told] + ([stopping] if len(held.x) else [])
     history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
                         shuffle=False,
                         validation_data=_batches(held, shuffle=False) if len(held.x) else None)
-    return network.weights_of_keras(model), len(history.history["loss"])
+    return model, history.history["val_loss" if len(held.x) else "loss"]
 
 
 def _rate_table(steps: int):  # noqa: ANN202 - a Keras class that exists only here

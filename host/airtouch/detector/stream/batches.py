@@ -28,14 +28,14 @@ class Flight:
     weight: float = 1.0
 
 
-def channels_of(log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
+def channels_of(log: FlightLog, motion: MotionConfig | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Motion channels (n, 12) and airborne (n,) of a log; AirTouchError that names missing columns."""
-    return kernels.motion_channels(level_acceleration(log), log.stack(GYRO), log.stack(PWM), MotionConfig())
+    return kernels.motion_channels(level_acceleration(log), log.stack(GYRO), log.stack(PWM), motion)
 
 
 def flight_of(log: FlightLog, recipe: Recipe) -> Flight:
     """A log as a training flight. Flights that pass over the platform at 4 cm or more are drawn more often."""
-    x, airborne = channels_of(log)
+    x, airborne = channels_of(log, recipe.motion)
     edges = logs.true_edges(log)
     high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
     return Flight(x, goals(over_platform(edges, len(log)), edges, recipe),
@@ -97,5 +97,5 @@ def _augment(x: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndar
     disturbed = x + recipe.offset * rng.standard_normal((b, 1, CHANNELS))
     disturbed += recipe.noise * rng.standard_normal((b, n, CHANNELS), dtype=np.float32)
     limit = MotionConfig().limit
-    disturbed[..., -1] = 0.0
+    disturbed[..., [*recipe.muted, CHANNELS - 1]] = 0.0
     return np.clip(disturbed, -limit, limit).astype(np.float32)

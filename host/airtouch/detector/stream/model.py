@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.detector import archive
 from airtouch.detector.model_file import check_range
 from airtouch.detector.stream.quantisation import network_of
-from airtouch.detector.stream.recipe import Recipe
+from airtouch.detector.stream.recipe import CHANNELS, Recipe
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.reference.edge_decoder import DecoderConfig
@@ -106,12 +106,15 @@ def parse(data: bytes, source: str) -> StreamModel:
 def _recipe(table: object, source: str) -> Recipe:
     wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; {archive.REMEDY}")
     try:
-        recipe = Recipe(**{**table, "dilations": tuple(table["dilations"])})
-        numbers = [recipe.width, recipe.first_taps, recipe.taps, *recipe.dilations]
+        recipe = Recipe(**{**table, "dilations": tuple(table["dilations"]),
+                            "muted": tuple(table["muted"])})
+        numbers = [recipe.width, recipe.first_taps, recipe.taps, *recipe.dilations, *recipe.muted]
     except (KeyError, TypeError):
         raise wrong from None
     whole = all(isinstance(v, int) and not isinstance(v, bool) for v in numbers)
     if not whole or not 1 <= len(recipe.dilations) <= 9 or not all(1 <= d <= 256 for d in recipe.dilations):
+        raise wrong
+    if not all(0 <= channel < CHANNELS for channel in recipe.muted):
         raise wrong
     if not all(low <= getattr(recipe, name) <= high for name, (low, high) in _LIMITS.items()) or recipe.width % 4:
         raise wrong

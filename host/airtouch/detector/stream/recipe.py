@@ -1,8 +1,9 @@
 """Shape of the streaming network and how it is trained."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
-from airtouch.reference.motion_channels import NAMES
+from airtouch.reference.motion_channels import NAMES, MotionConfig
 
 CHANNELS = len(NAMES)  #: values a sample
 STRIDE = 2  #: samples between two rows that are computed: 50 Hz
@@ -18,7 +19,7 @@ class Recipe:
     sparsity: share of zero blocks of four in those layers. delay: samples after an edge at which the
     event logits are to peak, spread over event_sigma; the over logit is to change over_delay after it.
     The rest: learning (steps, batch, crop in samples of which warm_up are not scored, one-cycle peak,
-    weight decay, loss weights) and augmentation (share of crops around an edge, flights of the rare
+    weight decay, loss weights), channels that are muted (held at 0, for ablations) and augmentation (share of crops around an edge, flights of the rare
     heights drawn `balance` times as often, gains, offsets and noise in usual swings, yaw in degrees,
     time warp, share mirrored left to right).
     """
@@ -38,6 +39,7 @@ class Recipe:
     over_delay: int = 4
     event_sigma: float = 6.0
     event_weight: float = 3.0
+    muted: tuple[int, ...] = ()
     edge_share: float = 0.6
     balance: float = 3.0
     gain: float = 0.15
@@ -58,6 +60,13 @@ class Recipe:
     def receptive_samples(self) -> int:
         """Samples that one output depends on."""
         return (self.taps - 1) * sum(self.dilations) * STRIDE + self.first_taps
+
+    @property
+    def motion(self) -> MotionConfig:
+        """The channels' settings: a muted channel has no bounds to its usual swing."""
+        config = MotionConfig()
+        scale = tuple(math.inf if i in self.muted else s for i, s in enumerate(config.scale))
+        return replace(config, scale=scale)
 
     def weight_shapes(self) -> dict[str, tuple[int, ...]]:
         """Name and shape of each float array: kernels (taps, in, out) and biases (out,)."""

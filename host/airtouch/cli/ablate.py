@@ -1,0 +1,73 @@
+"""`airtouch ablate`: what each part of the detectors is worth."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.table import Table
+
+from airtouch.cli import scores as show
+from airtouch.cli.flights import find_flights
+from airtouch.detector import ablation, dataset
+from airtouch.detector.ablation import ABLATIONS
+
+
+def _names() -> str:
+    return "\n".join(f"  {name:16} {a.what}" for name, a in ABLATIONS.items())
+
+
+@click.command(name="ablate", epilog="\b\nAblations:\n" + _names())
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--only", multiple=True, type=click.Choice(list(ABLATIONS)), metavar="NAME",
+              help="Run this one; may be given several times. All of them if left out.")
+@click.option("--steps", type=click.IntRange(1), help="Training steps of `best`; its own number if left out.")
+@click.option("--epochs", type=click.IntRange(1), help="Training epochs of `paper`; its own number if left out.")
+@click.option("--seed", default=0, show_default=True, help="Of training.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/ablate"), show_default=True,
+              help="Where finished folds are kept; a second run goes on from there.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
+@click.option("--force", is_flag=True, help="Replace the JSON file.")
+def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epochs: int | None, seed: int, out: Path,
+            json_path: Path | None, force: bool) -> None:
+    """Cross-validate the detectors on FOLDER with one thing changed at a time, split by flight.
+
+    Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Takes two to five minutes an ablation on two cores.
+    """
+    show.check_free(json_path, force)
+    folder = folder or find_flights()
+    if folder is None:
+        raise click.UsageError("no recorded flights found; name their FOLDER or set AIRTOUCH_FLIGHTS")
+    results = ablation.ablate(
+        only or tuple(ABLATIONS), dataset.collect([folder]), out, seed=seed,
+        best_options={} if steps is None else {"steps": steps},
+        paper_options={} if epochs is None else {"epochs": epochs},
+        tell=lambda line: click.echo(line, err=True))
+    screen = show.console()
+    for group in dict.fromkeys(row["group"] for row in results.values()):
+        rows = {row["what"]: row for row in results.values() if row["group"] == group}
+        screen.print(show.table(rows, f"ablation: {group}"))
+        if any("converged_after_epochs" in f["parameters"] for row in rows.values() for f in row["folds"]):
+            screen.print(_training(rows))
+        if any("parameter_bytes" in f["parameters"] for row in rows.values() for f in row["folds"]):
+            screen.print(_sizes(rows))
+    if json_path:
+        show.write_json(json_path, results, force)
+        screen.print(f"written: {json_path}")
+
+
+def _training(rows: dict[str, dict[str, Any]]) -> Table:
+    """Epochs to converge, mean over the folds."""
+    table = Table("", "epochs to converge, mean of the folds", title="training", title_justify="left")
+    for what, row in rows.items():
+        epochs = [f["parameters"]["converged_after_epochs"] for f in row["folds"]]
+        table.add_row(what, f"{sum(epochs) / len(epochs):.1f}")
+    return table
+
+
+def _sizes(rows: dict[str, dict[str, Any]]) -> Table:
+    """What the drone carries and computes."""
+    table = Table("", "parameters, bytes", "state, bytes", "MAC a sample", title="size and cost", title_justify="left")
+    for what, row in rows.items():
+        p = row["folds"][0]["parameters"]
+        table.add_row(what, str(p["parameter_bytes"]), str(p["state_bytes"]), f"{p['mac_per_sample']:.0f}")
+    return table

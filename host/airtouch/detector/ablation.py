@@ -1,0 +1,88 @@
+"""What each part is worth: cross-validation with one thing changed at a time."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from airtouch.detector import crossval, summary
+from airtouch.detector.dataset import FlightFile
+from airtouch.detector.registry import Detector, get
+from airtouch.detector.variants import Variant
+from airtouch.reference.motion_channels import NAMES
+
+HORIZONTAL = ("ax", "ay")
+RATES = ("gyro x", "gyro y", "gyro z")
+TURNS = ("motor roll", "motor pitch", "motor yaw")
+VERTICAL = ("az", "motor mean", "unexplained az")
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """One row: a detector and how it is changed. detector None is the registered `best`."""
+
+    group: str
+    what: str
+    detector: Detector | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+def _only(group: str, what: str, *kept: str) -> Ablation:
+    muted = tuple(i for i, name in enumerate(NAMES[:-1]) if name not in kept)
+    return Ablation(group, what, options={"muted": muted})
+
+
+#: name -> ablation; the first of each group is what the others are held against
+ABLATIONS: dict[str, Ablation] = {
+    "paper": Ablation("paper", "paper, float, unpruned", Variant()),
+    "no-df-loss": Ablation("paper", "without the disturbance-force loss", Variant(df_lambda=0.0)),
+    "strong-df-loss": Ablation("paper", "disturbance-force loss at lambda 1", Variant(df_lambda=1.0)),
+    "no-filter": Ablation("paper", "without the physical filter", Variant(physical_filter=False)),
+    "no-filter-no-df": Ablation("paper", "without both", Variant(physical_filter=False, df_lambda=0.0)),
+    "stft-100": Ablation("paper", "STFT window 100, filter off", Variant(physical_filter=False, band_window=100)),
+    "stft-300": Ablation("paper", "STFT window 300, filter off", Variant(physical_filter=False, band_window=300)),
+    "stft-centred": Ablation("paper", "STFT window centred (not causal), filter off",
+                             Variant(physical_filter=False, centred=True)),
+    "input-50": Ablation("paper", "network input 50 samples, filter off", Variant(physical_filter=False, rows=50)),
+    "input-170": Ablation("paper", "network input 170 samples, filter off", Variant(physical_filter=False, rows=170)),
+    "best": Ablation("channels", "best, all channels"),
+    "imu-only": _only("channels", "IMU only", "ax", "ay", "az", *RATES),
+    "motors-only": _only("channels", "motors only", *TURNS, "motor mean"),
+    "vertical-only": _only("channels", "vertical only (az, motor mean, unexplained az)", *VERTICAL),
+    "no-vertical": _only("channels", "without the vertical channels", *HORIZONTAL, *RATES, *TURNS),
+    "horizontal-only": _only("channels", "horizontal acceleration and rates only", *HORIZONTAL, *RATES),
+    "f_w-only": _only("channels", "unexplained vertical acceleration only (f_w / m)", "unexplained az"),
+    "no-kick": _only("channels", "without motor mean and raw az (height loop's kick)", *HORIZONTAL, *RATES, *TURNS,
+                     "unexplained az"),
+    "flights-10": Ablation("flights", "10 training flights", options={"most_flights": 10}),
+    "flights-20": Ablation("flights", "20 training flights", options={"most_flights": 20}),
+    "flights-40": Ablation("flights", "40 training flights", options={"most_flights": 40}),
+    "sparsity-0": Ablation("size", "best, no pruning", options={"sparsity": 0.0}),
+    "sparsity-70": Ablation("size", "best, 70 % zeros", options={"sparsity": 0.7}),
+    "sparsity-85": Ablation("size", "best, 85 % zeros", options={"sparsity": 0.85}),
+    "width-16": Ablation("size", "best, width 16, no pruning", options={"width": 16, "sparsity": 0.0}),
+}
+
+
+def ablate(
+    names: Sequence[str], files: Sequence[FlightFile], out: Path, *, seed: int = 0,
+    best_options: dict[str, Any] | None = None, paper_options: dict[str, Any] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> dict[str, dict[str, Any]]:
+    """Summary of each ablation over the folds, by name, with `group`, `what`, `seconds` and per-fold `folds`.
+
+    Finished folds are kept in `out`. best_options, paper_options: options of every fit of that detector.
+    """
+    results = {}
+    for number, name in enumerate(names, start=1):
+        ablation = ABLATIONS[name]
+        tell(f"{number}/{len(names)} {name}: {ablation.what}")
+        shared = best_options if ablation.detector is None else paper_options
+        label = name if ablation.detector is not None else "best"
+        scores, folds, left_out = crossval.crossval(
+            label, files, out, seed=seed, options={**(shared or {}), **ablation.options},
+            detector=ablation.detector or get("best"), tell=tell)
+        results[name] = {"group": ablation.group, "what": ablation.what, **summary.summarise(scores),
+                         "by_height": summary.by_height(scores), "folds": folds,
+                         "seconds": sum(f["seconds"] for f in folds), "left_out": len(left_out)}
+    return results

@@ -1,0 +1,146 @@
+"""Choose the `best` detector's decoder settings from cross-validated models.
+
+First `airtouch crossval --detector best --out DIR`, then `python tools/choose_decoder.py DIR`. Each flight
+is decoded from the logits of the model that never saw it. Prints the settings that are best over all folds,
+and an honest figure for choosing them: each fold scored with the settings best on the other four.
+"""
+
+import argparse
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+from rich.progress import track
+
+from airtouch import kernels, logs
+from airtouch.cli.flights import find_flights
+from airtouch.detector import best, dataset
+from airtouch.detector.score import SAMPLE_PERIOD_S, TOLERANCE_S, match
+from airtouch.detector.stream.recipe import STRIDE
+from airtouch.reference.edge_decoder import DecoderConfig
+
+MISS_M = 0.3  #: what a missed edge costs, as if it were found so far off
+FALSE_M = 0.02  #: what one false edge a minute costs, metres of mean error
+
+
+class Flight:
+    """One flight: logits and airborne at each step, true edges, what turns seconds into metres, fold."""
+
+    def __init__(self, path: Path, condition: dataset.Condition, model) -> None:  # noqa: ANN001
+        log = logs.read(path)
+        events = best.flight_events(log, model)
+        self.name, self.fold, self.speed = path.name, condition.fold, condition.speed_mps
+        self.logits, self.airborne = events.logits[events.ready], events.airborne[events.ready]
+        self.edges = [e.sample for e in logs.true_edges(log)]
+        self.minutes = float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60
+
+
+def flights_of(folder: Path, out: Path) -> list[Flight]:
+    """Every flight with the model of its own fold in `out`."""
+    models = {}
+    for path in sorted(out.glob("best_fold*.npz")):
+        models.setdefault(int(path.name.split("_fold")[1].split("_")[0]), best.load(path))
+    return [Flight(f.path, f.condition, models[f.condition.fold])
+            for f in track(dataset.collect([folder]), "logits")]
+
+
+def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
+    """For each flight the delays of the edges found, seconds, and how many detections were false."""
+    found = []
+    for flight in flights:
+        at = np.flatnonzero(kernels.edge_decoder(flight.logits, flight.airborne, config)) * STRIDE
+        pairs = match(flight.edges, list(at), TOLERANCE_S / SAMPLE_PERIOD_S)
+        delays = np.array([(at[j] - flight.edges[i]) * SAMPLE_PERIOD_S for i, j in pairs])
+        found.append((delays, len(at) - len(pairs)))
+    return found
+
+
+def figures(flights: list[Flight], found: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
+    """Mean error of the edges found, share missed, false a minute."""
+    errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, found)])
+    edges = sum(len(f.edges) for f in flights)
+    return {"error_m": float(errors.mean()) if len(errors) else MISS_M, "missed": 1 - len(errors) / edges,
+            "false_per_minute": sum(n for _, n in found) / sum(f.minutes for f in flights)}
+
+
+def lag_of(found: list[tuple[np.ndarray, int]]) -> float:
+    """Median delay, seconds."""
+    delays = np.concatenate([d for d, _ in found])
+    return float(np.median(delays)) if len(delays) else 0.0
+
+
+def cost(flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> float:
+    """Metres: mean error with misses at MISS_M, and FALSE_M for each false edge a minute."""
+    f = figures(flights, found, lag_of(found))
+    return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
+
+
+def candidates(count: int, rng: np.random.Generator, around: list[DecoderConfig] | None = None) -> list[DecoderConfig]:
+    """Random settings; near the given ones where there are any."""
+    found = []
+    for _ in range(count):
+        base = around[rng.integers(len(around))] if around else DecoderConfig(
+            entry_score=rng.uniform(-2, 3.5), exit_score=rng.uniform(-2, 3.5), late_entry=rng.uniform(0, 4.5),
+            late_exit=rng.uniform(-4.5, 0))
+        drift = {name: getattr(base, name) + rng.normal(0, 0.3)
+                 for name in ("entry_score", "exit_score", "late_entry", "late_exit")}
+        found.append(replace(base, **{k: round(float(v), 2) for k, v in drift.items()}, arm_steps=100,
+                             over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
+                             smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
+                             dwell_steps=int(rng.choice([20, 30, 40]))))
+    return found
+
+
+def main() -> None:
+    """Search, then print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, help="folder of `airtouch crossval --detector best --out`")
+    parser.add_argument("--count", type=int, default=300, help="settings tried in each of three rounds")
+    options = parser.parse_args()
+    flights = flights_of(find_flights(), options.out)
+    rng = np.random.default_rng(0)
+    tried: list[DecoderConfig] = [best.DECODER]
+    found = [outcomes(flights, best.DECODER)]
+    for _ in range(3):
+        order = np.argsort([cost(flights, f) for f in found])[:20]
+        new = candidates(options.count, rng, [tried[i] for i in order] if len(tried) > 1 else None)
+        tried += new
+        found += [outcomes(flights, config) for config in track(new, "settings")]
+    show("as shipped", flights, found[0])
+    winner = int(np.argmin([cost(flights, f) for f in found]))
+    show("one setting, best over all folds", flights, found[winner])
+    print(json.dumps(asdict(tried[winner])))
+    nested: list[tuple[np.ndarray, int]] = []
+    for i, flight in enumerate(flights):
+        others = [k for k, f in enumerate(flights) if f.fold != flight.fold]
+        choice = _best_on(flights, found, others)
+        lag = lag_of([found[choice][k] for k in others])
+        nested.append((found[choice][i][0] - lag, found[choice][i][1]))
+    print("each fold with the settings best on the other four:", _text(figures(flights, nested, 0.0)))
+
+
+_CHOICE: dict[tuple[int, ...], int] = {}
+
+
+def _best_on(flights: list[Flight], found: list, chosen: list[int]) -> int:
+    key = tuple(chosen)
+    if key not in _CHOICE:
+        some = [flights[k] for k in chosen]
+        _CHOICE[key] = int(np.argmin([cost(some, [f[k] for k in chosen]) for f in found]))
+    return _CHOICE[key]
+
+
+def show(title: str, flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> None:
+    """One line of figures."""
+    lag = lag_of(found)
+    print(f"{title}: {_text(figures(flights, found, lag))}, lag {lag:.2f} s")
+
+
+def _text(f: dict[str, float]) -> str:
+    return (f"error {1000 * f['error_m']:.1f} mm, missed {f['missed']:.1%}, "
+            f"false {f['false_per_minute']:.2f} a minute")
+
+
+if __name__ == "__main__":
+    main()
