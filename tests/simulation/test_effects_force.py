@@ -41,7 +41,7 @@ def test_ground_effect_is_the_published_curve():
     printed = 1 / (1 - (radius / (4 * heights)) ** 2 - radius**2 * heights / np.sqrt((d**2 + 4 * heights**2) ** 3)
                    - radius**2 / 2 * heights / np.sqrt((2 * d**2 + 4 * heights**2) ** 3)
                    - 2 * radius**2 * heights / np.sqrt((b**2 + 4 * heights**2) ** 3) * 2.0)
-    got = np.array([1 + thrust_ratio(h, radius, d, 2.0, 0.0) for h in heights])
+    got = np.array([1 + thrust_ratio(h, radius, d, 2.0) for h in heights])
     np.testing.assert_allclose(got, printed, rtol=1e-12)
     np.testing.assert_allclose(100 * (got - 1), [11.6, 7.5, 5.0, 2.5], rtol=0.09)
 
@@ -49,7 +49,7 @@ def test_ground_effect_is_the_published_curve():
 @pytest.mark.parametrize("range_m", [0.03, 0.06, 0.10])
 def test_hover_pwm_over_a_platform_follows_the_curve(steady, vehicle, range_m):
     log = steady({"ground_effect": {"turbulence": 0.0}}, scene=over_platform(range_m))
-    ratio = np.mean([thrust_ratio(z + 0.025, vehicle.rotor_radius_m, math.sqrt(2) * vehicle.arm_m, 2.0, 0.0)
+    ratio = np.mean([thrust_ratio(z + 0.025, vehicle.rotor_radius_m, math.sqrt(2) * vehicle.arm_m, 2.0)
                      for z in log["z_m"] - 0.5])
     thrust = vehicle.thrust(log.stack(PWM)).sum(axis=1).mean() * (1 + ratio)
     assert thrust == pytest.approx(MASS * GRAVITY, rel=2e-3)

@@ -58,8 +58,10 @@ def flight_on_ground(effects):
 def test_imu_noise_has_its_rms(vehicle, factor):
     log = flight_on_ground({"imu_noise": {"factor": factor}})
     still = log.slice(100, len(log))
-    np.testing.assert_allclose(still.stack(ACC).std(0), factor * vehicle.acc_noise_rms_mps2, rtol=0.12, atol=1e-3)
-    np.testing.assert_allclose(still.stack(GYRO).std(0), factor * vehicle.gyro_noise_rms_radps, rtol=0.12, atol=1e-3)
+    acc = factor * vehicle.acc_noise_rms_mps2 * np.array(vehicle.acc_noise_ratio)
+    gyro = factor * vehicle.gyro_noise_rms_radps * np.array(vehicle.gyro_noise_ratio)
+    np.testing.assert_allclose(still.stack(ACC).std(0), acc, rtol=0.12, atol=1e-3)
+    np.testing.assert_allclose(still.stack(GYRO).std(0), gyro, rtol=0.12, atol=1e-3)
 
 
 def test_vibration_folds_to_the_rotors_alias(steady):

@@ -43,7 +43,7 @@ def test_the_larger_quadrotor_senses_at_around_three_metres():
     """Range: where the ground effect's force is what a Crazyflie feels at its limit of 12 cm."""
     def force(name, height):
         v = vehicles.load(name)
-        ratio = thrust_ratio(height, v.rotor_radius_m, math.sqrt(2) * v.arm_m, 2.0, 0.0)
+        ratio = thrust_ratio(height, v.rotor_radius_m, math.sqrt(2) * v.arm_m, 2.0)
         return ratio * v.mass_kg * v.gravity_mps2
     limit = force("crazyflie-2.1-flow", 0.12 + 0.025)
     reach = brentq(lambda z: force("quadrotor-450", z) - limit, 0.3, 30.0)

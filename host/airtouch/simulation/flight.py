@@ -59,7 +59,7 @@ def choose(plan: FlightPlan, effects: Chosen = (), without: Sequence[str] = ()) 
         registry.get(name)
     added = registry.activate(effects)
     named = {a.effect.name for a in added}
-    kept = [(name, values) for name, values in plan.effects.items() if name not in named]
+    kept = [(name, values) for name, values in plan.effects if name not in named]
     return [a for a in registry.activate([*kept, *added]) if a.effect.name not in without]
 
 

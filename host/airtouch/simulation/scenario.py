@@ -36,7 +36,7 @@ class FlightPlan:
     setpoints: np.ndarray
     world: world.World
     room: np.ndarray
-    effects: dict[str, dict[str, float]]
+    effects: list[tuple[str, dict[str, float]]]
     values: dict[str, Any]
 
 
@@ -93,9 +93,10 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
     if set(ground) - {"floor", "room_m"}:
         raise AirTouchError(f"{source}: [world] takes floor and room_m")
     built = world.build(platforms, ground.get("floor", "cement"))
-    chosen = {}
+    chosen = []
     for name, given in draw(table.get("effects", {}), values, rng, f"{source}: effects").items():
-        chosen[name] = effects.get(name).values(given)
+        effect = effects.get(name)
+        chosen += [(name, effect.values(one)) for one in (given if isinstance(given, list) else [given])]
     plan = draw(table["mission"], values, rng, f"{source}: mission")
     rows = mission.setpoints(plan, built, source)
     room = np.array(ground.get("room_m", DEFAULT_ROOM_M), dtype=np.float64)

@@ -13,12 +13,11 @@ LEAST_HEIGHT_RADII = 0.75  #: the formula diverges below it
 
 
 @njit(cache=True)
-def thrust_ratio(height, radius, spacing, fountain, fade):
+def thrust_ratio(height, radius, spacing, fountain):
     """Thrust near a surface over thrust far from it, minus one, for a rotor of a quadrotor.
 
     height: rotor disc over the surface, m. spacing: between neighbouring rotors, m.
-    fountain: weight of the lift on the body (the paper's K_b = 2). fade: height in m over
-    which the effect dies out beyond the formula's own decay (0: not at all).
+    fountain: weight of the lift on the body (the paper's K_b = 2).
     Source: Sanchez-Cuevas, Heredia, Ollero, Characterization of the Aerodynamic Ground
     Effect and Its Influence in Multirotor Control, 2017, eq. 8.
     """
@@ -27,10 +26,13 @@ def thrust_ratio(height, radius, spacing, fountain, fade):
     near, far = d2 + z2, 2.0 * d2 + z2
     far *= math.sqrt(far)
     loss = r2 / (4.0 * z2) + r2 * z / (near * math.sqrt(near)) + (0.5 + 2.0 * fountain) * r2 * z / far
-    ratio = 1.0 / (1.0 - min(loss, 0.9)) - 1.0
-    if fade > 0.0:
-        ratio *= math.exp(-(z / fade) ** 2)
-    return ratio
+    return 1.0 / (1.0 - min(loss, 0.9)) - 1.0
+
+
+@njit(cache=True)
+def faded(ratio, height, fade):
+    """The ratio where the lift dies out over `fade` m beyond the formula's own decay (0: it does not)."""
+    return ratio * math.exp(-(height / fade) ** 2) if fade > 0.0 else ratio
 
 
 @wrench
@@ -39,17 +41,17 @@ def ground_effect(p, s, memory, stream, out):
     fresh = math.sqrt(1.0 - decay * decay)
     radius, spacing = s[at.ROTOR_RADIUS], s[at.ROTOR_SPACING]
     for i in range(4):
-        low = s[at.LOWER_FACTOR + i] * thrust_ratio(
-            s[at.LOWER_HEIGHT + i], radius, spacing, p[FOUNTAIN], p[FADE])
-        rough = s[at.LOWER_ROUGHNESS + i]
-        share = s[at.COVER + i]
+        height, share = s[at.LOWER_HEIGHT + i], s[at.COVER + i]
+        near = (1.0 - share) * s[at.LOWER_FACTOR + i] * thrust_ratio(height, radius, spacing, p[FOUNTAIN])
+        lift = faded(near, height, p[FADE])
+        rough = near * s[at.LOWER_ROUGHNESS + i]
         if share > 0.0:
-            high = s[at.UPPER_FACTOR + i] * thrust_ratio(
-                s[at.UPPER_HEIGHT + i], radius, spacing, p[FOUNTAIN], p[FADE])
-            low += share * (high - low)
-            rough += share * (s[at.UPPER_ROUGHNESS + i] - rough)
+            height = s[at.UPPER_HEIGHT + i]
+            near = share * s[at.UPPER_FACTOR + i] * thrust_ratio(height, radius, spacing, p[FOUNTAIN])
+            lift += faded(near, height, p[FADE])
+            rough += near * s[at.UPPER_ROUGHNESS + i]
         memory[i] = decay * memory[i] + fresh * normal(stream)
-        force = p[STRENGTH] * low * s[at.THRUST + i] * (1.0 + p[TURBULENCE] * rough * memory[i])
+        force = p[STRENGTH] * s[at.THRUST + i] * (lift + p[TURBULENCE] * rough * memory[i])
         out[2] += force
         out[3] += s[at.ROTOR_Y + i] * force
         out[4] -= s[at.ROTOR_X + i] * force
@@ -61,9 +63,9 @@ EFFECT = Effect(
                "Sanchez-Cuevas 2017, eq. 8"),
      Parameter("fountain", "1", 2.0, 0.0, 5.0, None, "weight of the lift on the body, K_b",
                "Sanchez-Cuevas 2017: 2"),
-     Parameter("fade", "m", 0.0, 0.0, 1.0, None, "height over which it dies out faster than published; 0: as published",
+     Parameter("fade", "m", 0.0, 0.0, 1.0, None, "height over which the mean lift dies out faster than published; 0: as published",
                "the authors' flights show nothing above 65 mm down range"),
-     Parameter("turbulence", "1", 0.3, 0.0, 3.0, 0.0, "rms of the force over its mean, on a surface of roughness 1",
+     Parameter("turbulence", "1", 0.3, 0.0, 3.0, 0.0, "rms of the force over the published mean, on a surface of roughness 1",
                "roll rate 3.5 to 17.6 deg/s rms over the platform in the authors' low flights"),
      Parameter("turbulence_time", "s", 0.02, 0.002, 1.0, None, "its correlation time", "rotor radius over wake speed, x 3")),
     wrench=ground_effect)
