@@ -139,3 +139,11 @@ def test_an_effect_of_your_own_is_one_short_file(tmp_path, short, vehicle, signa
     finally:
         effects.unregister("magnet")
     assert effect.name not in effects.EFFECTS
+
+
+def test_the_docs_table_is_not_stale():
+    from pathlib import Path
+
+    from airtouch.simulation.effects.table import updated
+    page = (Path(__file__).parents[2] / "host" / "docs" / "effects.md").read_text(encoding="utf-8")
+    assert page == updated(page), "run: python -m airtouch.simulation.effects.table host/docs/effects.md"

@@ -125,13 +125,14 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     down, last_down_top = 0.01, ground
     next_range, next_ranges = 0.0, 0.0
     flying = False
+    power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     decay = math.exp(-h / plant.motor_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
     attitude, slope = state[6:10], work[0]
     motor_stream, imu_stream, other_stream = streams[0], streams[1], streams[2]
     rows = table.shape[0]
     steps = rows * LOG_STEPS
-    rigid_body.derivative(plant, state, patch[:4] * 0.0, 0.0, 0.0, force, work[0])
+    rigid_body.derivative(plant, state, attitude, patch[:4] * 0.0, 0.0, 0.0, force, work[0])
 
     for k in range(steps):
         t = k * h
@@ -268,8 +269,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             target[i] = motors.target_speed(plant, given, factor)
             flicker[i] = decay * flicker[i] + fresh * motor_n[i]
             plant.gain[i] = base_gain[i] * (1.0 + plant.motor_noise * flicker[i])
-            thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
-            power += plant.power_per_thrust15 * thrust * math.sqrt(thrust)
+            power += power_per_speed3 * speed[i] * speed[i] * speed[i]
             phase[i] = (phase[i] + h * speed[i]) % 6.283185307179586
         charge, battery_volts = battery.drain(plant, charge, power, h)
 

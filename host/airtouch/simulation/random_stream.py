@@ -2,7 +2,8 @@
 
 Each consumer (a sensor, an effect) owns a stream, so that switching one effect on or
 off does not change what any other draws. Source: Steele, Lea, Flood, Fast Splittable
-Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64).
+Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64); Marsaglia, Tsang, The Ziggurat Method
+for Generating Random Variables, 2000.
 """
 
 import math
@@ -17,6 +18,21 @@ _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 _S30, _S27, _S31, _S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
 _TO_UNIT = 1.0 / (1 << 53)
+_STRIP, _SIGN = np.uint64(127), np.uint64(128)
+_TAIL, _AREA = 3.442619855899, 9.91256303526217e-3  #: start of the tail; area of each strip
+
+
+def _edges() -> np.ndarray:
+    """Right edges of the strips under exp(-x^2 / 2), widest first, 0 last."""
+    edges = [_AREA / math.exp(-0.5 * _TAIL**2), _TAIL]
+    while len(edges) < 128:
+        x = edges[-1]
+        edges.append(math.sqrt(-2.0 * math.log(_AREA / x + math.exp(-0.5 * x * x))))
+    return np.array([*edges, 0.0])
+
+
+_EDGE = _edges()
+_HEIGHT = np.exp(-0.5 * _EDGE**2)
 
 
 def stream(seed: int, flight: int, name: str) -> np.ndarray:
@@ -38,17 +54,30 @@ def uniform(state):
 
 @njit(float64(STREAM), cache=True)
 def normal(state):
-    """One number of the standard normal distribution (Box and Muller)."""
-    radius = math.sqrt(-2.0 * math.log(uniform(state)))
-    return radius * math.cos(2.0 * math.pi * uniform(state))
+    """One number of the standard normal distribution (ziggurat of 128 strips)."""
+    while True:
+        state[0] += _GOLDEN
+        z = state[0]
+        z = (z ^ (z >> _S30)) * _MIX_1
+        z = (z ^ (z >> _S27)) * _MIX_2
+        z = z ^ (z >> _S31)
+        strip = int(z & _STRIP)
+        x = float(z >> _S11) * _TO_UNIT * _EDGE[strip]
+        sign = 1.0 if z & _SIGN else -1.0
+        if x < _EDGE[strip + 1]:
+            return sign * x
+        if strip == 0:
+            while True:
+                beyond = -math.log(uniform(state)) / _TAIL
+                if -2.0 * math.log(uniform(state)) >= beyond * beyond:
+                    return sign * (_TAIL + beyond)
+        low, high = _HEIGHT[strip], _HEIGHT[strip + 1]
+        if low + (high - low) * uniform(state) < math.exp(-0.5 * x * x):
+            return sign * x
 
 
 @njit(types.void(STREAM, float64[::1]), cache=True)
 def normals(state, out):
     """Fill `out` with standard normal numbers."""
-    for i in range(0, len(out), 2):
-        radius = math.sqrt(-2.0 * math.log(uniform(state)))
-        angle = 2.0 * math.pi * uniform(state)
-        out[i] = radius * math.cos(angle)
-        if i + 1 < len(out):
-            out[i + 1] = radius * math.sin(angle)
+    for i in range(len(out)):
+        out[i] = normal(state)

@@ -33,15 +33,14 @@ def thrust_wrench(plant, speed, out):
 
 
 @njit(cache=True)
-def derivative(plant, state, wrench, spin, spin_rate, force, out):
+def derivative(plant, state, q, wrench, spin, spin_rate, force, out):
     """dstate/dt into out (13,).
 
-    wrench (4,): thrust and torques of the rotors. force (6,): force and torque of the
+    q (4,): the quaternion within the state. wrench (4,): thrust and torques of the rotors. force (6,): force and torque of the
     effects, body axes. spin: net angular momentum of the rotors about z (kg m^2/s), and
     its rate of change (N m).
     """
     m = plant.mass
-    q = state[6:10]
     ax, ay, az = rotate(q, force[0] / m, force[1] / m, (force[2] + wrench[0]) / m)
     out[0], out[1], out[2] = state[3], state[4], state[5]
     out[3], out[4], out[5] = ax, ay, az - plant.gravity
@@ -66,37 +65,39 @@ def step(plant, state, speed, target, h, force, work):
     """
     k1, k2, k3, k4, trial, aux = work[0], work[1], work[2], work[3], work[4], work[5]
     now, wrench = aux[0:4], aux[4:8]
-    spin, spin_rate = _rotors_at(plant, speed, target, 0.0, now)
+    attitude, trial_attitude = state[6:10], trial[6:10]
+    rise_half, fall_half = math.exp(-0.5 * h / plant.motor_rise), math.exp(-0.5 * h / plant.motor_fall)
+    spin, spin_rate = _rotors_at(plant, speed, target, 1.0, 1.0, now)
     thrust_wrench(plant, now, wrench)
-    derivative(plant, state, wrench, spin, spin_rate, force, k1)
+    derivative(plant, state, attitude, wrench, spin, spin_rate, force, k1)
     for i in range(STATE_SIZE):
         trial[i] = state[i] + 0.5 * h * k1[i]
-    spin, spin_rate = _rotors_at(plant, speed, target, 0.5 * h, now)
+    spin, spin_rate = _rotors_at(plant, speed, target, rise_half, fall_half, now)
     thrust_wrench(plant, now, wrench)
-    derivative(plant, trial, wrench, spin, spin_rate, force, k2)
+    derivative(plant, trial, trial_attitude, wrench, spin, spin_rate, force, k2)
     for i in range(STATE_SIZE):
         trial[i] = state[i] + 0.5 * h * k2[i]
-    derivative(plant, trial, wrench, spin, spin_rate, force, k3)
+    derivative(plant, trial, trial_attitude, wrench, spin, spin_rate, force, k3)
     for i in range(STATE_SIZE):
         trial[i] = state[i] + h * k3[i]
-    spin, spin_rate = _rotors_at(plant, speed, target, h, now)
+    spin, spin_rate = _rotors_at(plant, speed, target, rise_half * rise_half, fall_half * fall_half, now)
     thrust_wrench(plant, now, wrench)
-    derivative(plant, trial, wrench, spin, spin_rate, force, k4)
+    derivative(plant, trial, trial_attitude, wrench, spin, spin_rate, force, k4)
     for i in range(STATE_SIZE):
         state[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     for i in range(4):
         speed[i] = now[i]
-    normalise(state[6:10])
+    normalise(attitude)
 
 
 @njit(cache=True)
-def _rotors_at(plant, speed, target, after, out):
-    """Rotor speeds `after` seconds into out (4,); their net angular momentum and its rate."""
+def _rotors_at(plant, speed, target, rise, fall, out):
+    """Rotor speeds into out (4,), once `rise` or `fall` of the way is left; their momentum and its rate."""
     momentum = 0.0
     rate = 0.0
     for i in range(4):
-        tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
-        out[i] = target[i] + (speed[i] - target[i]) * math.exp(-after / tau)
-        momentum += SPIN[i] * plant.rotor_inertia * out[i]
-        rate += SPIN[i] * plant.rotor_inertia * (target[i] - out[i]) / tau
-    return momentum, rate
+        rising = target[i] > speed[i]
+        out[i] = target[i] + (speed[i] - target[i]) * (rise if rising else fall)
+        momentum += SPIN[i] * out[i]
+        rate += SPIN[i] * (target[i] - out[i]) / (plant.motor_rise if rising else plant.motor_fall)
+    return plant.rotor_inertia * momentum, plant.rotor_inertia * rate
