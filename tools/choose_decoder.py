@@ -1,7 +1,8 @@
 """Choose the `best` detector's decoder settings from cross-validated models.
 
-First `airtouch crossval --detector best --out DIR`, then `python tools/choose_decoder.py DIR`. Each flight
-is decoded from the logits of the model that never saw it. Prints the settings that are best over all folds,
+First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, then
+`python tools/choose_decoder.py DIR_0 DIR_1 ...`. Each flight is decoded from the logits of the model that
+never saw it, once for each folder. Prints the settings that are best over all folds,
 and an honest figure for choosing them: each fold scored with the settings best on the other four.
 """
 
@@ -76,7 +77,8 @@ def cost(flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> float:
     return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
 
 
-def candidates(count: int, rng: np.random.Generator, around: list[DecoderConfig] | None = None) -> list[DecoderConfig]:
+def candidates(count: int, rng: np.random.Generator, hold: int,
+               around: list[DecoderConfig] | None = None) -> list[DecoderConfig]:
     """Random settings; near the given ones where there are any."""
     found = []
     for _ in range(count):
@@ -88,23 +90,25 @@ def candidates(count: int, rng: np.random.Generator, around: list[DecoderConfig]
         found.append(replace(base, **{k: round(float(v), 2) for k, v in drift.items()}, arm_steps=100,
                              over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
                              smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
-                             dwell_steps=int(rng.choice([20, 30, 40]))))
+                             dwell_steps=int(rng.choice([20, 30, 40])), look_back=50, hold_steps=hold))
     return found
 
 
 def main() -> None:
     """Search, then print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path, help="folder of `airtouch crossval --detector best --out`")
+    parser.add_argument("out", type=Path, nargs="+", help="folders of `airtouch crossval --detector best --out`")
     parser.add_argument("--count", type=int, default=300, help="settings tried in each of three rounds")
+    parser.add_argument("--hold", type=int, default=best.DECODER.hold_steps,
+                        help="steps after its crossing at which an edge is reported (default: as shipped)")
     options = parser.parse_args()
-    flights = flights_of(find_flights(), options.out)
+    flights = [flight for out in options.out for flight in flights_of(find_flights(), out)]
     rng = np.random.default_rng(0)
     tried: list[DecoderConfig] = [best.DECODER]
     found = [outcomes(flights, best.DECODER)]
     for _ in range(3):
         order = np.argsort([cost(flights, f) for f in found])[:20]
-        new = candidates(options.count, rng, [tried[i] for i in order] if len(tried) > 1 else None)
+        new = candidates(options.count, rng, options.hold, [tried[i] for i in order] if len(tried) > 1 else None)
         tried += new
         found += [outcomes(flights, config) for config in track(new, "settings")]
     show("as shipped", flights, found[0])

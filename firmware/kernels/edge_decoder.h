@@ -2,7 +2,9 @@
  * @file edge_decoder.h
  * From the streaming network's three logits (over a platform, entry now, exit now)
  * to edges: an event fires where its own logit and the state agree, or late where
- * the state alone has changed for good.
+ * the state alone has changed for good. When an edge was seen says little of when
+ * it was crossed; the peak of its logit says more. So an edge is reported a fixed
+ * time after that peak, and what is left of the delay is one constant.
  */
 #pragma once
 
@@ -11,9 +13,17 @@
 
 #include "kernel_types.h"
 
+/** Steps of the event logits that are kept: the largest lookBack is one less. */
+#define EDGE_DECODER_RING 64
+
 /** The decoder's memory. */
 typedef struct {
   decoderConfig_t config;
+  float recent[2][EDGE_DECODER_RING];  ///< entry and exit logits, newest at `newest`
+  uint32_t newest;
+  float peak;         ///< logit at the crossing of the edge that waits
+  uint32_t due;       ///< steps until it is reported
+  uint8_t waiting;    ///< its kind: 0 none, 1 entry, 2 exit
   float slow;         ///< smoothed over logit
   uint32_t airborne;  ///< steps in the air
   uint32_t since;     ///< steps since the last edge
@@ -28,6 +38,6 @@ void edgeDecoderInit(edgeDecoder_t *decoder, const decoderConfig_t *config);
  * @param logits    over, entry, exit; NaN counts as "no"
  * @param airborne  whether the drone flies; on the ground it is over nothing
  * @return 0 nothing, 1 entry, 2 exit
- * Costs about 30 operations. Never fails.
+ * Costs about 30 operations, where an edge is seen up to 200 more. Never fails.
  */
 uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airborne);

@@ -86,6 +86,8 @@ typedef struct {
   float smoothGain;     ///< of that smoothing, a step
   uint32_t dwellSteps;  ///< at least so long between two edges
   uint32_t armSteps;    ///< airborne for so long before the first
+  uint32_t lookBack;    ///< the crossing is where the event's logit peaked in so many steps before, at most 63
+  uint32_t holdSteps;   ///< an edge is reported so long after its crossing; 0: as soon as it is seen
 } decoderConfig_t;
 
 /** How the streaming detector's network takes and gives numbers. */

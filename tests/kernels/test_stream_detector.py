@@ -71,15 +71,16 @@ def test_a_lift_shows_as_unexplained_acceleration_whatever_the_battery():
 
 @settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**31), n=st.integers(0, 600), nan=st.booleans(),
-       dwell=st.integers(0, 40), arm=st.integers(0, 60), share=st.floats(0, 1))
-def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, arm, share):
+       dwell=st.integers(0, 40), arm=st.integers(0, 60), share=st.floats(0, 1), hold=st.integers(0, 70),
+       look_back=st.integers(0, 63))
+def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, arm, share, hold, look_back):
     rng = np.random.default_rng(seed)
     logits = np.cumsum(rng.normal(0, 0.7, (n, 3)), axis=0).astype(np.float32)
     if nan and n:
         logits[rng.integers(0, n, 5)] = np.nan
     airborne = np.cumsum(rng.random(n) < 0.01) % 2 == 0
     config = DecoderConfig(over_share=float(np.float32(share)), dwell_steps=dwell, arm_steps=arm,
-                                        smooth_gain=0.125)
+                           smooth_gain=0.125, look_back=look_back, hold_steps=hold)
     edges = c.edge_decoder(logits, airborne, config)
     expected = edge_decoder(logits.astype(np.float64), airborne, config)
     first = np.flatnonzero(edges != expected)[:1]
@@ -88,7 +89,22 @@ def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, ar
     assert not edges[~airborne].any()
     for a, b in zip(at, at[1:]):
         flown = airborne[a:b + 1].all()
-        assert not flown or (b - a >= dwell and edges[a] != edges[b])
+        assert not flown or ((hold or b - a >= dwell) and edges[a] != edges[b])
+
+
+def test_an_edge_is_reported_a_fixed_time_after_the_peak_of_its_logit():
+    """A clear bump is seen at once; a weak one only late, by the state; both are reported hold_steps after."""
+    logits = np.tile([-4.0, -6.0, -6.0], (400, 1))
+    logits[150:, 0] = 4.0
+    config = DecoderConfig(entry_score=3.0, late_entry=2.0, smooth_gain=0.2, hold_steps=30, look_back=50)
+    reported = []
+    for height in (4.0, -1.0):
+        logits[145:156, 1] = height - np.abs(np.arange(-5, 6))
+        reported.append(list(np.flatnonzero(edge_decoder(logits, np.ones(400, bool), config))))
+        assert list(np.flatnonzero(c.edge_decoder(logits, np.ones(400, bool), config))) == reported[-1]
+    assert reported == [[180], [180]]
+    at_once = DecoderConfig(entry_score=3.0, late_entry=2.0, smooth_gain=0.2, hold_steps=0)
+    assert 150 < np.flatnonzero(edge_decoder(logits, np.ones(400, bool), at_once))[0] < 160
 
 
 def _near_threshold(logits: np.ndarray, config: DecoderConfig, at: int) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from airtouch import __version__, kernels, logs
 from airtouch.detector import tuning
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.channels import level_acceleration, nine_channels
 from airtouch.detector.stream import model as model_file
 from airtouch.detector.stream.model import StreamModel
 from airtouch.detector.stream.recipe import STRIDE, Recipe
@@ -39,11 +39,13 @@ def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
     """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
     model = model or load(None)
     events = flight_events(log, model)
-    over, entry, leave = _probability(events.logits).T
-    sure = np.where(events.edge == 2, leave, entry)
-    edges = [Detection(int(i), KINDS[int(events.edge[i])], float(sure[i])) for i in np.flatnonzero(events.edge)]
-    probability = np.where(events.airborne, over, 0.0)
-    return Trace(probability, edges, {"logits": events.logits})
+    over, *crossing = _probability(events.logits).T
+    recent = (model.decoder.hold_steps + model.decoder.look_back) * STRIDE
+    edges = []
+    for i in np.flatnonzero(events.edge):
+        kind = int(events.edge[i])
+        edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
+    return Trace(np.where(events.airborne, over, 0.0), edges, {"channels": nine_channels(log), "logits": events.logits})
 
 
 def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:

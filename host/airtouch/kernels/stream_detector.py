@@ -94,7 +94,8 @@ def decoder_struct(config: DecoderConfig) -> object:
     return ffi.new("decoderConfig_t *", {
         "overShare": config.over_share, "entryScore": config.entry_score, "exitScore": config.exit_score,
         "lateEntry": config.late_entry, "lateExit": config.late_exit, "smoothGain": config.smooth_gain,
-        "dwellSteps": config.dwell_steps, "armSteps": config.arm_steps})
+        "dwellSteps": config.dwell_steps, "armSteps": config.arm_steps, "lookBack": config.look_back,
+        "holdSteps": config.hold_steps})
 
 
 def _signals(acc: np.ndarray, gyro: np.ndarray, pwm: np.ndarray) -> tuple[np.ndarray, ...]:

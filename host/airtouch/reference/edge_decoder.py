@@ -15,7 +15,9 @@ class DecoderConfig:
 
     An entry fires where entry logit + over_share * over logit > entry_score, an exit where
     exit logit - over_share * over logit > exit_score; or late, where the over logit smoothed
-    by smooth_gain a step passes late_entry upwards or late_exit downwards.
+    by smooth_gain a step passes late_entry upwards or late_exit downwards. The crossing is taken to be where
+    the event's logit peaked within look_back steps before (or while the edge waits); the edge is reported
+    hold_steps after it, at once where that has passed.
     """
 
     over_share: float = 0.5
@@ -26,6 +28,8 @@ class DecoderConfig:
     smooth_gain: float = 0.1
     dwell_steps: int = 20
     arm_steps: int = 100
+    look_back: int = 50
+    hold_steps: int = 0
 
 
 def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig = DecoderConfig()) -> np.ndarray:
@@ -35,21 +39,32 @@ def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig
     """
     limited = np.clip(np.where(np.isnan(logits), -LOGIT_LIMIT, logits), -LOGIT_LIMIT, LOGIT_LIMIT)
     edges = np.zeros(len(limited), dtype=np.uint8)
-    slow, since, flown, over = SLOW_AT_START, LONG_AGO, 0, False
-    for t, (p, entry, leave) in enumerate(limited):
+    start, waiting, due, peak, over, slow, since = 0, 0, 0, 0.0, False, SLOW_AT_START, LONG_AGO
+    for t, (p, *events) in enumerate(limited):
         if not airborne[t]:
-            slow, since, flown, over = SLOW_AT_START, LONG_AGO, 0, False
+            start, waiting, over, slow, since = t + 1, 0, False, SLOW_AT_START, LONG_AGO
             continue
-        flown += 1
         slow += config.smooth_gain * (p - slow)
         since = min(since + 1, LONG_AGO)
-        if flown < config.arm_steps or since < config.dwell_steps:
-            continue
-        if over:
-            fires = leave - config.over_share * p > config.exit_score or slow < config.late_exit
-        else:
-            fires = entry + config.over_share * p > config.entry_score or slow > config.late_entry
-        if fires:
+        if waiting and events[waiting - 1] > peak:
+            peak, due = events[waiting - 1], config.hold_steps
+        elif waiting:
+            due = max(due - 1, 0)
+        free = t + 1 - start >= config.arm_steps and since >= config.dwell_steps
+        if free and _fires(p, events[int(over)], slow, over, config):
+            edges[t] = waiting
+            recent = limited[max(t - config.look_back, start):t + 1, 1 + int(over)][::-1]
+            back = int(np.argmax(recent))
+            peak, due = recent[back], max(config.hold_steps - back, 0)
             over, since, slow = not over, 0, 0.0
-            edges[t] = 1 if over else 2
+            waiting = 1 if over else 2
+        if not edges[t] and waiting and due == 0:
+            edges[t], waiting = waiting, 0
     return edges
+
+
+def _fires(p: float, event: float, slow: float, over: bool, config: DecoderConfig) -> bool:
+    """Whether an edge is seen: by its own logit beside the over logit, or late by the smoothed one."""
+    if over:
+        return event - config.over_share * p > config.exit_score or slow < config.late_exit
+    return event + config.over_share * p > config.entry_score or slow > config.late_entry
