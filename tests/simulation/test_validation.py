@@ -9,7 +9,7 @@ from scipy.signal import butter, lfilter
 
 from airtouch import logs
 from airtouch import vehicle as vehicles
-from airtouch.logs.flight_log import PWM, FlightLog
+from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 from airtouch.logs.thrust_stand import read_thrust_stand
 from airtouch.simulation import effects, motors, replay
 from airtouch.simulation.plant import from_vehicle
@@ -141,3 +141,30 @@ def test_replayed_commands_give_the_recorded_acceleration_and_rpm(flights):
         log, good = flown(flights, name)
         got = replayed(log, *best)[1][good, 1:] / np.mean(per_rpm, axis=0)
         assert rms(got, log.stack(("rpm_2", "rpm_3", "rpm_4"))[good]) < 0.05
+
+
+@pytest.mark.parametrize(("name", "letter"), [("cal_A_0", "a"), ("cal_A_1", "a"), ("cal_B_0", "b"), ("cal_B_1", "b")])
+def test_other_peoples_simulators_are_replayed_to_their_sensor_noise(flights, name, letter):
+    """RotorPy (A) and gym-pybullet-drones (B), free of unmodelled effects: what is left is noise."""
+    log = logs.read(flights / "peers" / f"{name}.csv.gz")
+    vehicle = vehicles.load(flights / "peers" / f"vehicle_{letter}.toml")
+    flying = (log["z_m"] > 0.1) & (log.stack(PWM).mean(1) > 15000)
+    result = replay.run(log, vehicle)
+    left = (log.stack(ACC) - result.specific_force)[flying]
+    np.testing.assert_allclose(left.std(0), vehicle.acc_noise_rms_mps2, rtol=0.08)
+    np.testing.assert_allclose(left.mean(0), 0.0, atol=0.01)
+    # rates over 0.1 s from the motors alone: correlation, and what is left against the gyro's own noise
+    turned = np.cumsum(result.angular_acceleration, axis=0) * 0.01
+    at = np.flatnonzero(flying)[:-10]
+    model, measured = (turned[at + 10] - turned[at])[:, :2], (log.stack(GYRO)[at + 10] - log.stack(GYRO)[at])[:, :2]
+    for axis in range(2):
+        assert np.corrcoef(model[:, axis], measured[:, axis])[0, 1] > 0.99
+    assert np.all((model - measured).std(0) < 2.1 * np.sqrt(2) * vehicle.gyro_noise_rms_radps)
+    # height 2 s ahead, open loop, from the commands
+    climb = result.specific_force[:, 2] - vehicle.gravity_mps2
+    errors = []
+    for s in range(at[0] + 50, at[-1] - 250, 100):
+        speed = np.polyfit(np.arange(-10, 11) * 0.01, log["z_m"][s - 10:s + 11], 1)[0]
+        ahead = log["z_m"][s] + np.cumsum(speed + np.cumsum(climb[s:s + 200]) * 0.01)[-1] * 0.01
+        errors.append(ahead - log["z_m"][s + 200])
+    assert np.sqrt(np.mean(np.square(errors))) < 0.02
