@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 from airtouch import kernels, logs
 from airtouch.detector import best
 from airtouch.detector.stream import batches, model as model_file, quantisation
+from airtouch.detector.stream.float_network import float_logits
 from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
@@ -86,22 +87,25 @@ def _check_against_tflite_micro(model, x: np.ndarray, count: int) -> int:
 def test_the_float_network_is_what_was_quantised(small):
     """int8 logits follow the float ones within a few steps of the output scale."""
     x = batches.channels_of(made_flight(6))[0]
-    rows = []
-    y = x.astype(np.float64)
-    for i, (taps, _, _) in enumerate(SMALL.shapes[:-1]):
-        dilation = (1, *SMALL.dilations)[i]
-        padded = np.vstack([np.zeros(((taps - 1) * dilation, y.shape[1])), y])
-        kernel = small.weights[f"layer{i}.kernel"]
-        y = sum(padded[k * dilation:][:len(y)] @ kernel[k] for k in range(taps)) + small.weights[f"layer{i}.bias"]
-        y = np.maximum(y, 0)[::STRIDE if i == 0 else 1]
-        rows += [y] if i else []
-    last = len(SMALL.shapes) - 1
-    logits = np.hstack(rows) @ small.weights[f"layer{last}.kernel"].reshape(-1, 3) + small.weights[f"layer{last}.bias"]
+    logits = float_logits(small.weights, SMALL, x)
     head = small.int8.head
     first = small.int8.convs[0].layer
     out = kernels.run_stream(small.int8, quantise(x, first.input_scale, first.input_zero_point))
     error = np.abs(head.output_scale * (out.astype(float) - head.output_zero_point) - logits)
     assert np.median(error) < 3 * head.output_scale
+
+
+def test_the_float_network_is_the_one_that_keras_trained(small):
+    from airtouch.detector.stream import training
+
+    keras_model = training.build(SMALL)
+    last = len(SMALL.shapes) - 1
+    shapes = [v.shape for v in keras_model.trainable_variables]
+    names = [f"layer{i}.{part}" for i in range(last + 1) for part in ("kernel", "bias")]
+    keras_model.set_weights([small.weights[name].reshape(shape) for name, shape in zip(names, shapes, strict=True)])
+    x = batches.channels_of(made_flight(6))[0]
+    expected = np.asarray(keras_model(x[None]))[0]
+    assert np.allclose(float_logits(small.weights, SMALL, x), expected, atol=1e-4)
 
 
 def test_it_is_causal_and_never_looks_at_the_range(small):

@@ -65,9 +65,23 @@ def _training(rows: dict[str, dict[str, Any]]) -> Table:
 
 
 def _sizes(rows: dict[str, dict[str, Any]]) -> Table:
-    """What the drone carries and computes."""
-    table = Table("", "parameters, bytes", "state, bytes", "MAC a sample", title="size and cost", title_justify="left")
+    """What the drone carries and computes, and what int8 loses against float."""
+    table = Table("", "parameters, bytes", "state, bytes", "MAC a sample", "balanced, float", "int8", "error, float",
+                  "int8", "missed, float", "int8", title="size, cost and what int8 costs", title_justify="left")
     for what, row in rows.items():
-        p = row["folds"][0]["parameters"]
-        table.add_row(what, str(p["parameter_bytes"]), str(p["state_bytes"]), f"{p['mac_per_sample']:.0f}")
+        p, exact = row["folds"][0]["parameters"], row.get("float")
+        pairs = [f(r) for f in (_accuracy, _error, _missed) for r in (exact, row)]
+        table.add_row(what, str(p["parameter_bytes"]), str(p["state_bytes"]), f"{p['mac_per_sample']:.0f}", *pairs)
     return table
+
+
+def _accuracy(row: dict[str, Any] | None) -> str:
+    return f"{row['balanced_accuracy']:.1%}" if row else ""
+
+
+def _error(row: dict[str, Any] | None) -> str:
+    return f"{1000 * row['mean_abs_error_m']:.1f} mm" if row and row["mean_abs_error_m"] is not None else ""
+
+
+def _missed(row: dict[str, Any] | None) -> str:
+    return f"{row['missed']:.1%}" if row else ""

@@ -3,11 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from airtouch.detector import crossval, summary
+from airtouch.detector import crossval, evaluate, summary
 from airtouch.detector.dataset import FlightFile
 from airtouch.detector.registry import Detector, get
+from airtouch.detector.score import FlightScore
 from airtouch.detector.variants import Variant
 from airtouch.reference.motion_channels import NAMES
 
@@ -19,11 +21,12 @@ VERTICAL = ("az", "motor mean", "unexplained az")
 
 @dataclass(frozen=True)
 class Ablation:
-    """One row: a detector and how it is changed. detector None is the registered `best`."""
+    """One row: a detector and how it is changed; the registered one of this name, or a variant."""
 
     group: str
     what: str
-    detector: Detector | None = None
+    variant: Detector | None = None
+    name: str = "best"
     options: dict[str, Any] = field(default_factory=dict)
 
 
@@ -57,7 +60,11 @@ ABLATIONS: dict[str, Ablation] = {
     "flights-10": Ablation("flights", "10 training flights", options={"most_flights": 10}),
     "flights-20": Ablation("flights", "20 training flights", options={"most_flights": 20}),
     "flights-40": Ablation("flights", "40 training flights", options={"most_flights": 40}),
+    "paper-0": Ablation("size", "paper, no pruning", None, "paper", {"sparsity": 0.0}),
+    "paper-80": Ablation("size", "paper, 80 % zeros (shipped)", None, "paper", {"sparsity": 0.8}),
+    "paper-90": Ablation("size", "paper, 90 % zeros", None, "paper", {"sparsity": 0.9}),
     "sparsity-0": Ablation("size", "best, no pruning", options={"sparsity": 0.0}),
+    "sparsity-50": Ablation("size", "best, 50 % zeros (shipped)"),
     "sparsity-70": Ablation("size", "best, 70 % zeros", options={"sparsity": 0.7}),
     "sparsity-85": Ablation("size", "best, 85 % zeros", options={"sparsity": 0.85}),
     "width-16": Ablation("size", "best, width 16, no pruning", options={"width": 16, "sparsity": 0.0}),
@@ -77,12 +84,23 @@ def ablate(
     for number, name in enumerate(names, start=1):
         ablation = ABLATIONS[name]
         tell(f"{number}/{len(names)} {name}: {ablation.what}")
-        shared = best_options if ablation.detector is None else paper_options
-        label = name if ablation.detector is not None else "best"
+        detector = ablation.variant or get(ablation.name)
+        shared = best_options if ablation.variant is None and ablation.name == "best" else paper_options
         scores, folds, left_out = crossval.crossval(
-            label, files, out, seed=seed, options={**(shared or {}), **ablation.options},
-            detector=ablation.detector or get("best"), tell=tell)
+            name if ablation.variant else ablation.name, files, out, seed=seed,
+            options={**(shared or {}), **ablation.options}, detector=detector, tell=tell)
         results[name] = {"group": ablation.group, "what": ablation.what, **summary.summarise(scores),
                          "by_height": summary.by_height(scores), "folds": folds,
                          "seconds": sum(f["seconds"] for f in folds), "left_out": len(left_out)}
+        if ablation.group == "size":
+            results[name]["float"] = summary.summarise(_in_float(detector, files, folds, out))
     return results
+
+
+def _in_float(detector: Detector, files: Sequence[FlightFile], folds: list[dict], out: Path) -> list[FlightScore]:
+    """The same folds and models, with the float network as trained."""
+    models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
+    view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
+    readable, _ = crossval.readable_flights(files)
+    return [evaluate.evaluate_flight(f, readable[f.path], view, models[f.condition.fold]).score
+            for f in files if f.path in readable]

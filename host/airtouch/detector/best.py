@@ -16,6 +16,8 @@ from airtouch import __version__, kernels, logs
 from airtouch.detector import tuning
 from airtouch.detector.channels import level_acceleration, nine_channels
 from airtouch.detector.stream import model as model_file
+from airtouch.detector.stream.batches import channels_of
+from airtouch.detector.stream.float_network import float_logits
 from airtouch.detector.stream.model import StreamModel
 from airtouch.detector.stream.recipe import STRIDE, Recipe
 from airtouch.detector.trace import Detection, Trace
@@ -39,13 +41,27 @@ def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
     """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
     model = model or load(None)
     events = flight_events(log, model)
-    over, *crossing = _probability(events.logits).T
+    return _trace(log, model, events.logits, events.edge, events.airborne)
+
+
+def run_float(log: FlightLog, model: StreamModel) -> Trace:
+    """As `run`, with the float network as trained: what quantisation is measured against."""
+    x, airborne = channels_of(log, model.recipe.motion)
+    steps = float_logits(model.weights, model.recipe, x)
+    edge = np.zeros(len(log), dtype=np.uint8)
+    edge[::STRIDE] = kernels.edge_decoder(steps, airborne[::STRIDE], model.decoder)
+    return _trace(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
+
+
+def _trace(log: FlightLog, model: StreamModel, logits: np.ndarray, edge: np.ndarray, airborne: np.ndarray) -> Trace:
+    """Edges with the highest probability of their crossing that led to them."""
+    over, *crossing = (1.0 / (1.0 + np.exp(-logits.astype(np.float64)))).T
     recent = (model.decoder.hold_steps + model.decoder.look_back) * STRIDE
     edges = []
-    for i in np.flatnonzero(events.edge):
-        kind = int(events.edge[i])
+    for i in np.flatnonzero(edge):
+        kind = int(edge[i])
         edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
-    return Trace(np.where(events.airborne, over, 0.0), edges, {"channels": nine_channels(log), "logits": events.logits})
+    return Trace(np.where(airborne, over, 0.0), edges, {"channels": nine_channels(log), "logits": logits})
 
 
 def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:
@@ -115,6 +131,3 @@ def parameters(model: StreamModel | None) -> dict[str, Any]:
             "mac_per_sample": model.int8.multiplications / STRIDE, **asdict(model.decoder),
             "seed": model.metadata.get("seed")}
 
-
-def _probability(logits: np.ndarray) -> np.ndarray:
-    return 1.0 / (1.0 + np.exp(-logits.astype(np.float64)))

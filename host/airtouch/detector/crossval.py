@@ -70,11 +70,12 @@ def crossval(
         if entry is None:
             tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
             started = time.monotonic()
-            model = model_of_fold(detector, train, out / f"{name}_fold{fold}_{key}.npz", seed, options or {})
+            kept = out / f"{name}_fold{fold}_{key}.npz"
+            model = model_of_fold(detector, train, kept, seed, options or {})
             if not physical_filter:
                 model = detector.retune(model, train, False)
             results = [evaluate.evaluate_flight(f, readable[f.path], detector, model).score for f in test]
-            entry = {"fold": fold, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
+            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
                      "seconds": round(time.monotonic() - started, 1),
                      "per_flight": [s.as_dict() for s in results]}
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)

@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from airtouch import kernels
+from airtouch import kernels, reference
 from airtouch import vehicle as vehicles
 from airtouch.detector.channels import level_acceleration, nine_channels, thrust_axis
 from airtouch.logs.flight_log import GYRO, PWM, FlightLog
@@ -48,3 +49,16 @@ def flight_features(log: FlightLog, vehicle: Vehicle | None = None,
         config=EdgePipelineConfig(parameters))
     return Features(nine_channels(log), events.band_power, events.features, events.force,
                     events.cfar_power, events.threshold, events.alert)
+
+
+def feature_windows(fused: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """z-scored windows (k, rows, c) float32 of fused features (n, c), and the sample at which each ends, (k,).
+
+    Windows that hold a value that is not finite are left out.
+    """
+    if len(fused) < rows:
+        return np.zeros((0, rows, fused.shape[1]), np.float32), np.zeros(0, int)
+    raw = np.moveaxis(sliding_window_view(fused, rows, axis=0), 2, 1)
+    usable = np.isfinite(raw).all(axis=(1, 2))
+    ends = np.arange(rows - 1, len(fused))[usable]
+    return reference.z_score_window(raw[usable]).astype(np.float32), ends

@@ -20,14 +20,15 @@ from airtouch.detector import model_file, tuning
 from airtouch.detector.channels import level_acceleration, thrust_axis
 from airtouch.detector.decode import decode, detections
 from airtouch.detector.decode import physical_filter as filtered
-from airtouch.detector.features import Features, flight_features
+from airtouch.detector.features import Features, feature_windows, flight_features
 from airtouch.detector.model_file import Model
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
-from airtouch.kernels.network import probability_of_flight
+from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
 from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.edge_pipeline import EdgeEvents, EdgePipelineConfig
+from airtouch.reference.int8_network import multiplications
 
 #: What `tune` chooses from: P at entry, P at exit, samples between edges, samples an alert counts.
 ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
@@ -39,9 +40,22 @@ HOLD = (25, 50, 100, 200)
 def run(log: FlightLog, model: Model | None = None) -> Trace:
     """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
     model = model or load(None)
+    features = flight_features(log, parameters=decoding(model)[0])
+    return _trace(log, model, features, probability_of_flight(model, features.fused))
+
+
+def run_float(log: FlightLog, model: Model) -> Trace:
+    """As `run`, with the float network as trained: what quantisation is measured against."""
+    features = flight_features(log, parameters=decoding(model)[0])
+    windows, ends = feature_windows(features.fused, DEFAULT.feature_window)
+    logits = infer_float(model.float_layers, windows).astype(np.float64)
+    probability = np.full(len(log), np.nan)
+    probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
+    return _trace(log, model, features, probability)
+
+
+def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
     settings, physical = decoding(model)
-    features = flight_features(log, parameters=settings)
-    probability = probability_of_flight(model, features.fused)
     events = pipeline(log, settings, probability, physical)
     return Trace(probability, detections(events.edge, probability), signals(features))
 
@@ -117,11 +131,14 @@ def lag_s(model: Model | None) -> float:
 
 
 def parameters(model: Model | None) -> dict[str, Any]:
-    """Pipeline and decoding settings, and how the network was trained."""
-    metadata = (model or load(None)).metadata
+    """Size, cost, pipeline and decoding settings, and how the network was trained."""
+    model = model or load(None)
+    metadata = model.metadata
+    size = {"parameter_bytes": parameter_bytes(model.int8), "state_bytes": arena_bytes(model.int8),
+            "mac_per_sample": multiplications(model.int8)}
     named = ("seed", "epochs", "epochs_run", "sparsity", "block", "lambda", "physical_filter",
              "tuned_timed_f1")
-    return {**metadata.get("parameters", asdict(DEFAULT)), **{k: metadata[k] for k in named if k in metadata}}
+    return {**size, **metadata.get("parameters", asdict(DEFAULT)), **{k: metadata[k] for k in named if k in metadata}}
 
 
 def decoding(model: Model) -> tuple[Parameters, bool]:

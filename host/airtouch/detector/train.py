@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
-from airtouch import __version__, logs, reference
+from airtouch import __version__, logs
 from airtouch.detector import network, pruning, quantisation
-from airtouch.detector.features import Features, flight_features
+from airtouch.detector.features import Features, feature_windows, flight_features
 from airtouch.detector.losses import DEFAULT_LAMBDA, edge_loss
 from airtouch.detector.model_file import Model
 from airtouch.detector.score import over_platform
@@ -108,18 +107,11 @@ def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Window
 
 def windows_of(log: FlightLog, features: Features, index: int = 0) -> Windows:
     """The training windows of one flight."""
-    size = DEFAULT.feature_window
-    if len(log) < size:
-        return Windows(np.zeros((0, size, 3), np.float32), np.zeros(0, np.float32), np.zeros(0, np.float32),
-                       np.zeros(0, np.int32))
-    raw = np.moveaxis(sliding_window_view(features.fused, size, axis=0), 2, 1)
-    ends = np.arange(size - 1, len(log))
-    usable = logs.airborne(log)[ends] & np.isfinite(raw).all(axis=(1, 2))
-    ends = ends[usable]
+    x, ends = feature_windows(features.fused, DEFAULT.feature_window)
+    flying = logs.airborne(log)[ends]
+    x, ends = x[flying], ends[flying]
     over = over_platform(logs.true_edges(log), len(log))
-    x = reference.z_score_window(raw[usable]) if len(ends) else raw[usable]
-    return Windows(x.astype(np.float32), over[ends].astype(np.float32),
-                   features.alert[ends].astype(np.float32),
+    return Windows(x, over[ends].astype(np.float32), features.alert[ends].astype(np.float32),
                    np.full(len(ends), index, np.int32))
 
 

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
-from airtouch import logs, reference
+from airtouch import logs
 from airtouch.detector import paper, train, tuning
 from airtouch.detector.decode import decode
-from airtouch.detector.features import flight_features
+from airtouch.detector.features import feature_windows, flight_features
 from airtouch.detector.losses import DEFAULT_LAMBDA
 from airtouch.detector.pruning import BLOCK
 from airtouch.detector.score import over_platform
@@ -91,7 +90,7 @@ class Variant:
     def _windows(self, log: FlightLog, index: int) -> train.Windows:
         """Training windows of one flight."""
         fused, alert = self._features(log)
-        x, ends = _windows_of(fused, self.rows)
+        x, ends = feature_windows(fused, self.rows)
         flying = logs.airborne(log)[ends]
         x, ends = x[flying], ends[flying]
         over = over_platform(logs.true_edges(log), len(log)).astype(np.float32)
@@ -100,7 +99,7 @@ class Variant:
     def _seen(self, log: FlightLog, model: "VariantModel") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """P(over) (n,), armed (n,), alerts (n,)."""
         fused, alert = self._features(log)
-        x, ends = _windows_of(fused, self.rows)
+        x, ends = feature_windows(fused, self.rows)
         logits = np.asarray(model.network.predict(x[..., None], batch_size=2048, verbose=0), dtype=np.float64)
         probability = np.full(len(log), np.nan)
         probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
@@ -116,12 +115,3 @@ class VariantModel:
     lag_s: float
     converged: int
 
-
-def _windows_of(fused: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """z-scored windows (k, rows, 3) float32 and the sample at which each ends, (k,)."""
-    if len(fused) < rows:
-        return np.zeros((0, rows, fused.shape[1]), np.float32), np.zeros(0, int)
-    raw = np.moveaxis(sliding_window_view(fused, rows, axis=0), 2, 1)
-    usable = np.isfinite(raw).all(axis=(1, 2))
-    ends = np.arange(rows - 1, len(fused))[usable]
-    return reference.z_score_window(raw[usable]).astype(np.float32), ends

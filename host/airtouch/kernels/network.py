@@ -112,6 +112,12 @@ def parameter_bytes(network: Int8Network) -> int:
     return total
 
 
+def arena_bytes(network: Int8Network) -> int:
+    """Bytes of working memory of one inference, the input not counted."""
+    flat, keep = flat_layers(network.layers)
+    return checked(lib.networkInt8BatchArena(flat))
+
+
 def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A layer's weights, block counts and block skips as the C kernels take them; the last two are
     empty where the layer keeps all its weights."""
