@@ -98,7 +98,7 @@ def test_command_writes_flights_and_continues(quick, tmp_path):
 def test_a_killed_run_continues(quick, tmp_path):
     out = tmp_path / "out"
     code = "from airtouch.cli import main; import sys; sys.argv[0] = 'airtouch'; main()"
-    args = [sys.executable, "-c", code, "simulate", str(quick), "--flights", "60", "--out", str(out), "--workers", "1"]
+    args = [sys.executable, "-c", code, "simulate", str(quick), "--flights", "60", "--out", str(out), "--workers", "2"]
     process = subprocess.Popen(args, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     for _ in range(600):
         time.sleep(0.05)
@@ -106,6 +106,7 @@ def test_a_killed_run_continues(quick, tmp_path):
             break
     process.kill()
     process.wait()
+    time.sleep(0.5)  # its children end by themselves
     done = {f.name: f.stat().st_mtime_ns for f in out.glob("*.csv.gz")}
     assert 3 <= len(done) < 60
     CliRunner().invoke(command, [*args[4:]], catch_exceptions=False)

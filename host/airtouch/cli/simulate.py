@@ -6,6 +6,8 @@ import click
 
 from airtouch.errors import AirTouchError
 
+FLIGHTS_A_PROCESS = 10  #: no further process for fewer
+
 
 def _list_effects(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     if not value:
@@ -40,7 +42,7 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
 @click.option("--without", multiple=True, metavar="NAME", help="Switch an effect of the scenario off.")
 @click.option("--effect-file", "files", multiple=True, help="Python file with an effect of your own.")
 @click.option("--seed", default=0, show_default=True, help="Of the whole batch.")
-@click.option("--workers", type=int, help="Threads; default one a core.")
+@click.option("--workers", type=int, help="Processes; default one a core.")
 @click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler.")
 @click.option("--force", is_flag=True, help="Remove flights of another request from --out.")
 @click.option("--list-effects", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects,
@@ -55,7 +57,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     number and never written; the exit code is then 1.
     """
     from airtouch import vehicle as vehicles
-    from airtouch.simulation import batch, cluster, effects, store
+    from airtouch.simulation import batch, cluster, effects, local, store
     from airtouch.simulation import scenario as scenarios
     from airtouch.simulation.flight import choose
 
@@ -79,7 +81,10 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
         results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
                                   plugins=plugins)
     else:
-        results = batch.flights(scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed, workers=workers)
+        # a process takes a second to start, a flight a tenth of one to fly and write
+        most = max(1, min(workers or batch.available_cores(), len(todo) // FLIGHTS_A_PROCESS))
+        results = local.write(out, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
+                              plugins=plugins, workers=most)
     _write(results, len(todo), out, scene.name)
     there = flights - len(store.missing(out, scene.name, seed, flights))
     lost = [f for f in store.failures(out) if f["flight"] < flights]
@@ -102,7 +107,8 @@ def _write(results, count: int, out: Path, name: str) -> None:
     with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()) as bar:
         task = bar.add_task("flights", total=count)
         for result in results:
-            store.save(out, name, result)
+            if result is not None:
+                store.save(out, name, result)
             bar.advance(task)
 
 
