@@ -144,7 +144,7 @@ def test_controller_gain_scales_the_loops(vehicle, name, field):
         plant = from_vehicle(vehicle)
         plant[field] = gain
         memory, pwm = np.zeros(controller.SIZE), np.zeros(4)
-        memory[controller.DESIRED], memory[controller.THRUST] = 2.0, 40000.0
+        memory[controller.DESIRED], memory[controller.THRUST] = 0.5, 40000.0
         controller.attitude_loop(plant[0], memory, 0.0, 0.0, 0.0, np.zeros(3), pwm)
         return pwm[2] + pwm[3] - pwm[0] - pwm[1]
     assert turn(2.0) == pytest.approx(2.0 * turn(1.0), rel=1e-6)

@@ -23,7 +23,8 @@ STREAMS = 4  #: motor noise, IMU, range and flow, start
 RING = 64  #: delays of up to 63 steps
 OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended
 ENDINGS = ("ok", "a value is not finite", "it turned over", "it struck a surface", "it flew away")
-FLOOR_DEPTH_M = 0.03  #: legs this far inside a surface: it struck it
+FOCUS_M = 0.08  #: the flow sensor's least distance; closer, its picture scales no further
+FLOOR_DEPTH_M = 0.015  #: legs this far inside a surface: it struck it
 (T, ACC, GYRO, PWM, DOWN, RANGES, VBAT, PLACE, SPEED, ANGLES, RPM, ACC_WORLD, COLUMNS) = (
     0, 1, 4, 7, 11, 12, 16, 17, 20, 23, 26, 30, 33)
 
@@ -87,7 +88,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     plant = plant_array[0]
     h = plant.step
     hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
-    leg = plant.range_below_rotors + 0.01
+    leg = plant.range_below_rotors + plant.leg_below_range
     state, speed, target = np.zeros(13), np.zeros(4), np.zeros(4)
     middle, middle_speed, work = np.zeros(13), np.zeros(4), np.zeros((6, 13))
     s, patch, force = np.zeros(at.COUNT), np.zeros(7), np.zeros(6)
@@ -124,7 +125,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     power, battery_volts = 0.0, plant.nominal_voltage
     down, last_down_top = 0.01, ground
     next_range, next_ranges = 0.0, 0.0
-    flying = False
+    flying, changed = False, -1e3
     power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     decay = math.exp(-h / plant.motor_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
@@ -197,6 +198,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
                 if top > ground:
                     height -= plant.range_residual
                 if top != last_down_top:
+                    changed = t
                     height += plant.range_kick if top < last_down_top else -plant.range_kick
                 estimator.correct_range(est, height)
             last_down_top = top
@@ -218,8 +220,9 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             normals(other_stream, other_n)
             for i in range(3):
                 drift[i] = drift_decay * drift[i] + drift_fresh * plant.flow_noise[i] * other_n[i]
-            height = max(state[2] - plant.range_below_rotors - last_down_top, 0.02)
-            scale = 1.0 + plant.flow_share * (max(est[8], 0.0) / height - 1.0) if flying else 1.0
+            height = max(state[2] - plant.range_below_rotors - last_down_top, FOCUS_M)
+            share = plant.flow_share + plant.flow_transient * math.exp((changed - t) / plant.flow_transient_time)
+            scale = 1.0 + share * (max(est[8], height) / height - 1.0) if flying else 1.0
             c, d = math.cos(est[2]), math.sin(est[2])
             estimator.correct_flow(est, state[3] * scale + c * drift[0] - d * drift[1],
                                    state[4] * scale + d * drift[0] + c * drift[1])

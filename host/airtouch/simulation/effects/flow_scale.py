@@ -5,10 +5,15 @@ from airtouch.simulation.effects.effect import Effect, Parameter
 
 def settings(plant, v):
     plant["flow_share"] = v["share"]
+    plant["flow_transient"] = v["transient"]
+    plant["flow_transient_time"] = v["time"]
 
 
 EFFECT = Effect(
     "flow_scale", "optical flow scaled by the estimated height over the floor, not the distance to what is below",
-    (Parameter("share", "1", 0.05, 0.0, 1.0, 0.0, "0: true distance, 1: estimated height",
-               "authors' flights: brakes at 0.5 to 0.7 m/s^2 after entry"),),
+    (Parameter("share", "1", 0.05, -0.1, 1.0, 0.0, "0: true distance, 1: estimated height; negative: the sensor, out of "
+               "focus, sees too little", "authors' flights speed up over the platform and brake at its end"),
+     Parameter("transient", "1", 0.0, -1.0, 1.0, 0.0, "the same, added where what is below has just changed",
+               "authors' flights: brake at 0.5 to 0.7 m/s^2 after entry"),
+     Parameter("time", "s", 0.2, 0.02, 5.0, None, "in which that dies out")),
     settings=settings)
