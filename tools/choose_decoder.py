@@ -61,7 +61,9 @@ def figures(flights: list[Flight], found: list[tuple[np.ndarray, int]], lag: flo
     """Mean error of the edges found, share missed, false a minute."""
     errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, found)])
     edges = sum(len(f.edges) for f in flights)
+    late = np.concatenate([d - lag for d, _ in found])
     return {"error_m": float(errors.mean()) if len(errors) else MISS_M, "missed": 1 - len(errors) / edges,
+            "rms_s": float(np.sqrt(np.mean(np.square(late)))) if len(late) else np.nan,
             "false_per_minute": sum(n for _, n in found) / sum(f.minutes for f in flights)}
 
 
@@ -142,7 +144,7 @@ def show(title: str, flights: list[Flight], found: list[tuple[np.ndarray, int]])
 
 
 def _text(f: dict[str, float]) -> str:
-    return (f"error {1000 * f['error_m']:.1f} mm, missed {f['missed']:.1%}, "
+    return (f"error {1000 * f['error_m']:.1f} mm ({f['rms_s']:.2f} s rms), missed {f['missed']:.1%}, "
             f"false {f['false_per_minute']:.2f} a minute")
 
 

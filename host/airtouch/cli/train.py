@@ -18,27 +18,30 @@ from airtouch.logs.flight_log import FlightLog
 
 @click.command(name="train")
 @click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--detector", default="paper", show_default=True, help="Which detector to train.")
+@click.option("--detector", default="best", show_default=True, help="Which detector to train: best or paper.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
               help="Model file to write.")
-@click.option("--epochs", type=click.IntRange(1), help="At most so many; the detector's own if left out.")
+@click.option("--epochs", type=click.IntRange(1), help="paper: at most so many; its own number if left out.")
+@click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
 @click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
-              help="Share of zeros in the first dense layer; 0.8 if left out.")
-@click.option("--block", type=click.Choice(["1", "4"]), help="Prune single weights or blocks; 4 if left out.")
-@click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="Weight of the disturbance-force loss.")
+              help="Share of zeros: paper, in the first dense layer; best, in the dilated layers.")
+@click.option("--block", type=click.Choice(["1", "4"]),
+              help="paper: prune single weights or blocks of four; 4 if left out.")
+@click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="paper: weight of the disturbance-force loss.")
 @click.option("--seed", default=0, show_default=True, help="Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
-def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, sparsity: float | None,
-            block: str | None, df_lambda: float | None, seed: int, force: bool) -> None:
+def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
+            sparsity: float | None, block: str | None, df_lambda: float | None, seed: int, force: bool) -> None:
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
 
     Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Flights that cannot be used are named and
-    left out, and the exit code is 2. A share of the flights is held out to stop in time, and to
-    choose the decoding.
+    left out, and the exit code is 2. `paper` holds a share of the flights out, to stop in time and to choose
+    its decoding; `best` trains on all of them.
     """
     check_free(out, force)
     module = registry.get(detector)
-    given = {"epochs": epochs, "sparsity": sparsity, "block": block and int(block), "df_lambda": df_lambda}
+    given = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
+             "df_lambda": df_lambda}
     options = {name: value for name, value in given.items() if value is not None}
     chosen, failures = _read(flights)
     start = time.monotonic()
@@ -84,12 +87,13 @@ def _read(paths: tuple[Path, ...]) -> tuple[list[FlightLog], int]:
 
 
 def _report(metadata: dict, seconds: float) -> None:
-    held = set(metadata["held_out"])
+    held = set(metadata.get("held_out", ()))
     fitted = [name for name in metadata["flights"] if name not in held]
-    click.echo(f"trained on {len(fitted)} flights, {metadata['epochs_run']} epochs, {seconds:.0f} s")
-    click.echo(f"held out ({len(held)}): {', '.join(metadata['held_out']) or 'none'}")
-    score = metadata["held_out_accuracy"]
-    if score["float"] is not None:
+    click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
+    if held:
+        click.echo(f"held out ({len(held)}): {', '.join(sorted(held))}")
+    score = metadata.get("held_out_accuracy", {})
+    if score.get("float") is not None:
         click.echo(f"balanced window accuracy on held-out flights: float {score['float']:.1%}, "
                    f"int8 {score['int8']:.1%} (n = {score['windows']} windows)")
 

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.detector.model_file import NORMALISATION, Model
 from airtouch.detector.network import WEIGHTED
 from airtouch.errors import AirTouchError
-from airtouch.kernels.network import layer_shape, packed_weights, parameter_bytes
+from airtouch.kernels.network import arena_bytes, layer_shape, packed_weights, parameter_bytes
 from airtouch.logs.files import write_bytes
 from airtouch.reference import z_score_window
 from airtouch.reference.int8_network import Int8Layer, Int8Network, quantise, run
@@ -94,15 +94,6 @@ def _model_header(model: Model) -> str:
 
 extern const networkInt8_t airtouchNetwork;
 """
-
-
-def arena_bytes(network: Int8Network) -> int:
-    """Bytes of working memory, as `networkInt8ArenaBytes` counts them."""
-    def room(shape: tuple[int, int, int]) -> int:
-        return (int(np.prod(shape)) + 3) // 4 * 4
-
-    return max((room(layer.input_shape) if i else 0) + room(layer.output_shape)
-               for i, layer in enumerate(network.layers))
 
 
 def _model_source(network: Int8Network) -> str:

@@ -1,0 +1,66 @@
+"""The README's picture: one held-out flight through the `best` detector.
+
+After `airtouch crossval --detector best`, `python tools/picture.py` draws a flight of fold 0 with the model that
+never saw it, and writes host/docs/img/flight.png.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from airtouch import logs
+from airtouch.cli.flights import find_flights
+from airtouch.detector import best, dataset
+from airtouch.logs.files import write_bytes
+from airtouch.reference.motion_channels import NAMES
+from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
+
+SHOWN = ("motor mean", "gyro x", "ax")  #: channels drawn
+
+
+def main() -> None:
+    """Draw and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--models", type=Path, default=Path("out/crossval"), help="where crossval kept its models")
+    parser.add_argument("--flight", default="imu_data_0126-1916.csv.gz", help="a flight of fold 0")
+    parser.add_argument("--out", type=Path, default=Path("host/docs/img/flight.png"))
+    options = parser.parse_args()
+    folder = find_flights()
+    file = next(f for f in dataset.collect([folder]) if f.path.name == options.flight)
+    path = next(iter(sorted(options.models.glob(f"best_fold{file.condition.fold}_*.npz"))))
+    write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out, force=True)
+
+
+def draw(log, model, name: str) -> bytes:  # noqa: ANN001
+    """PNG: what the drone feels, P(over a platform) with edges, and the down range that it never saw."""
+    trace, truth = best.run(log, model), logs.true_edges(log)
+    x = best.channels_of(log)[0]
+    t = np.arange(len(log)) * 0.01
+    first, last = t[truth[0].sample] - 6, t[truth[-1].sample] + 5
+    with style():
+        figure = Figure(figsize=(8.0, 4.6), layout="constrained")
+        axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.3, 1, 0.7))
+        for i, channel in enumerate(SHOWN):
+            axes[0].plot(t, x[:, NAMES.index(channel)] + 5 * (len(SHOWN) - 1 - i), lw=0.7, color=MUTED)
+        axes[0].set_yticks([5 * (len(SHOWN) - 1 - i) for i in range(len(SHOWN))], SHOWN)
+        axes[0].set_title(f"{name}: what the drone feels, in units of its usual swing", loc="left")
+        axes[1].plot(t, trace.probability, color=FOUND, lw=1)
+        axes[1].set(ylim=(-0.05, 1.25), yticks=(0, 1), ylabel="P(over)")
+        lag = best.lag_s(model)
+        for edge in trace.edges:
+            at = edge.sample * 0.01 - lag
+            axes[1].plot(at, 1.12, "v" if edge.kind == "entry" else "^", color=OTHER, ms=7)
+        axes[1].set_title(f"felt edges (red; constant lag of {lag:.2f} s taken off) and true ones (dashed green)", loc="left")
+        axes[2].plot(t, log["zrange_m"], color=TRUE, lw=1)
+        axes[2].set(xlabel="time, s", ylabel="m", xlim=(first, last))
+        axes[2].set_title("down range: the truth, never an input", loc="left")
+        for ax in axes:
+            for edge in truth:
+                ax.axvline(edge.sample * 0.01, color=TRUE, ls="--", lw=1)
+        return png(figure)
+
+
+if __name__ == "__main__":
+    main()
