@@ -44,7 +44,8 @@ class Vehicle:
     power_per_thrust15: float = 85.0  #: electrical power over thrust^1.5 of one rotor, W/N^1.5
     acc_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)  #: noise of each axis over the rms above
     gyro_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    flow_noise_mps: tuple[float, float, float] = (0.02, 0.02, 0.0)  #: velocity estimate's error forward, left, up
+    flow_noise_mps: tuple[float, float, float] = (0.02, 0.02,
+                                                  0.0)  #: velocity estimate's error forward, left, up
     flow_noise_time_s: float = 0.05  #: its correlation time
     acc_lowpass_hz: float = 0.0  #: of the logged accelerometer; 0: none
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller

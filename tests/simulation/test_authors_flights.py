@@ -32,7 +32,7 @@ def hover(log):
 
 
 def lift(log):
-    """(down range in m, vertical disturbance in share of the weight) over the platform, less that before and after."""
+    """(down range in m, vertical disturbance in weights) over the platform, less that before and after."""
     entry, leave = (e.sample for e in true_edges(log)[:2])
     vehicle = vehicles.load()
     lag = 1 - np.exp(-0.01 / 0.06)
@@ -60,7 +60,8 @@ def simulated():
 
 
 def test_hover_command_level_and_slope(real, simulated):
-    levels, slopes = ([np.array([h[k] for h in map(hover, group) if h]) for group in (real, simulated)] for k in (1, 2))
+    levels, slopes = ([np.array([h[k] for h in map(hover, group) if h]) for group in (real,
+            simulated)] for k in (1, 2))
     assert abs(levels[0].mean() - levels[1].mean()) < levels[0].std()
     assert abs(slopes[0].mean() - slopes[1].mean()) < slopes[0].std()
 

@@ -71,7 +71,8 @@ def test_every_built_in_scenario_flies(name, vehicle):
     assert not isinstance(log, flight.Diverged), str(log)
     assert log["z_m"].max() > 0.03
     assert log["z_m"][-1] < 0.05
-    if (name.startswith("paper") or name == "randomised") and "-" in name and not any(m in name for m in ("cement", "grass")):
+    if (name.startswith("paper")
+        or name == "randomised") and "-" in name and not any(m in name for m in ("cement", "grass")):
         assert [e.kind for e in true_edges(log)] == ["entry", "exit"]
 
 
@@ -98,7 +99,8 @@ def test_command_writes_flights_and_continues(quick, tmp_path):
 def test_a_killed_run_continues(quick, tmp_path):
     out = tmp_path / "out"
     code = "from airtouch.cli import main; import sys; sys.argv[0] = 'airtouch'; main()"
-    args = [sys.executable, "-c", code, "simulate", str(quick), "--flights", "60", "--out", str(out), "--workers", "2"]
+    args = [sys.executable, "-c", code, "simulate", str(quick), "--flights", "60", "--out", str(out),
+            "--workers", "2"]
     process = subprocess.Popen(args, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     for _ in range(600):
         time.sleep(0.05)
@@ -134,7 +136,8 @@ def test_diverged_flights_are_reported_and_never_written(quick, tmp_path):
     (("time_s = 1.0\n[effects]", "time_s = -1.0\n[effects]"), "must be positive"),
     (("motor_noise", "motor_noize"), "no effect 'motor_noize'"),
     (("[effects]", "[efects]"), "unknown key efects"),
-    (('do = "hover"\ntime_s = 1.0', 'do = "go"\ndistance_m = 2.0\nspeed_mps = 4.0'), "faster than the firmware"),
+    (('do = "hover"\ntime_s = 1.0', 'do = "go"\ndistance_m = 2.0\nspeed_mps = 4.0'),
+     "faster than the firmware"),
     (('do = "hover"\ntime_s = 1.0', 'do = "go"\nheight_m = -0.2\nspeed_mps = 0.2'), "through a surface"),
 ])
 def test_bad_scenarios_get_one_clear_line(change, said):

@@ -38,7 +38,8 @@ def test_ground_effect_is_the_published_curve():
     radius, d = 0.0231348, 0.0561
     heights = np.array([0.04, 0.06, 0.08, 0.12])
     b = np.sqrt(2) * d
-    printed = 1 / (1 - (radius / (4 * heights)) ** 2 - radius**2 * heights / np.sqrt((d**2 + 4 * heights**2) ** 3)
+    printed = 1 / (1 - (radius / (4 * heights)) ** 2
+                   - radius**2 * heights / np.sqrt((d**2 + 4 * heights**2) ** 3)
                    - radius**2 / 2 * heights / np.sqrt((2 * d**2 + 4 * heights**2) ** 3)
                    - 2 * radius**2 * heights / np.sqrt((b**2 + 4 * heights**2) ** 3) * 2.0)
     got = np.array([1 + thrust_ratio(h, radius, d, 2.0) for h in heights])

@@ -27,7 +27,8 @@ def ran(pwm, vehicle, chosen=(), period_s=0.002):
 
 def test_mass_and_thrust_coefficient_are_carried_by_more_thrust(steady, vehicle):
     assert thrusts(steady(), vehicle).sum() == pytest.approx(WEIGHT, rel=1e-3)
-    assert thrusts(steady({"mass": {"fraction": 0.1}}), vehicle).sum() == pytest.approx(1.1 * WEIGHT, rel=1e-3)
+    assert thrusts(steady({"mass": {"fraction": 0.1}}), vehicle).sum() == pytest.approx(1.1 * WEIGHT,
+            rel=1e-3)
     lossy = thrusts(steady({"thrust_coefficient": {"loss": 0.1}}), vehicle).sum()
     assert lossy == pytest.approx(WEIGHT / 0.9, rel=1e-3)
 
@@ -41,7 +42,8 @@ def test_weak_motor_gets_more_command_and_the_others_none(steady, vehicle, rotor
 
 
 def test_two_weak_motors_are_two_entries(steady, vehicle):
-    pair = [("weak_motor", {"rotor": 1, "thrust_loss": 0.1}), ("weak_motor", {"rotor": 3, "thrust_loss": 0.05})]
+    pair = [("weak_motor", {"rotor": 1, "thrust_loss": 0.1}), ("weak_motor", {"rotor": 3,
+            "thrust_loss": 0.05})]
     expected = WEIGHT / 4 / np.array([0.9, 1.0, 0.95, 1.0])
     np.testing.assert_allclose(thrusts(steady(pair), vehicle), expected, rtol=3e-3)
 
@@ -102,7 +104,8 @@ def test_battery_solves_its_circuit(vehicle):
     plant = from_vehicle(vehicle)[0]
     charge, volts = battery.drain(plant, 0.6, 6.0, 1.0)
     current = 6.0 / volts
-    assert volts == pytest.approx(battery.open_circuit(0.6) - plant["battery_resistance"] * current, rel=1e-12)
+    assert volts == pytest.approx(battery.open_circuit(0.6) - plant["battery_resistance"] * current,
+                                  rel=1e-12)
     assert 0.6 - charge == pytest.approx(current / plant["battery_capacity"], rel=1e-9)
 
 

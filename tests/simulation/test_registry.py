@@ -8,9 +8,12 @@ from airtouch.simulation import effects, flight, replay, scenario
 from airtouch.simulation import signals as at
 
 GAP_LIST = {
-    "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise", "thrust_coefficient",
-    "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load", "imu_bias", "imu_noise", "vibration",
-    "sensor_latency", "actuator_delay", "time_jitter", "packet_loss", "range_step", "flow_scale", "controller_gain",
+    "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise",
+    "thrust_coefficient",
+    "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load", "imu_bias", "imu_noise",
+    "vibration",
+    "sensor_latency", "actuator_delay", "time_jitter", "packet_loss", "range_step", "flow_scale",
+    "controller_gain",
 }
 SHORT = """
 name = "short"
@@ -100,7 +103,8 @@ def test_bad_effects_get_one_clear_line(text, said):
 
 def test_command_line_form():
     assert effects.parse("wind:x=0.3m/s, y=-1 m/s")[1] == {"x": 0.3, "y": -1.0, "z": 0.0, "drag": 0.0147}
-    assert effects.parse("weak_motor:rotor=2,thrust_loss=0.1") == ("weak_motor", {"rotor": 2.0, "thrust_loss": 0.1})
+    assert effects.parse("weak_motor:rotor=2,thrust_loss=0.1") == ("weak_motor", {"rotor": 2.0,
+            "thrust_loss": 0.1})
     assert effects.parse("mass") == ("mass", {"fraction": 0.1})
 
 

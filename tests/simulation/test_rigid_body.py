@@ -85,7 +85,8 @@ def test_hover_speed_holds_height(plant):
     np.testing.assert_allclose(state, at_rest(), atol=1e-9)
 
 
-@pytest.mark.parametrize(("rotor", "roll", "pitch", "yaw"), [(0, -1, -1, -1), (1, -1, 1, 1), (2, 1, 1, -1), (3, 1, -1, 1)])
+@pytest.mark.parametrize(("rotor", "roll", "pitch", "yaw"), [(0, -1, -1, -1), (1, -1, 1, 1), (2, 1, 1, -1),
+                                                             (3, 1, -1, 1)])
 def test_each_rotor_turns_the_body_the_documented_way(plant, rotor, roll, pitch, yaw):
     out, speed = np.zeros(4), np.zeros(4)
     speed[rotor] = 2000.0

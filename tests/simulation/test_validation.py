@@ -16,7 +16,8 @@ from airtouch.simulation.plant import from_vehicle
 
 GRAM_N = 9.81e-3
 FLIGHT_PWM = (30000, 58000)
-STANDS = {"ramp": "thrust_cf21_bitcraze2021_cf2.1-stock-prop", "steps": "thrust_cf21_bitcraze2021_cf21_stock2",
+STANDS = {"ramp": "thrust_cf21_bitcraze2021_cf2.1-stock-prop",
+          "steps": "thrust_cf21_bitcraze2021_cf21_stock2",
           "points": "thrust_cf21_imrc2025_data3"}
 
 
@@ -71,7 +72,8 @@ def test_thrust_and_rpm_fitted_on_one_stand_hold_on_another(flights, fitted, tes
     pwm, volts, thrust, speed = settled(fitted, flights)
     exponent = 1.25
     vehicle = replace(
-        vehicles.load("crazyflie-2.1"), thrust_of_pwm_n=curve(pwm, volts, thrust, exponent), nominal_voltage_v=3.8,
+        vehicles.load("crazyflie-2.1"), thrust_of_pwm_n=curve(pwm, volts, thrust, exponent),
+        nominal_voltage_v=3.8,
         voltage_exponent=exponent, thrust_per_speed2=float(np.mean(thrust / speed**2)))
     pwm, volts, thrust, speed = settled(tested, flights)
     got = speeds(vehicle, pwm, volts)
@@ -135,7 +137,8 @@ def test_replayed_commands_give_the_recorded_acceleration_and_rpm(flights):
         force, speed = replayed(log, *best)
         error = (log["acc_z_mps2"] - force)[good]
         assert 1 - np.var(error) / np.var(log["acc_z_mps2"][good]) > 0.9
-    per_rpm = [np.mean(replayed(log, *best)[1][good, 1:], axis=0) / log.stack(("rpm_2", "rpm_3", "rpm_4"))[good].mean(0)
+    per_rpm = [np.mean(replayed(log, *best)[1][good, 1:], axis=0) / log.stack(("rpm_2", "rpm_3",
+            "rpm_4"))[good].mean(0)
                for log, good in training]
     for name in ("jana23", "jana28"):
         log, good = flown(flights, name)
@@ -143,7 +146,8 @@ def test_replayed_commands_give_the_recorded_acceleration_and_rpm(flights):
         assert rms(got, log.stack(("rpm_2", "rpm_3", "rpm_4"))[good]) < 0.05
 
 
-@pytest.mark.parametrize(("name", "letter"), [("cal_A_0", "a"), ("cal_A_1", "a"), ("cal_B_0", "b"), ("cal_B_1", "b")])
+@pytest.mark.parametrize(("name", "letter"), [("cal_A_0", "a"), ("cal_A_1", "a"), ("cal_B_0", "b"),
+                                              ("cal_B_1", "b")])
 def test_other_peoples_simulators_are_replayed_to_their_sensor_noise(flights, name, letter):
     """RotorPy (A) and gym-pybullet-drones (B), free of unmodelled effects: what is left is noise."""
     log = logs.read(flights / "peers" / f"{name}.csv.gz")
@@ -156,7 +160,8 @@ def test_other_peoples_simulators_are_replayed_to_their_sensor_noise(flights, na
     # rates over 0.1 s from the motors alone: correlation, and what is left against the gyro's own noise
     turned = np.cumsum(result.angular_acceleration, axis=0) * 0.01
     at = np.flatnonzero(flying)[:-10]
-    model, measured = (turned[at + 10] - turned[at])[:, :2], (log.stack(GYRO)[at + 10] - log.stack(GYRO)[at])[:, :2]
+    gyro = log.stack(GYRO)
+    model, measured = (turned[at + 10] - turned[at])[:, :2], (gyro[at + 10] - gyro[at])[:, :2]
     for axis in range(2):
         assert np.corrcoef(model[:, axis], measured[:, axis])[0, 1] > 0.99
     assert np.all((model - measured).std(0) < 2.1 * np.sqrt(2) * vehicle.gyro_noise_rms_radps)

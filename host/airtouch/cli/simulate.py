@@ -35,7 +35,8 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
 @click.command("simulate")
 @click.argument("scenario")
 @click.option("--flights", "-n", default=1, show_default=True, help="How many flights.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder for the logs.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True,
+              help="Folder for the logs.")
 @click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Name or .toml file.")
 @click.option("--effect", "chosen", multiple=True, metavar="NAME[:P=V...]",
               help="Switch an effect on, as in wind:x=0.3m/s; a scenario's own of that name is replaced.")
@@ -49,7 +50,8 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
               help="Every effect with its parameters, and exit.")
 @click.option("--list-scenarios", is_flag=True, is_eager=True, expose_value=False, callback=_list_scenarios,
               help="Every scenario that comes with the package, and exit.")
-def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[str, ...], without: tuple[str, ...],
+def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[str, ...],
+            without: tuple[str, ...],
             files: tuple[str, ...], seed: int, workers: int | None, dask: str | None, force: bool) -> None:
     """Fly SCENARIO (a built-in name or a .toml file) and write one log a flight.
 
@@ -69,7 +71,8 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     scene, craft = scenarios.load(scenario), vehicles.load(vehicle)
     pairs = [effects.parse(text) for text in chosen]
     choose(scenarios.draw_flight(scene, seed, 0), pairs, without)
-    request = {"scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)), "vehicle": vars(craft),
+    request = {"scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)),
+               "vehicle": vars(craft),
                "effects": pairs, "without": list(without), "seed": seed,
                "effect_files": [store.digest(text) for text in plugins]}
     store.open_folder(out, request, force)
@@ -78,7 +81,8 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
         click.echo(f"{flights - len(todo)} of {flights} flights are there already")
     if dask:
         client = cluster.connect(dask)
-        results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
+        results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without,
+                                  seed=seed,
                                   plugins=plugins)
     else:
         # a process takes a second to start, a flight a tenth of one to fly and write

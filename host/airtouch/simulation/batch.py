@@ -18,7 +18,8 @@ from airtouch.vehicle import Vehicle
 AHEAD = 4  #: flights in work or waiting, for each worker
 
 
-def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *, vehicle: Vehicle | str | Path | None = None,
+def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
+            vehicle: Vehicle | str | Path | None = None,
             effects: Chosen = (), without: Sequence[str] = (), seed: int = 0,
             workers: int | None = None) -> Iterator[FlightLog | Diverged]:
     """Fly and yield flights one by one, in order; at most AHEAD per worker are held in memory.
@@ -46,7 +47,8 @@ def _in_order(one, numbers: Iterator[int], workers: int) -> Iterator[FlightLog |
         yield from map(one, numbers)
         return
     with ThreadPoolExecutor(workers) as pool:
-        waiting: deque[Future] = deque(pool.submit(one, n) for n in itertools.islice(numbers, AHEAD * workers))
+        waiting: deque[Future] = deque(pool.submit(one, n) for n in itertools.islice(numbers,
+                AHEAD * workers))
         try:
             while waiting:
                 result = waiting.popleft().result()
@@ -57,7 +59,8 @@ def _in_order(one, numbers: Iterator[int], workers: int) -> Iterator[FlightLog |
                 future.cancel()
 
 
-def simulate(scenario: Scenario | str | Path, vehicle: Vehicle | str | Path | None = None, effects: Chosen = (),
+def simulate(scenario: Scenario | str | Path, vehicle: Vehicle | str | Path | None = None,
+             effects: Chosen = (),
              seeds: int | Iterable[int] = 1, *, without: Sequence[str] = (), seed: int = 0,
              workers: int | None = None) -> list[FlightLog]:
     """Fly `seeds` flights (how many, or their numbers) and return their logs.

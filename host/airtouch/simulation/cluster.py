@@ -12,8 +12,10 @@ from airtouch.vehicle import Vehicle
 AHEAD = 64  #: flights sent out and not yet back
 
 
-def flights(client: Any, scenario: Scenario, numbers: Sequence[int], *, vehicle: Vehicle, effects: Chosen = (),
-            without: Sequence[str] = (), seed: int = 0, plugins: Sequence[str] = ()) -> Iterator[FlightLog | Diverged]:
+def flights(client: Any, scenario: Scenario, numbers: Sequence[int], *, vehicle: Vehicle,
+            effects: Chosen = (),
+            without: Sequence[str] = (), seed: int = 0,
+            plugins: Sequence[str] = ()) -> Iterator[FlightLog | Diverged]:
     """Fly on the cluster of a dask `Client` and yield flights as they come back, in any order.
 
     A worker that dies has its flights flown again elsewhere: each comes back once. plugins:
@@ -50,7 +52,8 @@ def connect(address: str) -> Any:
         raise AirTouchError(f"no dask scheduler answers at {address}: {error}") from None
 
 
-def _one(scenario: Scenario, vehicle: Vehicle, seed: int, number: int, effects: Chosen, without: Sequence[str],
+def _one(scenario: Scenario, vehicle: Vehicle, seed: int, number: int, effects: Chosen,
+         without: Sequence[str],
          plugins: Sequence[str]) -> FlightLog | Diverged:
     from airtouch.simulation import effects as registry
 

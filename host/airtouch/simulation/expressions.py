@@ -45,7 +45,9 @@ def evaluate(text: str, values: Mapping[str, Any], where: str) -> float:
     try:
         return float(_evaluate(ast.parse(text.strip(), mode="eval").body, values))
     except KeyError as error:
-        raise AirTouchError(f"{where}: {text.strip()!r} uses {error.args[0]!r}, which [values] does not have") from None
+        name = error.args[0]
+        raise AirTouchError(f"{where}: {text.strip()!r} uses {name!r}, "
+                            "which [values] does not have") from None
     except (SyntaxError, TypeError, ValueError, ZeroDivisionError):
         raise AirTouchError(f"{where}: {text.strip()!r} is not a sum of numbers and named values") from None
 

@@ -18,6 +18,7 @@ from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
 from airtouch.vehicle import Vehicle
 
+MOST_HOVER_PWM = 62000  #: of 65535; the rest is what attitude control needs
 DECIMALS = 6  #: of logged values, in their SI units
 Chosen = Mapping[str, Mapping[str, float]] | Sequence[Any]
 
@@ -84,8 +85,8 @@ def prepare(vehicle: Vehicle, active: Sequence[Active]) -> tuple[np.ndarray, lis
 def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
              name: str) -> FlightLog | Diverged:
     """Fly a drawn flight with these effects."""
-    if hover_pwm(vehicle) > 62000:
-        raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM {hover_pwm(vehicle):.0f} of 65535")
+    if hover_pwm(vehicle) > MOST_HOVER_PWM:
+        raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM {hover_pwm(vehicle):.0f}")
     plant, acting = prepare(vehicle, active)
     functions = tuple(a.effect.wrench for a in acting) + (_nothing,) * (loop.SLOTS - len(acting))
     parameters = np.zeros((loop.SLOTS, PARAMETERS))
@@ -109,7 +110,8 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     rng = np.random.default_rng([seed, flight, 7])
     table = np.round(received(table, *radio, rng), DECIMALS)
     meta = {
-        "source": f"{name}_{seed}_{flight:06d}", "format": "simulated", "sample_period_s": 0.01, "acc_frame": "body",
+        "source": f"{name}_{seed}_{flight:06d}", "format": "simulated", "sample_period_s": 0.01,
+        "acc_frame": "body",
         "vehicle": vehicle.name, "scenario": name, "seed": seed, "flight": flight, "condition": plan.values,
         "effects": [[a.effect.name, dict(a.values)] for a in active], "warnings": [],
     }

@@ -34,7 +34,8 @@ def write(folder: Path, scenario: Scenario, numbers: Sequence[int], *, vehicle: 
     waiting: deque[Future] = deque()
     left = iter(numbers)
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start, initargs=(tuple(plugins),)) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_start,
+                             initargs=(tuple(plugins),)) as pool:
         try:
             waiting.extend(pool.submit(_one, job, n) for n in itertools.islice(left, AHEAD * workers))
             while waiting:

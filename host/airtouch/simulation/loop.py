@@ -10,12 +10,22 @@ import math
 import numpy as np
 from numba import float64, from_dtype, int64, njit, types, uint64
 
-from airtouch.simulation import battery, contact, controller, estimator, motors, rigid_body, sensors, world
+from airtouch.simulation import (
+    battery,
+    contact,
+    controller,
+    estimator,
+    motors,
+    rigid_body,
+    sensors,
+    surroundings,
+    world,
+)
 from airtouch.simulation import signals as at
-from airtouch.simulation.effects.effect import MEMORY, PARAMETERS, WrenchFunction
+from airtouch.simulation.effects.effect import MEMORY, WrenchFunction
 from airtouch.simulation.plant import DTYPE
 from airtouch.simulation.random_stream import normal, normals
-from airtouch.simulation.rotation import euler, rotate_back
+from airtouch.simulation.rotation import euler
 
 SLOTS = 16  #: effects with a wrench that may be on at once
 LOG_STEPS = 5  #: physics steps a logged row
@@ -32,47 +42,6 @@ _LOOP = types.Tuple((int64, int64))(
     from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[::1],
     float64[:, ::1], types.UniTuple(WrenchFunction, SLOTS), int64, float64[:, ::1],
     uint64[:, ::1], uint64[:, ::1], float64[:, ::1])
-
-
-@njit(cache=True)
-def fill_signals(plant, state, slope, speed, corners, first, surface, box, h, t, hover, s, patch):
-    """The signals that effects see, for a state (13,), its slope and rotor speeds (4,)."""
-    s[at.TIME], s[at.STEP], s[at.MASS], s[at.GRAVITY] = t, h, plant.mass, plant.gravity
-    s[at.ROTOR_RADIUS], s[at.ROTOR_SPACING], s[at.HOVER_SPEED] = plant.rotor_radius, plant.rotor_spacing, hover
-    q = state[6:10]
-    vx, vy, vz = rotate_back(q, state[3], state[4], state[5])
-    s[at.VELOCITY], s[at.VELOCITY + 1], s[at.VELOCITY + 2] = vx, vy, vz
-    for i in range(3):
-        s[at.RATES + i] = state[10 + i]
-        s[at.ACCELERATION + i] = slope[3 + i]
-    r = at.ROTATION
-    from_quaternion(q, s, r)
-    lowest = 1e9
-    for i in range(4):
-        x, y = plant.rotor_x[i] - plant.com[0], plant.rotor_y[i] - plant.com[1]
-        s[at.ROTOR_X + i], s[at.ROTOR_Y + i] = x, y
-        s[at.ROTOR_SPEED + i] = speed[i]
-        s[at.THRUST + i] = plant.thrust_per_speed2 * speed[i] * speed[i] * plant.gain[i]
-        z = state[2] + s[r + 6] * x + s[r + 7] * y
-        world.below(corners, first, surface, box, state[0] + s[r] * x + s[r + 1] * y,
-                    state[1] + s[r + 3] * x + s[r + 4] * y, z, plant.rotor_radius, patch)
-        s[at.LOWER_HEIGHT + i] = z - patch[world.LOWER_TOP]
-        s[at.UPPER_HEIGHT + i] = z - patch[world.UPPER_TOP]
-        s[at.COVER + i] = patch[world.COVER]
-        s[at.LOWER_FACTOR + i], s[at.UPPER_FACTOR + i] = patch[world.LOWER_FACTOR], patch[world.UPPER_FACTOR]
-        s[at.LOWER_ROUGHNESS + i] = patch[world.LOWER_ROUGHNESS]
-        s[at.UPPER_ROUGHNESS + i] = patch[world.UPPER_ROUGHNESS]
-        lowest = min(lowest, z - (patch[world.UPPER_TOP] if patch[world.COVER] > 0.5 else patch[world.LOWER_TOP]))
-    s[at.HEIGHT] = lowest
-
-
-@njit(cache=True)
-def from_quaternion(q, s, r):
-    """Rotation matrix of q into s[r:r + 9]."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    s[r], s[r + 1], s[r + 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    s[r + 3], s[r + 4], s[r + 5] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    s[r + 6], s[r + 7], s[r + 8] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
 
 
 @njit(_LOOP, cache=True, nogil=True)
@@ -187,7 +156,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             near = patch[world.UPPER_TOP] if patch[world.COVER] > 0.0 else patch[world.LOWER_TOP]
             spot = max(sensors.CONE_TANGENT * (eye - near), 0.002)
             world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
-            top = patch[world.UPPER_TOP] if patch[world.COVER] >= sensors.CONE_COVER else patch[world.LOWER_TOP]
+            covered = patch[world.COVER] >= sensors.CONE_COVER
+            top = patch[world.UPPER_TOP] if covered else patch[world.LOWER_TOP]
             roll, pitch, _ = euler(attitude)
             tilt = max(math.cos(roll) * math.cos(pitch), 0.3)
             down = max((eye - top) / tilt + plant.range_noise * other_n[0], 0.0)
@@ -221,7 +191,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             for i in range(3):
                 drift[i] = drift_decay * drift[i] + drift_fresh * plant.flow_noise[i] * other_n[i]
             height = max(state[2] - plant.range_below_rotors - last_down_top, FOCUS_M)
-            share = plant.flow_share + plant.flow_transient * math.exp((changed - t) / plant.flow_transient_time)
+            left = math.exp((changed - t) / plant.flow_transient_time)
+            share = plant.flow_share + plant.flow_transient * left
             scale = 1.0 + share * (max(est[8], height) / height - 1.0) if flying else 1.0
             c, d = math.cos(est[2]), math.sin(est[2])
             estimator.correct_flow(est, state[3] * scale + c * drift[0] - d * drift[1],
@@ -282,7 +253,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         for i in range(4):
             tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
             middle_speed[i] = speed[i] + 0.5 * h / tau * (target[i] - speed[i])
-        fill_signals(plant, middle, slope, middle_speed, corners, first, surface, box, h, t + 0.5 * h,
+        surroundings.fill(plant, middle, slope, middle_speed, corners, first, surface, box, h, t + 0.5 * h,
                      hover, s, patch)
         for i in range(6):
             force[i] = 0.0

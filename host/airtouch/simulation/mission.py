@@ -79,8 +79,8 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
         wrong = set(step) - KEYS[kind] - {"do"}
         missing = NEEDED.get(kind, set()) - set(step)
         if wrong or missing:
-            said = f"does not take {', '.join(sorted(wrong))}" if wrong else f"needs {', '.join(sorted(missing))}"
-            raise AirTouchError(f"{place}: {kind} {said}")
+            said, keys = ("does not take", wrong) if wrong else ("needs", missing)
+            raise AirTouchError(f"{place}: {kind} {said} {', '.join(sorted(keys))}")
         for key in ("time_s", "speed_mps", "spacing_m"):
             if key in step and not 0.0 < float(step[key]) < MAX_FLIGHT_S:
                 raise AirTouchError(f"{place}: {key} = {step[key]} must be positive")
@@ -134,11 +134,12 @@ def _check_path(pen: _Pen, first: int, place: str) -> None:
     for row in rows:
         top = pen.top((row[c.X], row[c.Y]))
         if row[c.Z] < top:
-            raise AirTouchError(f"{place}: at ({row[c.X]:.2f}, {row[c.Y]:.2f}) m it would fly at {row[c.Z]:.2f} m "
-                                f"through a surface {top:.2f} m high")
+            raise AirTouchError(f"{place}: at ({row[c.X]:.2f}, {row[c.Y]:.2f}) m it would fly "
+                                f"{row[c.Z]:.2f} m high through a surface {top:.2f} m high")
 
 
 def _pair(value: Any, place: str, key: str) -> tuple[float, float]:
-    if not (isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(v, (int, float)) for v in value)):
+    if not (isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(v, (int,
+            float)) for v in value)):
         raise AirTouchError(f"{place}: {key} must be two numbers")
     return float(value[0]), float(value[1])

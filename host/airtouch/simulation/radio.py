@@ -3,7 +3,8 @@
 import numpy as np
 
 
-def received(table: np.ndarray, jitter_s: float, loss: float, burst: float, rng: np.random.Generator) -> np.ndarray:
+def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
+             rng: np.random.Generator) -> np.ndarray:
     """Rows of a log (n, columns), time in column 0, that the host gets, with the host's times.
 
     jitter_s: rms of the error of each time; times never run backwards. loss: share of rows

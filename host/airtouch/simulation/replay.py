@@ -42,7 +42,8 @@ class Replay:
 @njit(types.void(from_dtype(DTYPE)[::1], float64[:, ::1], float64[:, ::1], float64[::1],
                  types.UniTuple(WrenchFunction, loop.SLOTS), int64, float64[:, ::1], uint64[:, ::1],
                  float64[:, ::1], float64[:, ::1], float64[::1]), cache=True, nogil=True)
-def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, streams, out, speeds, volts_out):
+def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, streams, out, speeds,
+         volts_out):
     plant = plant_array[0]
     speed, target, wrench_now = np.zeros(4), np.zeros(4), np.zeros(4)
     command, memory, force = np.zeros((loop.RING, 4)), np.zeros((loop.SLOTS, MEMORY)), np.zeros(6)
@@ -91,7 +92,8 @@ def _nothing(p, s, memory, stream, out):
     pass
 
 
-def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), period_s: float = 0.01) -> np.ndarray:
+def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (),
+               period_s: float = 0.01) -> np.ndarray:
     """The signals (n, COUNT) that effects see, from what a log holds.
 
     Where it has no attitude the vehicle is taken as level, without velocity as standing,

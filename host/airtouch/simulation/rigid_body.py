@@ -3,7 +3,7 @@
 State (13,): position (m, world), velocity (m/s, world), quaternion (w first), rates
 (rad/s, body). Rotor speeds follow their command with a first-order lag and are solved
 exactly; their thrust enters each stage of the step at its own time. The wrench of the
-effects is given at the middle of the step and held: second order in the step.
+effects is given at the middle of the step and held.
 """
 
 import math
@@ -36,9 +36,9 @@ def thrust_wrench(plant, speed, out):
 def derivative(plant, state, q, wrench, spin, spin_rate, force, out):
     """dstate/dt into out (13,).
 
-    q (4,): the quaternion within the state. wrench (4,): thrust and torques of the rotors. force (6,): force and torque of the
-    effects, body axes. spin: net angular momentum of the rotors about z (kg m^2/s), and
-    its rate of change (N m).
+    q (4,): the quaternion within the state. wrench (4,): thrust and torques of the rotors.
+    force (6,): force and torque of the effects, body axes. spin: net angular momentum of the
+    rotors about z (kg m^2/s); spin_rate: its rate of change (N m).
     """
     m = plant.mass
     ax, ay, az = rotate(q, force[0] / m, force[1] / m, (force[2] + wrench[0]) / m)

@@ -57,7 +57,8 @@ def load(name_or_path: str | Path) -> Scenario:
         folder = resources.files("airtouch") / "simulation" / "scenarios"
         text = (folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
     else:
-        raise AirTouchError(f"no scenario {str(name_or_path)!r}; known: {', '.join(names())}, or a .toml file")
+        raise AirTouchError(f"no scenario {str(name_or_path)!r}; known: {', '.join(names())}, "
+                            "or a .toml file")
     return parse(text, str(name_or_path))
 
 

@@ -39,7 +39,8 @@ def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -
     old = [*folder.glob("*.csv.gz"), *folder.glob("*.jsonl")]
     if old or known.is_file():
         if not force:
-            raise AirTouchError(f"{folder}: holds flights of another request; choose another --out, or --force")
+            raise AirTouchError(f"{folder}: holds flights of another request; "
+                                "choose another --out, or --force")
         for path in old:
             path.unlink()
     temporary = folder / f".{REQUEST}.{os.getpid()}"

@@ -104,7 +104,8 @@ def below(corners, first, surface, box, x, y, z, radius, out):
         if depth >= radius or out[COVER] > 0.0:
             # all of the disc is over it, or it stands beside a lower one that already counts
             if depth >= radius:
-                out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = surface[k, 0], surface[k, 1], surface[k, 2]
+                out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = surface[k, 0], surface[k,
+                        1], surface[k, 2]
                 out[COVER] = 0.0
                 continue
             out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = out[UPPER_TOP], out[UPPER_FACTOR], out[

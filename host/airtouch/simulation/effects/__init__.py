@@ -12,7 +12,8 @@ from pathlib import Path
 from airtouch.errors import AirTouchError
 from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
-__all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "load_text", "parse", "register",
+__all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "load_text", "parse",
+           "register",
            "unregister", "wrench"]
 
 NAMES = (

@@ -21,6 +21,8 @@ EFFECT = Effect(
     "blade_flapping", "rotor discs tilt back with speed: drag and a moment that lifts the nose",
     (Parameter("tilt", "rad s/m", 0.01, 0.0, 0.2, 0.0, "disc tilt per speed",
                "Pounds, Mahony, Corke 2010; Crazyflie blades are stiff, so an upper guess"),
-     Parameter("hub", "m", 0.005, 0.0, 0.1, None, "moment of the stiff hub over the disc's horizontal force", "guess"),
-     Parameter("above", "m", 0.01, -0.05, 0.2, None, "discs above the centre of mass", "Crazyflie 2.1, measured on drawings")),
+     Parameter("hub", "m", 0.005, 0.0, 0.1, None,
+               "moment of the stiff hub over the disc's horizontal force", "guess"),
+     Parameter("above", "m", 0.01, -0.05, 0.2, None, "discs above the centre of mass",
+               "Crazyflie 2.1, measured on drawings")),
     wrench=blade_flapping)

@@ -10,8 +10,10 @@ def settings(plant, v):
 
 
 EFFECT = Effect(
-    "flow_scale", "optical flow scaled by the estimated height over the floor, not the distance to what is below",
-    (Parameter("share", "1", 0.05, -0.1, 1.0, 0.0, "0: true distance, 1: estimated height; negative: the sensor, out of "
+    "flow_scale",
+    "optical flow scaled by the estimated height over the floor, not the distance to what is below",
+    (Parameter("share", "1", 0.05, -0.1, 1.0, 0.0,
+               "0: true distance, 1: estimated height; negative: the sensor, out of "
                "focus, sees too little", "authors' flights speed up over the platform and brake at its end"),
      Parameter("transient", "1", 0.0, -1.0, 1.0, 0.0, "the same, added where what is below has just changed",
                "authors' flights: brake at 0.5 to 0.7 m/s^2 after entry"),

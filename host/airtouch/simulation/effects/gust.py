@@ -36,7 +36,8 @@ def gust(p, s, memory, stream, out):
 EFFECT = Effect(
     "gust", "Dryden turbulence of zero mean, through the rotors' horizontal drag",
     (Parameter("rms", "m/s", 0.3, 0.0, 10.0, 0.0, "of each component", "MIL-F-8785C, Dryden form"),
-     Parameter("length", "m", 0.5, 0.01, 500.0, None, "turbulence scale", "size of a fan's or a door's eddies"),
+     Parameter("length", "m", 0.5, 0.01, 500.0, None, "turbulence scale",
+               "size of a fan's or a door's eddies"),
      Parameter("airspeed", "m/s", 1.0, 0.05, 30.0, None, "at which the turbulence is carried past"),
      Parameter("drag", "N s/m", 0.0147, 0.0, 2.0, None, "horizontal drag at hover", "drone-models")),
     wrench=gust)

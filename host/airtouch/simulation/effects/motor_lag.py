@@ -12,5 +12,6 @@ EFFECT = Effect(
     "motor_lag", "rotor speed follows the command with another time constant",
     (Parameter("factor", "1", 1.5, 0.1, 5.0, 1.0, "times the declared time constant",
                "brushed motors: 60 ms (authors' flights) to 145 ms (drone-models)"),
-     Parameter("fall", "1", 1.0, 0.2, 5.0, 1.0, "slowing down over speeding up", "drone-models: slower to fall")),
+     Parameter("fall", "1", 1.0, 0.2, 5.0, 1.0, "slowing down over speeding up",
+               "drone-models: slower to fall")),
     settings=settings)

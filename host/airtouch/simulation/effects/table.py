@@ -18,7 +18,8 @@ def table() -> str:
                   "|---|---|---|---|---|---|---|---|"]
         for p in effect.parameters:
             neutral = "" if p.neutral is None else f"{p.neutral:g}"
-            cells = (p.name, p.unit, f"{p.default:g}", f"{p.low:g}", f"{p.high:g}", neutral, p.summary, p.source)
+            cells = (p.name, p.unit, f"{p.default:g}", f"{p.low:g}", f"{p.high:g}", neutral, p.summary,
+                     p.source)
             lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
     return "\n".join(lines)
