@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from small_model import random_model
 
-from airtouch.detector import export, model_file
+from airtouch.detector import best, export, model_file
 from airtouch.errors import AirTouchError
 
 ROOT = Path(__file__).parents[2]
-MODEL, KERNELS = ROOT / "gap8" / "model", ROOT / "gap8" / "kernels"
+MODEL, KERNELS, FIRMWARE = ROOT / "gap8" / "model", ROOT / "gap8" / "kernels", ROOT / "firmware" / "kernels"
 MAIN = """
 #include <string.h>
 #include "airtouch_golden.h"
@@ -30,19 +30,45 @@ int main(void) {
 """
 
 
-def test_the_generated_sources_are_those_of_the_shipped_model() -> None:
+STREAM_MAIN = """
+#include <string.h>
+#include "airtouch_stream.h"
+#include "airtouch_stream_golden.h"
+#include "stream_detector.h"
+static _Alignas(4) int8_t arena[AIRTOUCH_STREAM_ARENA_BYTES];
+static streamDetector_t detector;
+int main(void) {
+  if (streamInt8ArenaBytes(&airtouchStream) != AIRTOUCH_STREAM_ARENA_BYTES ||
+      !streamDetectorInit(&detector, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
+                          &airtouchStreamDecoder, arena)) return 2;
+  const int8_t *expected = airtouchStreamGoldenOutputs;
+  for (int i = 0; i < AIRTOUCH_STREAM_GOLDEN_COUNT; i++) {
+    const int8_t *in = airtouchStreamGoldenInputs + i * AIRTOUCH_STREAM_GOLDEN_INPUTS;
+    const int8_t *out = streamInt8Step(&airtouchStream, &detector.state, in);
+    if (out && memcmp(out, expected, AIRTOUCH_STREAM_GOLDEN_OUTPUTS)) return 1;
+    expected += out ? AIRTOUCH_STREAM_GOLDEN_OUTPUTS : 0;
+  }
+  return expected == airtouchStreamGoldenOutputs + sizeof airtouchStreamGoldenOutputs ? 0 : 3;
+}
+"""
+
+
+def test_the_generated_sources_are_those_of_the_shipped_models() -> None:
     export.check(model_file.load(), MODEL)
+    export.check(best.load(None), MODEL)
 
 
-def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path) -> None:
+@pytest.mark.parametrize("main", [MAIN, STREAM_MAIN], ids=["paper", "best"])
+def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path, main: str) -> None:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
-    (tmp_path / "main.c").write_text(MAIN)
+    (tmp_path / "main.c").write_text(main)
     flags = ["-std=c11", "-Os", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
              "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    subprocess.run([compiler, *flags, f"-I{KERNELS}", f"-I{MODEL}", str(tmp_path / "main.c"),
-                    *map(str, sorted(KERNELS.glob("*.c"))), *map(str, sorted(MODEL.glob("*.c"))), "-lm",
+    subprocess.run([compiler, *flags, f"-I{KERNELS}", f"-I{FIRMWARE}", f"-I{MODEL}",
+                    str(tmp_path / "main.c"), *map(str, sorted(KERNELS.glob("*.c"))),
+                    *map(str, sorted(FIRMWARE.glob("*.c"))), *map(str, sorted(MODEL.glob("*.c"))), "-lm",
                     "-o", str(tmp_path / "golden")], check=True)
     assert subprocess.run([str(tmp_path / "golden")]).returncode == 0
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from airtouch.detector import export, model_file
+from airtouch.detector import archive, export, model_file
+from airtouch.detector.stream import model as stream_model
 from airtouch.kernels.network import parameter_bytes
 
 
@@ -17,17 +18,25 @@ from airtouch.kernels.network import parameter_bytes
               help="Write nothing; refuse a folder that is stale or foreign.")
 @click.option("--force", is_flag=True, help="Replace files that differ.")
 def command(model: Path | None, out: Path, only_check: bool, force: bool) -> None:
-    """Write MODEL (.npz; the shipped one if left out) as C: weights, shapes, scales, golden vectors.
+    """Write MODEL (.npz; both shipped ones if left out) as C: weights, shapes, scales, golden vectors.
 
     With --check: exit code 2 and the reason where the folder is not what MODEL exports to.
     """
-    trained = model_file.load(model)
-    name = model.name if model else ""
-    if only_check:
-        export.check(trained, out, name)
-        click.echo(f"{out}: up to date with model {trained.digest[:12]}")
-        return
-    for path in export.export(trained, out, name, force):
-        click.echo(f"written: {path}")
-    click.echo(f"model {trained.digest[:12]}: {parameter_bytes(trained.int8)} bytes of constants, "
-               f"{export.arena_bytes(trained.int8)} bytes of arena")
+    for trained in ([_load(model)] if model else [model_file.load(), stream_model.load()]):
+        name = model.name if model else ""
+        if only_check:
+            export.check(trained, out, name)
+            click.echo(f"{out}: up to date with {trained.metadata['detector']} model {trained.digest[:12]}")
+            continue
+        for path in export.export(trained, out, name, force):
+            click.echo(f"written: {path}")
+        click.echo(f"{trained.metadata['detector']} model {trained.digest[:12]}: "
+                   f"{parameter_bytes(trained.int8)} bytes of constants")
+
+
+def _load(path: Path) -> model_file.Model | stream_model.StreamModel:
+    """A model of either kind."""
+    data = archive.read(path)
+    _, metadata = archive.parse(data, str(path))
+    module = stream_model if metadata.get("network") == "stream" else model_file
+    return module.parse(data, str(path))

@@ -1,0 +1,71 @@
+"""Networks as C text: the pieces that every export is made of."""
+
+import hashlib
+
+import numpy as np
+
+from airtouch.kernels.network import layer_shape, packed_weights
+from airtouch.reference.int8_network import Int8Layer
+
+_KINDS = ("LAYER_CONV", "LAYER_MAX_POOL", "LAYER_DENSE", "LAYER_SPARSE_DENSE")
+
+
+def fields(layer: Int8Layer) -> list[str]:
+    """Initialisers of a layerInt8_t's plain members."""
+    kind, *shape = layer_shape(layer)
+    names = ("inRows", "inColumns", "inChannels", "outRows", "outColumns", "outChannels", "kernelRows",
+             "kernelColumns", "outputZeroPoint", "outputMin", "outputMax")
+    return [f".kind = {_KINDS[kind]}", *(f".{n} = {v}" for n, v in zip(names, shape, strict=True))]
+
+
+def layer_arrays(name: str, layer: Int8Layer) -> tuple[str, list[str]]:
+    """The C arrays of one layer, and the initialisers that point to them."""
+    weights, counts, skips = packed_weights(layer)
+    multiplier, shift = layer.multipliers()
+    arrays = [("Weights", "int8_t", weights), ("Bias", "int32_t", layer.folded_bias()),
+              ("Multiplier", "int32_t", multiplier), ("Shift", "int8_t", shift)]
+    if counts.size:
+        arrays += [("BlockCounts", "uint16_t", counts), ("BlockSkips", "uint8_t", skips)]
+    text = "".join(array(kind, name + what, np.ravel(values)) for what, kind, values in arrays)
+    return text, [f".{what[0].lower() + what[1:]} = {name + what}" for what, _, _ in arrays]
+
+
+def array(kind: str, name: str, values: np.ndarray, static: bool = True) -> str:
+    """A constant array, aligned to four bytes."""
+    head = f"{'static ' if static else ''}const {kind} {name}[{max(values.size, 1)}]"
+    lines, line = [], "   "
+    for value in values.tolist() or [0]:  # C has no empty array
+        if len(line) + len(f" {value},") > 108:
+            lines.append(line)
+            line = "   "
+        line += f" {value},"
+    return f"_Alignas(4) {head} = {{\n" + "\n".join([*lines, line]) + "\n};\n\n"
+
+
+def golden_header(what: str, prefix: str, names: tuple[str, str], inputs: np.ndarray, outputs: np.ndarray) -> str:
+    """Declarations of golden inputs (n, ...) and outputs (m, ...), with their hash."""
+    digest = hashlib.sha256(inputs.tobytes() + outputs.tobytes()).hexdigest()
+    return f"""// {what}
+#pragma once
+
+#include <stdint.h>
+
+#define {prefix}_SHA256 "{digest}"  // of inputs, then outputs
+#define {prefix}_COUNT {len(inputs)}
+#define {prefix}_INPUTS {inputs.shape[1]}
+#define {prefix}_OUTPUTS {outputs.shape[1]}
+
+extern const int8_t {names[0]}[{inputs.size}];
+extern const int8_t {names[1]}[{outputs.size}];
+"""
+
+
+def golden_source(header: str, names: tuple[str, str], inputs: np.ndarray, outputs: np.ndarray) -> str:
+    """Their definitions."""
+    arrays = (array("int8_t", name, values.ravel(), False) for name, values in zip(names, (inputs, outputs)))
+    return (f'#include "{header}"\n\n' + "".join(arrays)).rstrip("\n") + "\n"
+
+
+def float_literal(value: float) -> str:
+    """A C float literal of exactly this float32."""
+    return f"{np.float32(value):.9e}f"

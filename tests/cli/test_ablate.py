@@ -1,0 +1,48 @@
+"""`airtouch ablate`, from the outside."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch.cli.ablate import command
+from airtouch.detector.ablation import ABLATIONS
+from airtouch.reference.motion_channels import NAMES, MotionConfig, motion_channels
+
+
+def run(*arguments: object):
+    return CliRunner().invoke(command, [str(a) for a in arguments])
+
+
+@pytest.mark.slow
+def test_a_channel_group_a_size_and_a_variant(generated, tmp_path):
+    pytest.importorskip("tensorflow")
+    arguments = [generated, "--out", tmp_path / "folds", "--json", tmp_path / "a.json", "--steps", 8, "--epochs", 1,
+                 "--only", "f_w-only", "--only", "sparsity-85", "--only", "no-filter"]
+    result = run(*arguments)
+    assert result.exit_code == 0, result.output
+    table = json.loads((tmp_path / "a.json").read_text())
+    assert set(table) == {"f_w-only", "sparsity-85", "no-filter"}
+    assert all(row["flights"] == 4 and len(row["folds"]) == 2 for row in table.values())
+    assert "float" in table["sparsity-85"] and "int8" in result.output
+    assert table["no-filter"]["folds"][0]["parameters"]["converged_after_epochs"] == 1
+    folds = {p.name: p.stat().st_mtime_ns for p in (tmp_path / "folds").glob("*.json")}
+    assert run(*arguments, "--force").exit_code == 0
+    assert {p.name: p.stat().st_mtime_ns for p in (tmp_path / "folds").glob("*.json")} == folds, "done again"
+
+
+def test_an_existing_result_is_kept(generated, tmp_path):
+    (tmp_path / "a.json").write_text("{}")
+    result = run(generated, "--json", tmp_path / "a.json", "--only", "best")
+    assert "--force" in str(result.exception)
+
+
+def test_muted_channels_are_zero_and_the_others_are_not():
+    muted = ABLATIONS["f_w-only"].options["muted"]
+    scale = tuple(np.inf if i in muted else s for i, s in enumerate(MotionConfig().scale))
+    rng = np.random.default_rng(0)
+    x, _ = motion_channels(rng.normal(size=(300, 3)), rng.normal(size=(300, 3)),
+                           46000 + 900 * rng.normal(size=(300, 4)), MotionConfig(scale=scale))
+    alive = {NAMES[i] for i in np.flatnonzero(np.abs(x[150:]).max(axis=0) > 0)}
+    assert alive == {"unexplained az"}
