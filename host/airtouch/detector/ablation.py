@@ -43,7 +43,7 @@ ABLATIONS: dict[str, Ablation] = {
     "no-filter": Ablation("paper", "without the physical filter", Variant(physical_filter=False)),
     "no-filter-no-df": Ablation("paper", "without both", Variant(physical_filter=False, df_lambda=0.0)),
     "stft-100": Ablation("paper", "STFT window 100, filter off", Variant(physical_filter=False, band_window=100)),
-    "stft-300": Ablation("paper", "STFT window 300, filter off", Variant(physical_filter=False, band_window=300)),
+    "stft-50": Ablation("paper", "STFT window 50, filter off", Variant(physical_filter=False, band_window=50)),
     "stft-centred": Ablation("paper", "STFT window centred (not causal), filter off",
                              Variant(physical_filter=False, centred=True)),
     "input-50": Ablation("paper", "network input 50 samples, filter off", Variant(physical_filter=False, rows=50)),
