@@ -43,13 +43,13 @@ def compare(ours: Callable[[], object], peer: Callable[[], object]) -> tuple[flo
 
 
 def flights(limit: int) -> list[FlightLog]:
-    """Recorded flights where there are any, else made ones."""
+    """Recorded flights where there are any, else simulated ones."""
     folder = find_flights()
     if folder is not None:
         return [logs.read(file.path) for file in dataset.collect([folder])[:limit]]
-    from airtouch.simulation.minimal import simulate
+    from airtouch.simulation import batch
 
-    return [simulate(seed) for seed in range(min(limit, 8))]
+    return batch.simulate("paper-low", seeds=min(limit, 8))
 
 
 def scipy_band_power(x: np.ndarray) -> np.ndarray:

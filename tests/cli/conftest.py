@@ -1,24 +1,23 @@
-"""Flights of the minimal generator, written once."""
+"""Simulated flights, written once."""
 
 import numpy as np
 import pytest
+import short_flights
 
 from airtouch import logs
-from airtouch.simulation.minimal import Mission, fly
 
 HEADER = "file,use,fold,height,angle_deg,wind,speed_mps\n"
 
 
 @pytest.fixture(scope="session")
 def generated(tmp_path_factory):
-    """A folder with four generated flights in two folds and their manifest."""
+    """A folder with four simulated flights in two folds and their manifest."""
     folder = tmp_path_factory.mktemp("flights")
-    plan = [Mission(0.3, 0.05, 0.0, 0.8), Mission(0.35, 0.05, 10.0, 1.0), Mission(0.3, 0.04, 0.0, 1.2),
-            Mission(0.25, 0.06, -10.0, 0.8)]
     rows = []
-    for i, (mission, log) in enumerate(zip(plan, fly(plan, seed=11), strict=True)):
+    for i, log in enumerate(short_flights.fly(4)):
+        drawn = log.meta["condition"]
         logs.write(log, folder / f"f{i}.csv.gz")
-        rows.append(f"f{i}.csv.gz,clean,{i % 2},low,{mission.angle_deg:g},none,{mission.speed_mps}\n")
+        rows.append(f"f{i}.csv.gz,clean,{i % 2},low,{drawn['angle']:g},none,{drawn['speed']:.3f}\n")
     (folder / "manifest.csv").write_text(HEADER + "".join(rows))
     return folder
 

@@ -61,7 +61,8 @@ def test_the_cache_changes_with_the_conditions(generated, tmp_path):
     folder = shutil.copytree(generated, tmp_path / "copy")
     before = crossval.cache_key("baseline", dataset.collect([folder]), 0, 0, {})
     manifest = folder / "manifest.csv"
-    manifest.write_text(manifest.read_text().replace(",0.25\n", ",0.2\n"))
+    first = manifest.read_text().splitlines()[1]
+    manifest.write_text(manifest.read_text().replace(first, first.replace(",low,", ",high,")))
     assert crossval.cache_key("baseline", dataset.collect([folder]), 0, 0, {}) != before
     assert crossval.cache_key("baseline", dataset.collect([generated]), 1, 0, {}) != before
 

@@ -1,9 +1,10 @@
-"""The paper's pipeline with the shipped model, on generated flights."""
+"""The paper's pipeline with the shipped model, on a simulated flight."""
 
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+import short_flights
 
 from airtouch import logs, reference, vehicle
 from airtouch.detector import paper, registry
@@ -14,12 +15,11 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.parameters import DEFAULT
 from airtouch.reference.edge_pipeline import EdgePipelineConfig
-from airtouch.simulation.minimal import Mission, fly
 
 
 @pytest.fixture(scope="module")
 def log():
-    return fly([Mission(0.35, 0.04, 0.0, 0.6)], seed=2)[0]
+    return short_flights.fly(1)[0]
 
 
 @pytest.fixture(scope="module")

@@ -16,15 +16,15 @@ from airtouch.detector.summary import summarise
 from airtouch.errors import AirTouchError
 
 TRAIN, TEST, EPOCHS, STEPS = 52, 18, 8, 800  #: as much as fits in the time on two cores
-GENERATED = 32  #: flights, where none are recorded
+GENERATED, SCENARIO = 32, "paper-low"  #: simulated flights, where none are recorded
 SHOWN = 4  #: flights plotted in the report
 
 
 @click.command(name="demo")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/demo"), show_default=True,
-              help="Folder for the report, the model and generated flights.")
+              help="Folder for the report, the model and simulated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
-              help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else generated.")
+              help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else simulated.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
               help="Commanded speed of flights whose manifest does not say.")
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
@@ -95,7 +95,7 @@ def flights_of(
     if folder is not None:
         files, where = dataset.collect([folder], speed), f"recorded flights in {folder}"
     else:
-        files, where = generated(out / "flights"), f"flights from the built-in generator ({out / 'flights'})"
+        files, where = generated(out / "flights"), f"flights of the simulator ({out / 'flights'})"
     if len(files) < 4:
         raise AirTouchError(f"{folder}: {len(files)} flights are too few to train and to test; "
                             "at least 4 are needed")
@@ -106,18 +106,20 @@ def flights_of(
 
 
 def generated(folder: Path) -> list[FlightFile]:
-    """Flights of the minimal generator, written as canonical CSV with their manifest."""
-    from airtouch.simulation import minimal
+    """Simulated flights, written with their manifest; compiles the simulator on the first call."""
+    from airtouch.simulation import batch, scenario, store
+    from airtouch.simulation.flight import Diverged
 
+    scene = scenario.load(SCENARIO)
     folder.mkdir(parents=True, exist_ok=True)
-    missions = minimal.missions(GENERATED)
-    lines = ["file,use,fold,height,angle_deg,wind,speed_mps"]
-    for i, (mission, log) in enumerate(zip(missions, minimal.fly(missions), strict=True)):
-        name = f"generated_{i:03d}.csv.gz"
-        logs.write(log, folder / name, force=True)
-        lines.append(f"{name},clean,{i % 5},{100 * mission.clearance_m:.0f} cm,{mission.angle_deg:g},none,"
-                     f"{mission.speed_mps:g}")
-    (folder / dataset.MANIFEST).write_text("\n".join(lines) + "\n")
+    for number, flown in enumerate(batch.flights(scene, GENERATED)):
+        path = store.path_of(folder, scene.name, 0, number)
+        path.unlink(missing_ok=True)
+        if isinstance(flown, Diverged):
+            click.echo(f"airtouch: {flown}", err=True)
+        else:
+            logs.write(flown, path)
+    store.write_manifest(folder, scene, 0, GENERATED)
     return dataset.collect([folder])
 
 
