@@ -10,6 +10,7 @@ from small_model import random_model
 
 from airtouch.cli import export as export_command
 from airtouch.cli import train as train_command
+from airtouch.detector import registry, simulated
 from airtouch.errors import AirTouchError
 
 
@@ -53,3 +54,50 @@ def test_training_refuses_to_overwrite_before_it_starts(tmp_path: Path) -> None:
     result = CliRunner().invoke(train_command.command, [str(tmp_path), "--out", str(tmp_path / "m.npz")])
     assert isinstance(result.exception, AirTouchError) and "--force" in str(result.exception)
     assert (tmp_path / "m.npz").read_bytes() == b"kept"
+
+
+def train(*arguments: object):
+    return CliRunner().invoke(train_command.command, [str(a) for a in arguments])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("detector", "short"), [("best", ("--steps", 4)), ("paper", ("--epochs", 1))])
+def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, detector: str, short: tuple) -> None:
+    pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
+    out = tmp_path / "m.npz"
+    result = train("--simulated", 4, "--scenario", "paper-low", "--without", "gust", "--detector", detector, *short,
+                   "--seed", 3, "--out", out)
+    assert result.exit_code == 0, result.output
+    metadata = registry.get(detector).load(out).metadata
+    said = metadata["simulated"]
+    assert (said["scenario"], said["flights"], said["seed"], said["without"]) == ("paper-low", 4, 3, ["gust"])
+    assert "ground_effect" in said["effects"] and "gust" not in said["effects"]
+    assert len(metadata["flights"]) == 4 and all(name.startswith("paper-low_3_") for name in metadata["flights"])
+    assert "simulated: paper-low, seed 3" in result.output
+
+
+def test_simulated_flights_are_the_same_for_the_same_seed() -> None:
+    told = []
+    first, what = simulated.training_flights(2, "paper-low", seed=5, progress=lambda *a: told.append(a))
+    again, _ = simulated.training_flights(2, "paper-low", seed=5)
+    other, _ = simulated.training_flights(2, "paper-low", seed=5, without=("ground_effect",))
+    assert all((a["gyro_x_radps"] == b["gyro_x_radps"]).all() for a, b in zip(first, again, strict=True))
+    assert first[0].meta["condition"] == other[0].meta["condition"]
+    assert not any(name == "ground_effect" for log in other for name, _ in log.meta["effects"])
+    assert [a[1:3] for a in told] == [(1, 2), (2, 2)] and what["effects"]
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (("--simulated", 2, "--scenario", "nowhere"), "nowhere"),
+    (("--simulated", 2, "--without", "magic"), "magic"),
+    (("--simulated", 2, "--without", "vibration"), "off in paper-mixed already"),
+    (("--simulated", 2, "--scenario", "hover"), "crossed an edge"),
+    (("--simulated", 2, "--detector", "baseline"), "nothing to train"),
+    (("--simulated", 2, "."), "not both"),
+    (("--scenario", "paper-low"), "need --simulated"),
+    (("--without", "gust", "."), "need --simulated"),
+])
+def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple, said: str) -> None:
+    result = train(*arguments, "--out", tmp_path / "m.npz")
+    assert result.exit_code != 0 and not (tmp_path / "m.npz").exists()
+    assert said in (str(result.exception) + result.output)

@@ -1,9 +1,12 @@
-"""`airtouch train`: train a detector on recorded flights."""
+"""`airtouch train`: train a detector on recorded flights, or on simulated ones."""
 
 import shlex
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -28,23 +31,37 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--block", type=click.Choice(["1", "4"]),
               help="paper: prune single weights or blocks of four; 4 if left out.")
 @click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="paper: weight of the disturbance-force loss.")
-@click.option("--seed", default=0, show_default=True, help="Fixes every bit of the result on one machine.")
+@click.option("--simulated", type=click.IntRange(1), metavar="N", help="Train on N simulated flights instead.")
+@click.option("--scenario", metavar="NAME", help="With --simulated: what is flown; paper-mixed if left out.")
+@click.option("--without", multiple=True, metavar="EFFECT",
+              help="With --simulated: an effect of the scenario to switch off; may be repeated.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
+              help="Fixes every bit of the result on one machine, simulated flights included.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
-            sparsity: float | None, block: str | None, df_lambda: float | None, seed: int, force: bool) -> None:
+            sparsity: float | None, block: str | None, df_lambda: float | None, simulated: int | None,
+            scenario: str | None, without: tuple[str, ...], seed: int, force: bool) -> None:
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
 
-    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Flights that cannot be used are named and
-    left out, and the exit code is 2. `paper` holds a share of the flights out, to stop in time and to choose
-    its decoding; `best` trains on all of them.
+    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights; with --simulated N, flights of the simulator.
+    Flights that cannot be used are named and left out, and the exit code is 2. `paper` holds a share of the
+    flights out, to stop in time and to choose its decoding; `best` trains on all of them.
     """
+    if simulated and flights:
+        raise click.UsageError("either FLIGHTS or --simulated, not both")
+    if not simulated and (scenario or without):
+        raise click.UsageError("--scenario and --without need --simulated N")
     check_free(out, force)
     module = registry.get(detector)
+    if detector == "baseline":
+        raise AirTouchError("baseline has nothing to train; --detector best or paper")
     given = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
              "df_lambda": df_lambda}
     options = {name: value for name, value in given.items() if value is not None}
-    chosen, failures = _read(flights)
+    what: dict[str, Any] | None = None
     start = time.monotonic()
+    if not simulated:
+        chosen, failures = _read(flights)
     with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
                   TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
         tasks: dict[str, int] = {}
@@ -54,7 +71,12 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
                 tasks[stage] = bar.add_task(stage, total=total, note="")
             bar.update(tasks[stage], completed=done, note=note)
 
+        if simulated:
+            chosen, what = _simulate(simulated, scenario, without, seed, progress)
+            failures = 0
         model = module.fit(chosen, seed=seed, progress=progress, command=_command(), **options)
+    if what:
+        model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)
     _report(model.metadata, time.monotonic() - start)
     click.echo(f"written: {out} ({out.stat().st_size} bytes)")
@@ -86,12 +108,24 @@ def _read(paths: tuple[Path, ...]) -> tuple[list[FlightLog], int]:
     return chosen, failures
 
 
+def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: int,
+              progress: Callable[[str, int, int, str], None]) -> tuple[list[FlightLog], dict[str, Any]]:
+    """Flights of the simulator, and what they are."""
+    from airtouch.detector import simulated
+
+    return simulated.training_flights(count, scenario or simulated.SCENARIO, without=without, seed=seed,
+                                      progress=progress)
+
+
 def _report(metadata: dict, seconds: float) -> None:
     held = set(metadata.get("held_out", ()))
     fitted = [name for name in metadata["flights"] if name not in held]
     click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
     if held:
         click.echo(f"held out ({len(held)}): {', '.join(sorted(held))}")
+    if "simulated" in metadata:
+        flown = metadata["simulated"]
+        click.echo(f"simulated: {flown['scenario']}, seed {flown['seed']}, effects: {', '.join(flown['effects'])}")
     score = metadata.get("held_out_accuracy", {})
     if score.get("float") is not None:
         click.echo(f"balanced window accuracy on held-out flights: float {score['float']:.1%}, "
