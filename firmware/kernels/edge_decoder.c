@@ -90,8 +90,8 @@ uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airb
     wait(decoder);
   }
   uint8_t reported = 0;
-  const bool free = decoder->airborne >= config->armSteps && decoder->since >= config->dwellSteps;
-  if (free && fires(decoder, over)) {
+  const bool ready = decoder->airborne >= config->armSteps && decoder->since >= config->dwellSteps;
+  if (ready && fires(decoder, over)) {
     reported = decoder->waiting;  // an edge that still waits is not held up by the next one
     const uint32_t back = findPeak(decoder, decoder->over ? 1 : 0);
     decoder->due = config->holdSteps > back ? config->holdSteps - back : 0;

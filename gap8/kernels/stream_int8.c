@@ -74,13 +74,13 @@ int32_t streamInt8Check(const streamInt8_t *network) {
 
 void streamInt8Reset(const streamInt8_t *network, streamState_t *state, int8_t *arena) {
   *state = (streamState_t){.patch = arena, .skips = arena + widestPatch(network)};
-  int8_t *free = state->skips + skipBytes(network);
+  int8_t *place = state->skips + skipBytes(network);
   for (int32_t i = 0; i < network->convCount; i++) {
     const streamConv_t *conv = &network->convs[i];
     const int32_t bytes = ringRows(conv) * conv->layer.inChannels;
-    state->rings[i] = free;
-    memset(free, conv->zeroPoint, (size_t)bytes);
-    free += aligned(bytes);
+    state->rings[i] = place;
+    memset(place, conv->zeroPoint, (size_t)bytes);
+    place += aligned(bytes);
   }
 }
 

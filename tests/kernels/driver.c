@@ -1,12 +1,14 @@
-// Feeds files of arbitrary bytes through every kernel; built with sanitizers by test_sanitizers.py.
+// Feeds files of arbitrary bytes through every kernel; built with sanitizers by test_build.py.
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "airtouch_stream.h"
 #include "cross_spectrum.h"
 #include "disturbance_force.h"
 #include "edge_pipeline.h"
+#include "stream_detector.h"
 
 #define MAX_BYTES (1 << 20)
 
@@ -157,6 +159,31 @@ static void feedPipeline(bytes_t bytes, bool wild) {
   free(pipeline);
 }
 
+/** The shipped network; wild: with any decoder settings and logits. */
+static void feedStreamDetector(bytes_t bytes, bool wild) {
+  int8_t *arena = malloc(AIRTOUCH_STREAM_ARENA_BYTES);
+  check(arena != NULL, "memory");
+  decoderConfig_t settings = airtouchStreamDecoder;
+  if (wild) {
+    take(&bytes, &settings, sizeof(settings));
+  }
+  streamDetector_t detector;
+  check(streamDetectorInit(&detector, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
+                           &settings, arena), "the shipped network is accepted");
+  while (bytes.left > 0) {
+    float sample[10];
+    streamEvent_t event;
+    take(&bytes, sample, sizeof(sample));
+    const bool edge = streamDetectorStep(&detector, sample, sample + 3, sample + 6, &event);
+    check(edge == (event.edge != EDGE_NONE) && event.edge <= EDGE_EXIT, "an edge is none, entry or exit");
+    check(isfinite(event.logits[0]) && isfinite(event.logits[2]), "logits are finite");
+    if (wild) {
+      check(edgeDecoderStep(&detector.decoder, sample, sample[9] > 0.0f) <= EDGE_EXIT, "any logits are taken");
+    }
+  }
+  free(arena);
+}
+
 int main(int argc, char **argv) {
   static unsigned char buffer[MAX_BYTES];
   for (int i = 1; i < argc; i++) {
@@ -167,6 +194,7 @@ int main(int argc, char **argv) {
     for (int wild = 0; wild < 2; wild++) {
       feedBandPower(bytes, wild);
       feedPipeline(bytes, wild);
+      feedStreamDetector(bytes, wild);
     }
     feedCfar(bytes);
     feedFeatures(bytes);

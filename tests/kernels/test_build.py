@@ -14,9 +14,10 @@ from airtouch.parameters import c_header
 ROOT = Path(__file__).parents[2]
 KERNELS = ROOT / "firmware" / "kernels"
 SOURCES = sorted(KERNELS.glob("*.c"))
-INCLUDES = ["-I", KERNELS, "-I", ROOT / "gap8" / "kernels"]
-DRIVEN = [KERNELS / f"{name}.c" for name in (
-    "band_power", "cross_spectrum", "disturbance_force", "edge_pipeline", "feature_window", "fr_cfar")]
+GAP8 = ROOT / "gap8"
+INCLUDES = ["-I", KERNELS, "-I", GAP8 / "kernels", "-I", GAP8 / "model"]
+DRIVEN = [*SOURCES, *(GAP8 / "kernels" / f"{name}.c" for name in ("stream_int8", "dense_int8", "sparse_dense_int8")),
+          GAP8 / "model" / "airtouch_stream.c"]
 FIRMWARE_FLAGS = ["-std=gnu11", "-Os", "-Werror", "-Wdouble-promotion", "-Wall", "-Wextra"]
 SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 FLOAT32 = np.array([np.nan, np.inf, -np.inf, 0, -0.0, 1e-45, 1e-38, 3.4e38, -3.4e38, 65535, 65536, -1, 1e15, 9.81, 0.5])
