@@ -24,8 +24,9 @@ demo: setup  ## the main job: train, prune, export, detect through the C kernels
 test: setup  ## every test, sanitizers included
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
 
-bench: setup  ## time the kernels against their peers, as ratios
+bench: setup  ## time the kernels and the simulator against their peers, as ratios
 	$(BIN)/python tools/bench.py $(BENCH_ARGS)
+	$(BIN)/python tools/bench_simulation.py
 
 clean:  ## remove what was built
 	rm -rf .venv build out host/*.egg-info host/airtouch/kernels/*.so

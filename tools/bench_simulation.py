@@ -1,13 +1,16 @@
-"""Simulated seconds per wall second: 64 flights, every effect on, physics at 500 Hz.
+"""Simulated seconds per wall second: 64 flights, every effect on, physics at 500 Hz; RotorPy in the same run.
 
     .venv/bin/python tools/bench_simulation.py [--flights 64] [--workers 2] [--json out.json]
 
 Every effect of the registry is on at a fifth of its default strength (all at full
 strength at once is not flyable). The first, untimed flight pays for compilation.
+RotorPy (extra `bench`) flies its Crazyflie in a closed loop with its own controller, on one core:
+it has no batch of its own without PyTorch. Three pairs in turn, medians.
 """
 
 import argparse
 import json
+import statistics
 import time
 
 from airtouch import vehicle as vehicles
@@ -15,6 +18,8 @@ from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
 
 STRENGTH = 0.2
+PAIRS = 3
+PEER_S = 4.0  #: simulated by the peer each time
 
 
 def every_effect() -> list[effects.Active]:
@@ -38,14 +43,46 @@ def measure(flights: int, workers: int, name: str = "paper-mixed") -> dict[str, 
             "wall_s": round(wall, 3), "simulated_s_per_wall_s": round(seconds / wall)}
 
 
-if __name__ == "__main__":
+def rotorpy_rate(seconds: float = PEER_S) -> float | None:
+    """Simulated seconds a wall second of RotorPy's Crazyflie on a circle at 500 Hz, None where it is not installed."""
+    try:
+        from rotorpy.controllers.quadrotor_control import SE3Control
+        from rotorpy.trajectories.circular_traj import ThreeDCircularTraj
+        from rotorpy.vehicles.crazyflie_params import quad_params
+        from rotorpy.vehicles.multirotor import Multirotor
+    except ImportError:
+        return None
+    craft, pilot, path = Multirotor(quad_params), SE3Control(quad_params), ThreeDCircularTraj()
+    state = craft.initial_state
+    started = time.perf_counter()
+    for step in range(int(seconds / 0.002)):
+        t = step * 0.002
+        state = craft.step(state, pilot.update(t, state, path.update(t)), 0.002)
+    return seconds / (time.perf_counter() - started)
+
+
+def main() -> None:
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=64)
     parser.add_argument("--workers", type=int, default=batch.available_cores())
     parser.add_argument("--json", help="write the figures here")
     options = parser.parse_args()
-    figures = measure(options.flights, options.workers)
+    pairs = [(measure(options.flights, options.workers), rotorpy_rate()) for _ in range(PAIRS)]
+    figures = {**pairs[-1][0], "first_flight_s": pairs[0][0]["first_flight_s"],
+               "simulated_s_per_wall_s": statistics.median(ours["simulated_s_per_wall_s"] for ours, _ in pairs)}
+    peers = [peer for _, peer in pairs if peer is not None]
+    if peers:
+        figures["rotorpy_s_per_wall_s"] = round(statistics.median(peers), 2)
+        figures["times_rotorpy"] = round(statistics.median(
+            ours["simulated_s_per_wall_s"] / peer for ours, peer in pairs))
     print("\n".join(f"{key}: {value}" for key, value in figures.items()))
+    if not peers:
+        print("RotorPy is not installed (extra 'bench'), so it is not compared")
     if options.json:
         with open(options.json, "w", encoding="utf-8") as file:
             json.dump(figures, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
