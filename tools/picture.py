@@ -1,10 +1,11 @@
-"""The README's picture: one held-out flight through the `best` detector.
+"""The documentation's pictures: one held-out flight through the `best` detector, and its reliability plot.
 
-After `airtouch crossval --detector best`, `python tools/picture.py` draws a flight of fold 0 with the model that
-never saw it, and writes host/docs/img/flight.png.
+After `airtouch crossval --detector best --json out/best.json`, `python tools/picture.py` draws a flight of fold 0
+with the model that never saw it (host/docs/img/flight.png) and the reliability over all folds (reliability.png).
 """
 
 import argparse
+import json
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from airtouch.cli.flights import find_flights
 from airtouch.detector import best, dataset
 from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
-from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
+from airtouch.detector.score import FlightScore
+from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
 
 SHOWN = ("motor mean", "gyro x", "ax")  #: channels drawn
 
@@ -25,12 +27,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--models", type=Path, default=Path("out/crossval"), help="where crossval kept its models")
     parser.add_argument("--flight", default="imu_data_0126-1916.csv.gz", help="a flight of fold 0")
-    parser.add_argument("--out", type=Path, default=Path("host/docs/img/flight.png"))
+    parser.add_argument("--json", type=Path, default=Path("out/best.json"), help="what crossval wrote")
+    parser.add_argument("--out", type=Path, default=Path("host/docs/img"), help="folder")
     options = parser.parse_args()
     folder = find_flights()
     file = next(f for f in dataset.collect([folder]) if f.path.name == options.flight)
     path = next(iter(sorted(options.models.glob(f"best_fold{file.condition.fold}_*.npz"))))
-    write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out, force=True)
+    write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out / "flight.png", force=True)
+    scores = [FlightScore.from_dict(s) for s in json.loads(options.json.read_text())["per_flight"]]
+    write_bytes(reliability({"best": scores}), options.out / "reliability.png", force=True)
 
 
 def draw(log, model, name: str) -> bytes:  # noqa: ANN001
