@@ -18,7 +18,8 @@ GRAM_N = 9.81e-3
 FLIGHT_PWM = (30000, 58000)
 STANDS = {"ramp": "thrust_cf21_bitcraze2021_cf2.1-stock-prop",
           "steps": "thrust_cf21_bitcraze2021_cf21_stock2",
-          "points": "thrust_cf21_imrc2025_data3"}
+          "points": "thrust_cf21_imrc2025_data3",
+          "other": "thrust_cf21_eckart1_data"}
 
 
 def settled(name, flights):
@@ -67,18 +68,31 @@ def rms(predicted, measured):
     return np.sqrt(np.mean((predicted / measured - 1.0) ** 2))
 
 
+def fitted_on(name, flights):
+    """A vehicle whose thrust and rotor speed are those of one stand."""
+    pwm, volts, thrust, speed = settled(name, flights)
+    return replace(vehicles.load("crazyflie-2.1"), thrust_of_pwm_n=curve(pwm, volts, thrust, 1.25),
+                   nominal_voltage_v=3.8, voltage_exponent=1.25, thrust_per_speed2=float(np.mean(thrust / speed**2)))
+
+
 @pytest.mark.parametrize(("fitted", "tested"), [("ramp", "steps"), ("steps", "ramp")])
 def test_thrust_and_rpm_fitted_on_one_stand_hold_on_another(flights, fitted, tested):
-    pwm, volts, thrust, speed = settled(fitted, flights)
-    exponent = 1.25
-    vehicle = replace(
-        vehicles.load("crazyflie-2.1"), thrust_of_pwm_n=curve(pwm, volts, thrust, exponent),
-        nominal_voltage_v=3.8,
-        voltage_exponent=exponent, thrust_per_speed2=float(np.mean(thrust / speed**2)))
+    vehicle = fitted_on(fitted, flights)
     pwm, volts, thrust, speed = settled(tested, flights)
     got = speeds(vehicle, pwm, volts)
     assert rms(vehicle.thrust_per_speed2 * got**2, thrust) < 0.03
     assert rms(got, speed) < 0.03
+
+
+@pytest.mark.parametrize(("fitted", "tested", "goal"), [
+    ("ramp", "other", 0.04), ("steps", "other", 0.04), ("other", "ramp", 0.035), ("other", "steps", 0.055)])
+def test_thrust_between_laboratories_is_above_three_percent(flights, fitted, tested, goal):
+    """Between laboratories the goal of 3 % is missed: mostly level, as rpm holds within 2 %."""
+    vehicle = fitted_on(fitted, flights)
+    pwm, volts, thrust, speed = settled(tested, flights)
+    got = speeds(vehicle, pwm, volts)
+    assert rms(vehicle.thrust_per_speed2 * got**2, thrust) < goal
+    assert rms(got, speed) < 0.02
 
 
 @pytest.mark.parametrize("fitted", ["ramp", "steps"])
