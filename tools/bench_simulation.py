@@ -44,7 +44,7 @@ def measure(flights: int, workers: int, name: str = "paper-mixed") -> dict[str, 
 
 
 def rotorpy_rate(seconds: float = PEER_S) -> float | None:
-    """Simulated seconds a wall second of RotorPy's Crazyflie on a circle at 500 Hz, None where it is not installed."""
+    """Simulated seconds a wall second of RotorPy's Crazyflie on a circle at 500 Hz; None without RotorPy."""
     try:
         from rotorpy.controllers.quadrotor_control import SE3Control
         from rotorpy.trajectories.circular_traj import ThreeDCircularTraj

@@ -36,15 +36,17 @@ def sources() -> str:
 
 def effects_of(name: str) -> list[str]:
     """The effects that a scenario switches on."""
-    return list(dict.fromkeys(effect for effect, _ in scenario.draw_flight(scenario.load(name), 0, 0).effects))
+    plan = scenario.draw_flight(scenario.load(name), 0, 0)
+    return list(dict.fromkeys(effect for effect, _ in plan.effects))
 
 
-def row(detector: str, without: str, options: argparse.Namespace, files: list[dataset.FlightFile]) -> dict[str, Any]:
+def row(detector: str, without: str, options: argparse.Namespace,
+        files: list[dataset.FlightFile]) -> dict[str, Any]:
     """Train and test one, or read what an earlier run found."""
     own = {"epochs": options.epochs} if detector == "paper" else {"steps": options.steps}
     own = {name: value for name, value in own.items() if value is not None}
-    asked = {"detector": detector, "without": without, "scenario": options.scenario, "flights": options.flights,
-             "seed": options.seed, **own, "tested": [f.path.name for f in files]}
+    asked = {"detector": detector, "without": without, "scenario": options.scenario,
+             "flights": options.flights, "seed": options.seed, **own, "tested": [f.path.name for f in files]}
     key = hashlib.sha256((json.dumps(asked) + sources()).encode()).hexdigest()[:12]
     kept = options.out / f"{detector}_without_{without}_{key}.json"
     if kept.is_file():
@@ -69,12 +71,13 @@ def line(detector: str, without: str, found: dict[str, Any]) -> str:
         interval = found["intervals"].get(name)
         if found[name] is None:
             return "-"
-        span = "" if interval is None else f" ({scale * interval[0]:.{digits}f} to {scale * interval[1]:.{digits}f})"
-        return f"{scale * found[name]:.{digits}f}{unit}{span}"
+        value, *ends = (f"{scale * x:.{digits}f}" for x in (found[name], *(interval or ())))
+        return f"{value}{unit}" + (f" ({ends[0]} to {ends[1]})" if ends else "")
 
     what = "all on" if without == ALL else f"`{without}` off"
-    return (f"| {detector}, {what} | {cell('mean_abs_error_m', 1, 3, ' m')} | {cell('missed', 100, 1, ' %')} | "
-            f"{cell('false_per_minute', 1, 1)} | {cell('balanced_accuracy', 100, 0, ' %')} | {found['lag_s']:.2f} s |")
+    cells = (f"{detector}, {what}", cell("mean_abs_error_m", 1, 3, " m"), cell("missed", 100, 1, " %"),
+             cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0, " %"), f"{found['lag_s']:.2f} s")
+    return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
@@ -86,7 +89,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, help="best: training steps; its own number if left out")
     parser.add_argument("--epochs", type=int, help="paper: epochs; its own number if left out")
     parser.add_argument("--detector", action="append", choices=("best", "paper"), help="default both")
-    parser.add_argument("--without", action="append", metavar="EFFECT", help="only these rows; none is all effects on")
+    parser.add_argument("--without", action="append", metavar="EFFECT",
+                        help="only these rows; none is all effects on")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -101,7 +105,8 @@ def main() -> None:
             if not started:
                 print(f"{options.flights} flights of {options.scenario}, seed {options.seed}; tested on "
                       f"{found['flights']} recorded flights, {found['edges']} edges\n\n"
-                      "| trained with | mean absolute error | missed | false a minute | balanced accuracy | lag |\n"
+                      "| trained with | mean absolute error | missed | false a minute | balanced accuracy "
+                      "| lag |\n"
                       "|---|---|---|---|---|---|")
                 started = True
             print(line(detector, without, found), flush=True)

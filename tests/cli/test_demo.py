@@ -1,4 +1,4 @@
-"""`airtouch demo` from the outside, on few generated flights and one epoch."""
+"""`airtouch demo` from the outside, on few simulated flights and one epoch."""
 
 import re
 
@@ -18,6 +18,7 @@ def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
     pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
     monkeypatch.setattr(demo, "find_flights", lambda: None)
     monkeypatch.setattr(demo, "GENERATED", 8)
+    monkeypatch.setattr(demo, "STEPS", 40)
     out = tmp_path / "demo"
     result = run("--out", out, "--epochs", 1)
     assert result.exit_code == 0, result.output

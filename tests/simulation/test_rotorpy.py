@@ -1,4 +1,4 @@
-"""The same rotor speed commands, open loop, through RotorPy's Crazyflie and through this simulator's equations."""
+"""The same rotor speed commands, open loop, through RotorPy's Crazyflie and through this simulator."""
 
 from dataclasses import replace
 
@@ -36,9 +36,12 @@ def same(vehicle, peer):
 def commands(hover):
     """(steps, 4) rad/s, our order: climb, roll, pitch and yaw pulses that end where they began."""
     t = np.arange(0.0, FLOWN_S, STEP_S)
+
     def pulse(start, size):
         return size * np.sin(2 * np.pi * (t - start) / 0.5) * ((t >= start) & (t < start + 0.5))
-    roll, pitch, yaw, climb = pulse(0.1, 14.0), pulse(0.4, 10.0), pulse(0.8, 150.0), pulse(0.2, 100.0) + pulse(1.3, 60.0)
+
+    roll, pitch, yaw = pulse(0.1, 14.0), pulse(0.4, 10.0), pulse(0.8, 150.0)
+    climb = pulse(0.2, 100.0) + pulse(1.3, 60.0)
     return hover + np.stack([climb - roll - pitch - yaw, climb - roll + pitch + yaw,
                              climb + roll + pitch - yaw, climb + roll - pitch + yaw], axis=1)
 
@@ -46,8 +49,8 @@ def commands(hover):
 def theirs(peer, given, aero):
     """(steps, 10): position, velocity and quaternion (w first) after each step."""
     kind, parameters = peer
-    state = {"x": np.zeros(3), "v": np.zeros(3), "q": np.array([0.0, 0, 0, 1]), "w": np.zeros(3), "wind": np.zeros(3),
-             "rotor_speeds": np.full(4, given[0].mean())}
+    state = {"x": np.zeros(3), "v": np.zeros(3), "q": np.array([0.0, 0, 0, 1]), "w": np.zeros(3),
+             "wind": np.zeros(3), "rotor_speeds": np.full(4, given[0].mean())}
     craft = kind(parameters, state, aero=aero, integrator_kwargs={"rtol": 1e-8, "atol": 1e-10})
     rows = []
     for command in given:
@@ -87,7 +90,7 @@ def thrust_axis(rows):
 
 @pytest.mark.parametrize("drag", [False, True])
 def test_trajectories_agree_within_one_percent(peer, same, drag):
-    # k_z at the hubs also damps roll and pitch, which `rotor_drag` leaves out: the drag in the plane is compared
+    # k_z at the hubs also damps roll and pitch, which `rotor_drag` leaves out: drag in the plane is compared
     kind, parameters = peer[0], {**peer[1], "k_z": 0.0}
     hover = hover_speed(from_vehicle(same))
     horizontal = 4.0 * parameters["k_d"] * hover

@@ -18,9 +18,10 @@ Progress = Callable[[str, int, int, str], None]
 
 
 def training_flights(
-    count: int, name: str = SCENARIO, *, without: Sequence[str] = (), seed: int = 0, progress: Progress | None = None
+    count: int, name: str = SCENARIO, *, without: Sequence[str] = (), seed: int = 0,
+    progress: Progress | None = None,
 ) -> tuple[list[FlightLog], dict[str, Any]]:
-    """(the first `count` flights of a scenario that end well and cross an edge, what they are for a model's metadata).
+    """(the first `count` flights that end well and cross an edge, what they are, for a model's metadata).
 
     name: a built-in scenario or a .toml file. without: effects of it to switch off. Same
     arguments, same flights. Held in memory: about 0.5 MB each.
@@ -47,8 +48,8 @@ def training_flights(
         if len(kept) == count:
             break
     if len(kept) < count:
-        raise AirTouchError(f"{scene.name}: only {len(kept)} of {SPARE * count} flights ended well and crossed an edge; "
-                            "choose another scenario")
+        raise AirTouchError(f"{scene.name}: only {len(kept)} of {SPARE * count} flights ended well and "
+                            "crossed an edge; choose another scenario")
     return kept, {"scenario": scene.name, "flights": count, "seed": seed, "left_out": left_out,
                   "effects": [effect for effect in on if effect not in without], "without": list(without)}
 
