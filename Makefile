@@ -19,7 +19,7 @@ setup: .venv/.kernels  ## make .venv with everything in it
 	@touch $@
 
 demo: setup  ## the main job: train, prune, export, detect through the C kernels, report
-	$(BIN)/airtouch demo
+	$(BIN)/airtouch demo --force
 
 test: setup  ## every test, sanitizers included
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)

@@ -53,7 +53,8 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     models = {name: fit(name, training, short.get(name, {})) for name in names}
 
     steps.say("Export: C sources for the GAP8")
-    export(models["paper"], out)
+    for name in ("paper", "best"):
+        export(name, models[name], out)
 
     steps.say("Detection on the held-out flights, through the C kernels and the C int8 network")
     results: dict[str, list[evaluate.Result]] = {}
@@ -155,15 +156,15 @@ def order(name: str) -> int:
     return ("paper", "baseline").index(name) if name in ("paper", "baseline") else 2
 
 
-def export(model: Any, out: Path) -> None:
+def export(name: str, model: Any, out: Path) -> None:
     """The model file, and the C sources made of it."""
     from airtouch.detector import export as gap8
 
     folder = out / "model"
     folder.mkdir(exist_ok=True)
-    model.save(folder / "paper.npz", force=True)
-    written = gap8.export(model, folder, "paper.npz", force=True)
-    click.echo(f"  {folder}: paper.npz, {', '.join(path.name for path in written)}")
+    model.save(folder / f"{name}.npz", force=True)
+    written = gap8.export(model, folder, f"{name}.npz", force=True)
+    click.echo(f"  {folder}: {name}.npz, {', '.join(path.name for path in written)}")
 
 
 def write(path: Path, where: str, results: dict[str, list[evaluate.Result]], models: dict[str, Any],
