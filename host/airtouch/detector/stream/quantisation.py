@@ -10,21 +10,23 @@ from airtouch.reference.int8_network import Int8Layer
 from airtouch.reference.stream_int8 import StreamConv, StreamNetwork
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
-EACH = 5  #: of a flight, at least
+FEW = 5  #: windows of a flight
 
 
 def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESENTATIVE) -> np.ndarray:
     """Windows (count, receptive samples, 12), evenly spaced over the flights' channels [(n, 12), ...].
 
-    Of many flights only some give windows: the first and the last of a flight lie on the ground.
+    Where there are few of each flight none is at its ends, which lie on the ground.
     """
     length = recipe.receptive_samples
     usable = [x for x in flights if len(x) >= length]
-    most = count // EACH
-    if len(usable) > count // (EACH - 1):
-        usable = [usable[i * len(usable) // most] for i in range(most)]
     each = -(-count // max(len(usable), 1))
-    found = [x[s:s + length] for x in usable for s in np.linspace(0, len(x) - length, each).astype(int)]
+    few = each < FEW
+    ends = 0.5 / each if few else 0.0
+    found = [x[s:s + length] for x in usable
+             for s in np.linspace(ends * (len(x) - length), (1 - ends) * (len(x) - length), each).astype(int)]
+    if few:
+        found = [found[i * len(found) // count] for i in range(min(count, len(found)))]
     return np.stack(found[:count]).astype(np.float32)
 
 
