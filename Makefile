@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] gap8/kernels/*.[ch] host/airtouch/kernels/*.[ch])
 
-.PHONY: help setup demo test bench model clean
+.PHONY: help setup demo test bench clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
