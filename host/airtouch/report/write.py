@@ -53,7 +53,7 @@ def write_report(
     source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
     template = environment.from_string(source)
     page = template.render(
-        title=title, answer=answer(first, summaries[first]), summaries=summaries, columns=COLUMNS, cell=cell,
+        title=title, answers=[answer(*row) for row in sorted(summaries.items(), key=_missed)], summaries=summaries, columns=COLUMNS, cell=cell,
         breakdowns={f"{first} by height": summary.by_height(scores[first]),
                     f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
                     f"{first} by wind": summary.by_wind(scores[first])},
@@ -62,6 +62,11 @@ def write_report(
                   "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)
+
+
+def _missed(row: tuple[str, Mapping[str, Any]]) -> int:
+    """What the sentences are sorted by."""
+    return row[1]["missed_count"]
 
 
 def answer(name: str, table: Mapping[str, Any]) -> str:
