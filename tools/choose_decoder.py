@@ -117,24 +117,15 @@ def main() -> None:
     winner = int(np.argmin([cost(flights, f) for f in found]))
     show("one setting, best over all folds", flights, found[winner])
     print(json.dumps(asdict(tried[winner])))
-    nested: list[tuple[np.ndarray, int]] = []
-    for i, flight in enumerate(flights):
-        others = [k for k, f in enumerate(flights) if f.fold != flight.fold]
-        choice = _best_on(flights, found, others)
+    nested: list[tuple[np.ndarray, int]] = [None] * len(flights)
+    for fold in {flight.fold for flight in flights}:
+        others = [k for k, flight in enumerate(flights) if flight.fold != fold]
+        some = [flights[k] for k in others]
+        choice = int(np.argmin([cost(some, [f[k] for k in others]) for f in found]))
         lag = lag_of([found[choice][k] for k in others])
-        nested.append((found[choice][i][0] - lag, found[choice][i][1]))
+        for k in set(range(len(flights))) - set(others):
+            nested[k] = (found[choice][k][0] - lag, found[choice][k][1])
     print("each fold with the settings best on the other four:", _text(figures(flights, nested, 0.0)))
-
-
-_CHOICE: dict[tuple[int, ...], int] = {}
-
-
-def _best_on(flights: list[Flight], found: list, chosen: list[int]) -> int:
-    key = tuple(chosen)
-    if key not in _CHOICE:
-        some = [flights[k] for k in chosen]
-        _CHOICE[key] = int(np.argmin([cost(some, [f[k] for k in chosen]) for f in found]))
-    return _CHOICE[key]
 
 
 def show(title: str, flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> None:

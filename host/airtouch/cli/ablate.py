@@ -7,7 +7,7 @@ import click
 from rich.table import Table
 
 from airtouch.cli import scores as show
-from airtouch.cli.flights import find_flights
+from airtouch.cli.flights import need_flights
 from airtouch.detector import ablation, dataset
 from airtouch.detector.ablation import ABLATIONS
 
@@ -34,9 +34,7 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
     Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Takes two to five minutes an ablation on two cores.
     """
     show.check_free(json_path, force)
-    folder = folder or find_flights()
-    if folder is None:
-        raise click.UsageError("no recorded flights found; name their FOLDER or set AIRTOUCH_FLIGHTS")
+    folder = need_flights(folder)
     results = ablation.ablate(
         only or tuple(ABLATIONS), dataset.collect([folder]), out, seed=seed,
         best_options={} if steps is None else {"steps": steps},

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from airtouch.cli import scores as show
-from airtouch.cli.flights import find_flights
+from airtouch.cli.flights import need_flights
 from airtouch.detector import crossval, dataset, evaluate
 
 
@@ -39,11 +39,7 @@ def command(folder: Path | None, detector: str, physical_filter: bool, epochs: i
     training flights of each fold alone. Exit code 2 when a flight was left out.
     """
     show.check_free(json_path, force)
-    if folder is None:
-        folder = find_flights()
-        if folder is None:
-            raise click.UsageError("no recorded flights found; name their FOLDER or set AIRTOUCH_FLIGHTS")
-    files = dataset.collect([folder])
+    files = dataset.collect([need_flights(folder)])
     options = {} if epochs is None else {"epochs": epochs}
     scores, folds, left_out = crossval.crossval(
         detector, files, out, seed=seed, options=options, physical_filter=physical_filter,

@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+import click
+
 from airtouch.errors import AirTouchError
 
 
@@ -23,6 +25,14 @@ def find_flights() -> Path | None:
         if folder.is_dir():
             return _inner(folder)
     return None
+
+
+def need_flights(folder: Path | None = None) -> Path:
+    """The folder given, else `find_flights`; a usage error where there is none."""
+    found = folder or find_flights()
+    if found is None:
+        raise click.UsageError("no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS")
+    return found
 
 
 def _inner(folder: Path) -> Path:

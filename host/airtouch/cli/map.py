@@ -54,17 +54,15 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
         trained = module.load(model)
         found, lag = module.run(log, trained).edges, module.lag_s(trained)
         model_sigma = getattr(trained, "metadata", {}).get("sigma_s", edge_map.ASSUMED_SIGMA_S)
-    points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found],
-                                  sigma_s=sigma or model_sigma, lag_s=lag)
-    if not measured and points:
-        xy = xy - [points[0].x_m, points[0].y_m]
-        points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found],
-                                      sigma_s=sigma or model_sigma, lag_s=lag)
+    sigma_s = sigma or model_sigma
+    if not measured and found:  # only distances from the first edge mean something
+        xy = xy - xy[max(round(found[0].sample - lag / edge_map.PERIOD_S), 0)]
+    points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found], sigma_s=sigma_s, lag_s=lag)
     platforms = edge_map.platforms(points)
     position = "logged" if measured else "dead reckoning, from the first edge"
     content = edge_map.geojson(points, platforms, {
         "flight": flight.name, "detector": "truth" if truth else detector, "position": position,
-        "lag_s": lag, "sigma_s": sigma or model_sigma})
+        "lag_s": lag, "sigma_s": sigma_s})
     from airtouch.report.map_figure import edge_map as draw
 
     write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)

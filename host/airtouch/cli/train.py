@@ -12,7 +12,7 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from airtouch import logs
-from airtouch.cli.flights import find_flights
+from airtouch.cli.flights import need_flights
 from airtouch.cli.scores import check_free
 from airtouch.detector import dataset, evaluate, registry
 from airtouch.errors import AirTouchError
@@ -87,13 +87,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
 
 def _read(paths: tuple[Path, ...]) -> tuple[list[FlightLog], int]:
     """The logs that can be trained on, and how many could not."""
-    if not paths:
-        found = find_flights()
-        if found is None:
-            raise click.UsageError("no recorded flights found; name FLIGHTS or set AIRTOUCH_FLIGHTS")
-        paths = (found,)
     chosen, failures = [], 0
-    for file in dataset.collect(paths):
+    for file in dataset.collect(paths or (need_flights(),)):
         try:
             log = logs.read(file.path)
             evaluate.check(log)

@@ -15,6 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
 ASSUMED_SIGMA_S = 0.1  #: timing error of a detection where the model does not state one
+PERIOD_S = 0.01  #: between two samples, where nothing else is said
 MIN_SPEED_MPS = 0.05  #: below it a timing error is not turned into less than this much distance
 
 
@@ -54,14 +55,14 @@ def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0
         return log.stack(("x_m", "y_m")), True
     if speed_mps is None:
         raise AirTouchError(f"{log.source}: no position (x_m, y_m) in this log; give the speed: --speed 0.2")
-    period = float(log.meta.get("sample_period_s", 0.01))
+    period = float(log.meta.get("sample_period_s", PERIOD_S))
     along = np.arange(len(log)) * period * speed_mps
     heading = np.radians(heading_deg)
     return np.column_stack((along * np.cos(heading), along * np.sin(heading))), False
 
 
 def edge_points(
-    xy: np.ndarray, samples: np.ndarray, kinds: list[str], *, period_s: float = 0.01,
+    xy: np.ndarray, samples: np.ndarray, kinds: list[str], *, period_s: float = PERIOD_S,
     sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
 ) -> list[EdgePoint]:
     """Detections as points of the track.

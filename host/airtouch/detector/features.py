@@ -10,7 +10,7 @@ from airtouch import vehicle as vehicles
 from airtouch.detector.channels import level_acceleration, nine_channels, thrust_axis
 from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.parameters import DEFAULT, Parameters
-from airtouch.reference.edge_pipeline import EdgePipelineConfig
+from airtouch.reference.edge_pipeline import EdgeEvents, EdgePipelineConfig
 from airtouch.vehicle import Vehicle
 
 
@@ -25,6 +25,7 @@ class Features:
     cfar_power (n,) squared deviation of f_w,z from its mean so far, newtons^2
     threshold  (n,) FR-CFAR threshold T for `cfar_power`; NaN at first
     alert      (n,) bool, cfar_power above T
+    armed      (n,) bool, in the air for long enough that an edge would be reported
     """
 
     channels: np.ndarray
@@ -34,21 +35,28 @@ class Features:
     cfar_power: np.ndarray
     threshold: np.ndarray
     alert: np.ndarray
+    armed: np.ndarray
 
 
-def flight_features(log: FlightLog, vehicle: Vehicle | None = None,
-                    parameters: Parameters = DEFAULT) -> Features:
-    """Every signal of the paper's sections 4 and 5.1 for one flight, in one call of the C pipeline.
+def pipeline(log: FlightLog, parameters: Parameters = DEFAULT, probability: np.ndarray | None = None, *,
+             vehicle: Vehicle | None = None, physical_filter: bool = True) -> EdgeEvents:
+    """One flight through the C pipeline; probability (n,) is the network's, None for none yet.
 
     vehicle: mass and thrust curve for the disturbance force, the flow-deck Crazyflie by default.
     Raises AirTouchError that names the columns which the log lacks.
     """
-    events = kernels.edge_pipeline(
+    return kernels.edge_pipeline(
         level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle or vehicles.load(),
         vbat_v=log["vbat_V"] if log.has("vbat_V") else None, thrust_axis=thrust_axis(log),
-        config=EdgePipelineConfig(parameters))
+        probability=probability, config=EdgePipelineConfig(parameters, physical_filter=physical_filter))
+
+
+def flight_features(log: FlightLog, vehicle: Vehicle | None = None,
+                    parameters: Parameters = DEFAULT) -> Features:
+    """Every signal of the paper's sections 4 and 5.1 for one flight, in one call of `pipeline`."""
+    events = pipeline(log, parameters, vehicle=vehicle)
     return Features(nine_channels(log), events.band_power, events.features, events.force,
-                    events.cfar_power, events.threshold, events.alert)
+                    events.cfar_power, events.threshold, events.alert, events.armed)
 
 
 def feature_windows(fused: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:

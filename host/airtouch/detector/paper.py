@@ -14,20 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from airtouch import kernels, logs
-from airtouch import vehicle as vehicles
+from airtouch import logs
 from airtouch.detector import model_file, tuning
-from airtouch.detector.channels import level_acceleration, thrust_axis
 from airtouch.detector.decode import decode, detections
 from airtouch.detector.decode import physical_filter as filtered
-from airtouch.detector.features import Features, feature_windows, flight_features
+from airtouch.detector.features import Features, feature_windows, flight_features, pipeline
 from airtouch.detector.model_file import Model
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
-from airtouch.logs.flight_log import GYRO, PWM, FlightLog
+from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
-from airtouch.reference.edge_pipeline import EdgeEvents, EdgePipelineConfig
 from airtouch.reference.int8_network import multiplications
 
 #: What `tune` chooses from: P at entry, P at exit, samples between edges, samples an alert counts.
@@ -56,7 +53,7 @@ def run_float(log: FlightLog, model: Model) -> Trace:
 
 def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
     settings, physical = decoding(model)
-    events = pipeline(log, settings, probability, physical)
+    events = pipeline(log, settings, probability, physical_filter=physical)
     return Trace(probability, detections(events.edge, probability), signals(features))
 
 
@@ -86,8 +83,7 @@ def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = Tru
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for log in flights:
         features = flight_features(log)
-        events = pipeline(log, DEFAULT, None, False)
-        seen.append((probability_of_flight(model, features.fused), events.armed, features.alert))
+        seen.append((probability_of_flight(model, features.fused), features.armed, features.alert))
 
     @cache
     def unfiltered(entry: float, leave: float, dwell: int, i: int) -> list[Detection]:
@@ -98,14 +94,7 @@ def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = Tru
         edges = unfiltered(settings.probability_entry, settings.probability_exit, settings.dwell_samples, i)
         return filtered(edges, seen[i][2], settings.alert_hold) if physical_filter else edges
 
-    holds = HOLD if physical_filter else HOLD[:1]
-    candidates = [
-        replace(DEFAULT, probability_entry=enter, probability_exit=leave, dwell_samples=dwell,
-                alert_hold=hold)
-        for enter, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, holds)
-        if leave < enter
-    ]
-    settings, lag, score = tuning.choose(candidates, truth, detect)
+    settings, lag, score = tuning.choose(candidates(physical_filter), truth, detect)
     return replace(model, metadata={
         **model.metadata, "parameters": asdict(settings), "lag_s": lag, "physical_filter": physical_filter,
         "tuned_on": [os.path.basename(log.source) for log in flights], "tuned_timed_f1": score})
@@ -147,16 +136,6 @@ def decoding(model: Model) -> tuple[Parameters, bool]:
         return Parameters(**model.metadata["parameters"]), bool(model.metadata.get("physical_filter", True))
     except (KeyError, TypeError):
         raise AirTouchError("the model's parameters are not those of this version; train it again") from None
-
-
-def pipeline(
-    log: FlightLog, settings: Parameters, probability: np.ndarray | None, physical: bool
-) -> EdgeEvents:
-    """One flight through the C pipeline."""
-    return kernels.edge_pipeline(
-        level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicles.load(),
-        vbat_v=log["vbat_V"] if log.has("vbat_V") else None, thrust_axis=thrust_axis(log),
-        probability=probability, config=EdgePipelineConfig(settings, physical_filter=physical))
 
 
 def signals(features: Features) -> dict[str, np.ndarray]:

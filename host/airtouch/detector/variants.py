@@ -78,18 +78,18 @@ class Variant:
         """What an ablation reports of training."""
         return {"converged_after_epochs": model.converged}
 
-    def _features(self, log: FlightLog) -> tuple[np.ndarray, np.ndarray]:
-        """Fused features (n, 3) and alerts (n,)."""
+    def _features(self, log: FlightLog) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Fused features (n, 3), armed (n,) and alerts (n,)."""
         features = flight_features(log, parameters=replace(DEFAULT, band_window=self.band_window))
         fused = features.fused
         if self.centred:
             early = self.band_window // 2
             fused = np.vstack([fused[early:], np.full((early, fused.shape[1]), np.nan, fused.dtype)])
-        return fused, features.alert
+        return fused, features.armed, features.alert
 
     def _windows(self, log: FlightLog, index: int) -> train.Windows:
         """Training windows of one flight."""
-        fused, alert = self._features(log)
+        fused, _, alert = self._features(log)
         x, ends = feature_windows(fused, self.rows)
         flying = logs.airborne(log)[ends]
         x, ends = x[flying], ends[flying]
@@ -98,12 +98,12 @@ class Variant:
 
     def _seen(self, log: FlightLog, model: "VariantModel") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """P(over) (n,), armed (n,), alerts (n,)."""
-        fused, alert = self._features(log)
+        fused, armed, alert = self._features(log)
         x, ends = feature_windows(fused, self.rows)
         logits = np.asarray(model.network.predict(x[..., None], batch_size=2048, verbose=0), dtype=np.float64)
         probability = np.full(len(log), np.nan)
         probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
-        return probability, paper.pipeline(log, DEFAULT, None, False).armed, alert
+        return probability, armed, alert
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,6 @@ from airtouch.simulation.rotation import euler
 
 SLOTS = 16  #: effects with a wrench that may be on at once
 LOG_STEPS = 5  #: physics steps a logged row
-STREAMS = 4  #: motor noise, IMU, range and flow, start
 RING = 64  #: delays of up to 63 steps
 OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended
 ENDINGS = ("ok", "a value is not finite", "it turned over", "it struck a surface", "it flew away")

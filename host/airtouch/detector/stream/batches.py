@@ -96,6 +96,5 @@ def _augment(x: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndar
     x *= np.exp(recipe.gain * (rng.standard_normal((b, 1, 1)) + rng.standard_normal((b, 1, CHANNELS))))
     disturbed = x + recipe.offset * rng.standard_normal((b, 1, CHANNELS))
     disturbed += recipe.noise * rng.standard_normal((b, n, CHANNELS), dtype=np.float32)
-    limit = MotionConfig().limit
     disturbed[..., [*recipe.muted, CHANNELS - 1]] = 0.0
-    return np.clip(disturbed, -limit, limit).astype(np.float32)
+    return np.clip(disturbed, -MotionConfig.limit, MotionConfig.limit).astype(np.float32)

@@ -76,7 +76,9 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
             progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
     for variable, mask in zip(model.trainable_variables, masks):
         variable.assign(variable * mask)
-    return dict(zip(_names(recipe), (v.numpy() for v in model.trainable_variables), strict=True)) | _head(model, recipe)
+    shapes = recipe.weight_shapes()  # the head's kernel has a tap for each layer that it reads
+    return {name: v.numpy().reshape(shapes[name])
+            for name, v in zip(_names(recipe), model.trainable_variables, strict=True)}
 
 
 def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
@@ -95,8 +97,3 @@ def _names(recipe: Recipe) -> list[str]:
     """The weights' names in the order of the model's variables."""
     return [f"layer{i}.{part}" for i in range(len(recipe.shapes)) for part in ("kernel", "bias")]
 
-
-def _head(model, recipe: Recipe) -> Weights:  # noqa: ANN001
-    """The head's kernel as (layers that it reads, width, outputs)."""
-    last = len(recipe.shapes) - 1
-    return {f"layer{last}.kernel": model.trainable_variables[-2].numpy().reshape(recipe.shapes[-1])}
