@@ -28,7 +28,7 @@ def motion_channels(
     acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray, config: MotionConfig | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Channels (n, 12) float32 and airborne (n,) bool; see `airtouch.reference.motion_channels`."""
-    acc, rate, motors = _signals(acc_level, gyro, pwm)
+    acc, rate, motors = check_signals(acc_level, gyro, pwm)
     channels = np.empty((len(acc), 12), dtype=np.float32)
     airborne = np.empty(len(acc), dtype=np.uint8)
     lib.motionChannelsBatch(pointer(acc), pointer(rate), pointer(motors), len(acc),
@@ -57,7 +57,7 @@ def stream_detector(
     Raises AirTouchError for signals of another shape and for a network that does not take twelve
     channels or give three logits.
     """
-    acc, rate, motors = _signals(acc_level, gyro, pwm)
+    acc, rate, motors = check_signals(acc_level, gyro, pwm)
     flat, keep = flat_stream(network)
     arena = ffi.new("int8_t[]", arena_bytes(network))
     events = ffi.new("streamEvent_t[]", max(len(acc), 1))
@@ -70,14 +70,15 @@ def stream_detector(
         quantisation, decoder_struct(decoder), arena, events)
     if not fits:
         raise AirTouchError("stream detector: the network must take 12 channels and give 3 logits")
-    table = np.frombuffer(ffi.buffer(events), dtype=_EVENT)[:len(acc)]
+    table = np.frombuffer(ffi.buffer(events), dtype=EVENT)[:len(acc)]
     return StreamEvents(table["logits"].copy(), table["ready"] > 0, table["edge"].copy(), table["airborne"] > 0)
 
 
-_EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
-                   "formats": [("<f4", 3), "u1", "u1", "u1"],
-                   "offsets": [ffi.offsetof("streamEvent_t", name) for name in ("logits", "ready", "edge", "airborne")],
-                   "itemsize": ffi.sizeof("streamEvent_t")})
+#: streamEvent_t as NumPy sees it
+EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
+                  "formats": [("<f4", 3), "u1", "u1", "u1"],
+                  "offsets": [ffi.offsetof("streamEvent_t", name) for name in ("logits", "ready", "edge", "airborne")],
+                  "itemsize": ffi.sizeof("streamEvent_t")})
 
 
 def motion_struct(config: MotionConfig) -> object:
@@ -98,7 +99,8 @@ def decoder_struct(config: DecoderConfig) -> object:
         "holdSteps": config.hold_steps})
 
 
-def _signals(acc: np.ndarray, gyro: np.ndarray, pwm: np.ndarray) -> tuple[np.ndarray, ...]:
+def check_signals(acc: np.ndarray, gyro: np.ndarray, pwm: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The three as float32; AirTouchError for other shapes than (n, 3), (n, 3) and (n, 4)."""
     signals = float32(acc), float32(gyro), float32(pwm)
     n = len(signals[0])
     if [s.shape for s in signals] != [(n, 3), (n, 3), (n, 4)]:

@@ -1,0 +1,44 @@
+"""The streaming detector in C, kept open between samples: what runs live, on a drone's log or a file."""
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.kernels.arrays import pointer
+from airtouch.kernels.library import call, ffi
+from airtouch.kernels.stream import arena_bytes, flat_stream
+from airtouch.kernels.stream_detector import EVENT, StreamEvents, check_signals, decoder_struct, motion_struct
+from airtouch.reference.edge_decoder import DecoderConfig
+from airtouch.reference.motion_channels import MotionConfig
+from airtouch.reference.stream_int8 import StreamNetwork
+
+
+class StreamSession:
+    """`stream_detector` in pieces: the same events whatever the pieces are.
+
+    Raises AirTouchError for a network that does not take twelve channels or give three logits.
+    """
+
+    def __init__(self, network: StreamNetwork, motion: MotionConfig | None = None,
+                 decoder: DecoderConfig = DecoderConfig()) -> None:
+        flat, keep = flat_stream(network)
+        first = network.convs[0].layer
+        quantisation = ffi.new("streamQuantisation_t *", {
+            "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
+            "outputScale": network.head.output_scale, "outputZeroPoint": network.head.output_zero_point})
+        arena = ffi.new("int8_t[]", arena_bytes(network))
+        self._state = ffi.new("double[]", call("streamSessionBytes")() // 8 + 1)  # doubles, for their alignment
+        self._keep = (flat, keep, arena)  # the session points into these
+        if not call("streamSessionOpen")(self._state, motion_struct(motion or MotionConfig()), flat, quantisation,
+                                         decoder_struct(decoder), arena):
+            raise AirTouchError("stream detector: the network must take 12 channels and give 3 logits")
+
+    def next(self, acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray) -> StreamEvents:
+        """Events of the next samples: (n, 3) m/s^2 in level axes, (n, 3) rad/s, (n, 4) PWM.
+
+        Values that are not finite hold the last finite one.
+        """
+        acc, rate, motors = check_signals(acc_level, gyro, pwm)
+        events = np.empty(len(acc), dtype=EVENT)
+        call("streamSessionNext")(self._state, pointer(acc), pointer(rate), pointer(motors), len(acc),
+                                  pointer(events, "streamEvent_t *"))
+        return StreamEvents(events["logits"], events["ready"] > 0, events["edge"], events["airborne"] > 0)
