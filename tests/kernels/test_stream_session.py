@@ -10,7 +10,7 @@ from airtouch.kernels.stream_session import StreamSession
 
 MODEL = best.load(None)
 RNG = np.random.default_rng(0)
-SAMPLES = 600
+SAMPLES = 2000
 ACC = RNG.normal(0.0, 1.0, (SAMPLES, 3)) + (0.0, 0.0, 9.81)
 GYRO = RNG.normal(0.0, 0.5, (SAMPLES, 3))
 PWM = RNG.normal(40000.0, 5000.0, (SAMPLES, 4))
