@@ -1,0 +1,138 @@
+"""Cross-compiles C files into a static program for one of the flight processors, from PyPI alone.
+
+`ziglang` (PyPI) is a whole cross compiler: clang, linker and runtime library. Where the
+distribution's GCC is asked for and present it is used instead. A program is named by the hash of
+all that goes into it, so that a second build is a look into a folder.
+"""
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from airtouch.errors import AirTouchError
+from tools.emulator.cores import CORES, Core
+from tools.emulator.elf import Elf
+
+ROOT = Path(__file__).resolve().parents[2]
+CACHE = ROOT / "build" / "emulator"
+LIBC = Path(__file__).resolve().parent / "libc"
+
+#: As the desktop library is compiled: without contraction a multiply-add rounds twice on both.
+FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Wdouble-promotion", "-Werror",
+         "-fno-asynchronous-unwind-tables", "-fomit-frame-pointer", "-g0")
+_ZIG_FLAGS = ("-fhosted", "-fno-sanitize=undefined", "-fno-stack-protector")
+
+
+@dataclass(frozen=True)
+class Program:
+    """A linked program and the objects it is made of, by the name of their source."""
+
+    elf: Path
+    objects: dict[str, Path]
+
+
+def compilers(core: str) -> list[str]:
+    """What can compile for this core here: "zig", "gcc", both or none."""
+    found = ["zig"] if importlib.util.find_spec("ziglang") else []
+    return found + (["gcc"] if shutil.which(CORES[core].gcc) else [])
+
+
+def build(
+    sources: Sequence[Path], core: str, *, include: Sequence[Path] = (), defines: Sequence[str] = (),
+    optimise: str = "-O2", compiler: str | None = None, cache: Path = CACHE,
+) -> Program:
+    """Compiles and links `sources` (no main, every function kept) for "cortex-m4" or "rv32imc".
+
+    include: folders of headers; defines: "NAME" or "NAME=VALUE"; compiler: "zig" or "gcc", by default
+    $AIRTOUCH_CROSS or zig where it is installed, whose version is pinned, so that counts can be compared.
+    Raises AirTouchError with the compiler's words where the sources do not compile, and where there is no
+    compiler.
+    """
+    target = _core(core)
+    chosen = _compiler(core, compiler)
+    sources, include = [Path(s).resolve() for s in sources], [Path(i).resolve() for i in include]
+    flags = [*FLAGS, optimise, *(f"-D{d}" for d in defines), *(f"-I{folder}" for folder in include)]
+    folder = cache / core / _digest(target, chosen, flags, sources, include)
+    program = Program(folder / "program.elf", {s.name: folder / f"{s.stem}.o" for s in sources})
+    if not program.elf.is_file():
+        _make(folder, target, chosen, flags, sources, cache)
+    return program
+
+
+def _core(name: str) -> Core:
+    if name not in CORES:
+        raise AirTouchError(f"no core {name!r}: there are {', '.join(CORES)}")
+    return CORES[name]
+
+
+def _compiler(core: str, asked: str | None) -> str:
+    there = compilers(core)
+    asked = asked or os.environ.get("AIRTOUCH_CROSS") or (there[0] if there else "zig")
+    if asked not in there:
+        raise AirTouchError(f"no {asked} compiler for {core}: `pip install ziglang`, or install {CORES[core].gcc}")
+    return asked
+
+
+def _commands(core: Core, compiler: str) -> tuple[list[str], list[str]]:
+    """The compiler with its target, to compile and to link."""
+    if compiler == "zig":
+        base = [sys.executable, "-m", "ziglang", "cc", *core.zig_flags, *_ZIG_FLAGS, f"-I{LIBC}"]
+        return base, [*base, "-Wl,--gc-sections"]
+    base = [core.gcc, *core.gcc_flags]
+    return base, [*base, "-nostartfiles", "-Wl,--gc-sections"]
+
+
+def _compiler_version(core: Core, compiler: str) -> str:
+    if compiler == "zig":
+        return version("ziglang")
+    return subprocess.run([core.gcc, "--version"], capture_output=True, text=True, check=True).stdout
+
+
+def _digest(core: Core, compiler: str, flags: list[str], sources: list[Path], include: list[Path]) -> str:
+    headers = [path for folder in include for path in sorted(folder.glob("**/*.h"))]
+    text = hashlib.sha256(repr((core, compiler, _compiler_version(core, compiler), flags)).encode())
+    for path in [*sources, *headers, *sorted(LIBC.iterdir()), Path(__file__)]:
+        text.update(f"\0{path.name}\0".encode())
+        text.update(path.read_bytes())
+    return text.hexdigest()[:24]
+
+
+def _make(folder: Path, core: Core, compiler: str, flags: list[str], sources: list[Path], cache: Path) -> None:
+    """Everything in a folder of its own, which then takes its name: two builds at once do no harm."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    compile_, link = _commands(core, compiler)
+    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache / "zig"), "ZIG_LOCAL_CACHE_DIR": str(cache / "zig")}
+    extra = [LIBC / "libc.c"] if compiler == "zig" else []
+    with tempfile.TemporaryDirectory(dir=folder.parent) as work:
+        new = Path(work) / "new"
+        new.mkdir()
+        objects = [new / f"{source.stem}.o" for source in [*sources, *extra]]
+        if len({path.name for path in objects}) < len(objects):
+            raise AirTouchError("two sources have the same file name")
+        for source, target in zip([*sources, *extra], objects):
+            _run([*compile_, *flags, "-c", source, "-o", target], environment)
+        libraries = [] if compiler == "zig" else ["-lm", "-lc", "-lgcc"]
+        kept = [f"-Wl,-u,{name}" for path in objects[:len(sources)]
+                for name, symbol in Elf(path).symbols.items() if symbol.is_global]
+        _run([*link, "-Wl,-e,0", "-T", LIBC / f"{core.name}.ld", *kept, *objects, *libraries,
+              "-o", new / "program.elf"], environment)
+        try:
+            new.rename(folder)
+        except OSError:
+            if not (folder / "program.elf").is_file():
+                raise
+
+
+def _run(command: list, environment: dict[str, str]) -> None:
+    run = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=environment)
+    if run.returncode:
+        words = (run.stderr or run.stdout).strip()
+        raise AirTouchError(f"{Path(str(command[-1])).name}: the cross compiler says: {words[:2000]}")

@@ -1,0 +1,31 @@
+"""The processors that flight code runs on: how to compile for each and how to emulate it."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Core:
+    """One processor."""
+
+    name: str
+    gcc: str                     #: the cross compiler of distributions, used only where asked for or alone
+    gcc_flags: tuple[str, ...]
+    zig_flags: tuple[str, ...]
+    has_fpu: bool                #: floats are passed in and returned from float registers
+    registers: int               #: integer registers that carry arguments
+
+
+CORTEX_M4 = Core(
+    "cortex-m4", "arm-none-eabi-gcc",
+    ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+    # Without vfp4d16sp this target silently calls soft-float routines.
+    ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp"),
+    has_fpu=True, registers=4)
+
+RV32IMC = Core(
+    "rv32imc", "riscv64-unknown-elf-gcc",
+    ("-march=rv32imc_zicsr", "-mabi=ilp32", "-msmall-data-limit=0"),
+    ("-target", "riscv32-freestanding", "-mcpu=generic_rv32+m+c", "-mabi=ilp32", "-msmall-data-limit=0"),
+    has_fpu=False, registers=8)
+
+CORES = {core.name: core for core in (CORTEX_M4, RV32IMC)}

@@ -1,0 +1,105 @@
+"""As much of a 32-bit little-endian ELF file as an emulator needs: what to load where, and the names."""
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+ARM, RISCV = 40, 243
+_WRITE, _ALLOC, _EXECUTE = 1, 2, 4
+_NOBITS, _SYMTAB = 8, 2
+_FUNCTION = 2
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section that lies in memory."""
+
+    name: str
+    address: int
+    size: int
+    data: bytes  #: empty where the section is zeros (.bss)
+    writable: bool
+    executable: bool
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A function or variable; `address` without the Thumb bit."""
+
+    name: str
+    address: int
+    size: int
+    is_function: bool
+    is_global: bool
+
+
+class Elf:
+    """A linked program or one object file.
+
+    machine: ARM or RISCV. sections: those that lie in memory. symbols: by name.
+    Raises ValueError for anything that is not a 32-bit little-endian ELF file.
+    """
+
+    def __init__(self, path: Path):
+        self.path = Path(path)
+        data = self.path.read_bytes()
+        if data[:6] != b"\x7fELF\x01\x01":
+            raise ValueError(f"{path}: not a 32-bit little-endian ELF file")
+        self.machine = struct.unpack_from("<H", data, 18)[0]
+        headers = _section_headers(data)
+        self.sections = [_section(data, header) for header in headers if header["flags"] & _ALLOC and header["size"]]
+        self.symbols = {symbol.name: symbol for symbol in _symbols(data, headers, thumb=self.machine == ARM)}
+        self._functions = sorted((s for s in self.symbols.values() if s.is_function), key=lambda s: s.address)
+
+    def where(self, address: int) -> str:
+        """`function+0x1a` for an address, or the bare address where no function is."""
+        for symbol in self._functions:
+            if symbol.address <= address < symbol.address + max(symbol.size, 2):
+                return f"{symbol.name}+{address - symbol.address:#x}"
+        return f"{address:#010x}"
+
+    def flash_bytes(self) -> int:
+        """Code, constants and the start values of variables."""
+        return sum(len(section.data) for section in self.sections)
+
+    def code_bytes(self) -> int:
+        """Code alone."""
+        return sum(section.size for section in self.sections if section.executable)
+
+    def ram_bytes(self) -> int:
+        """Variables: .data and .bss."""
+        return sum(section.size for section in self.sections if section.writable)
+
+
+def _section_headers(data: bytes) -> list[dict]:
+    offset, = struct.unpack_from("<I", data, 32)
+    size, count, names = struct.unpack_from("<HHH", data, 46)
+    fields = ("name", "type", "flags", "address", "offset", "size", "link", "info")
+    headers = [dict(zip(fields, struct.unpack_from("<8I", data, offset + i * size))) for i in range(count)]
+    name_table = headers[names]["offset"]
+    for header in headers:
+        header["name"] = _text(data, name_table + header["name"])
+    return headers
+
+
+def _text(data: bytes, start: int) -> str:
+    return data[start:data.index(b"\0", start)].decode()
+
+
+def _section(data: bytes, header: dict) -> Section:
+    content = b"" if header["type"] == _NOBITS else data[header["offset"]:header["offset"] + header["size"]]
+    return Section(header["name"], header["address"], header["size"], content,
+                   bool(header["flags"] & _WRITE), bool(header["flags"] & _EXECUTE))
+
+
+def _symbols(data: bytes, headers: list[dict], thumb: bool) -> list[Symbol]:
+    found = []
+    for table in (header for header in headers if header["type"] == _SYMTAB):
+        text = headers[table["link"]]["offset"]
+        for at in range(table["offset"], table["offset"] + table["size"], 16):
+            name, value, size, info, _, section = struct.unpack_from("<IIIBBH", data, at)
+            function = info & 15 == _FUNCTION
+            if name and section and info & 15 <= _FUNCTION:
+                found.append(Symbol(_text(data, text + name), value & ~1 if function and thumb else value, size,
+                                    function, info >> 4 != 0))
+    return found
