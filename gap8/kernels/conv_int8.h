@@ -1,14 +1,28 @@
 #pragma once
 
-#include "layer_int8.h"
+#include "job_int8.h"
+
+enum { CONV_MAX_FILTER = 64 };  // kernelRows * kernelColumns * inChannels at most
 
 /**
- * @brief Two-dimensional convolution of int8 activations, stride 1, no padding.
+ * @brief Two-dimensional convolution of int8 activations, stride 1, no padding; with
+ * `job->pool`, the max pool that follows as well.
  *
- * Needs `layer->kind` LAYER_CONV, an input of inRows x inColumns x inChannels and
- * room for outRows x outColumns x outChannels, where outRows is
- * inRows - kernelRows + 1 and outColumns likewise. The two must not overlap.
- * Costs outRows * outColumns * outChannels * kernelRows * kernelColumns * inChannels
- * multiplications; no memory of its own. Never fails.
+ * Needs a layer of kind LAYER_CONV or LAYER_SPARSE_CONV (a filter divisible by four),
+ * a filter of at most CONV_MAX_FILTER values, an input of inRows x inColumns x
+ * inChannels, and room for outRows x outColumns x outChannels of the layer, or of the pool
+ * where there is one, where outRows is inRows - kernelRows + 1 and outColumns likewise.
+ * A pool must be one that convCanPool accepts; the convolution's own output is then
+ * never written. Input and output must not overlap.
+ *
+ * Four neighbouring positions are copied to 256 bytes of stack, then multiplied with two
+ * channels at a time, so that six loads serve eight products. Costs kernelRows *
+ * kernelColumns * inChannels multiplications for each output, or those of the blocks that
+ * are kept. Shared among cores by position and channel. Never fails.
  */
-void convInt8(const layerInt8_t *layer, const int8_t *input, int8_t *output);
+void convInt8(const jobInt8_t *job);
+
+/**
+ * @brief Whether convInt8 can do a pool on the way: 2 or 4 positions to one.
+ */
+int32_t convCanPool(const layerInt8_t *pool);

@@ -1,12 +1,46 @@
-// Dot product of two int8 vectors in int32, the inner loop of every layer here.
+// What every inner loop here is made of: a unit of inputs times a unit of weights. With
+// XPULP a unit is four int8 in a register and their dot product one instruction; elsewhere
+// it is a single value.
 #pragma once
 
 #include <stdint.h>
 
-static inline int32_t dotInt8(const int8_t *a, const int8_t *b, int32_t count) {
-  int32_t sum = 0;
-  for (int32_t i = 0; i < count; i++) {
-    sum += (int32_t)a[i] * (int32_t)b[i];
-  }
-  return sum;
+#include "xpulp.h"
+
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+
+#if AIRTOUCH_XPULP
+
+enum { UNIT = 4 };
+
+ALWAYS_INLINE int32_t loadUnit(const int8_t *p) {
+  return xpulpLoad4(p);
 }
+
+ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
+  return xpulpDot4(x, w, sum);
+}
+
+// The last one to three values of a row, then zeros.
+ALWAYS_INLINE int32_t loadLast(const int8_t *p, int32_t count) {
+  return xpulpPack4(p[0], count > 1 ? p[1] : 0, count > 2 ? p[2] : 0, 0);
+}
+
+#else
+
+enum { UNIT = 1 };
+
+ALWAYS_INLINE int32_t loadUnit(const int8_t *p) {
+  return *p;
+}
+
+ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
+  return sum + x * w;
+}
+
+ALWAYS_INLINE int32_t loadLast(const int8_t *p, int32_t count) {
+  (void)count;  // a row has no rest
+  return *p;
+}
+
+#endif

@@ -6,6 +6,12 @@
 // the bias by whoever makes the layer:
 //   bias'[o] = bias[o] - inputZeroPoint * sum(weights of o)
 // so that the inner loops are plain dot products of int8.
+//
+// A sparse layer keeps its weights as blocks of four neighbouring inputs and uses them
+// where they lie. For each output channel, blockCounts says how many blocks it has; for
+// each block, blockSkips says how many blocks of four inputs to pass over before it (a gap
+// of more than 255 is bridged by blocks of zero weights), and weights holds its four
+// values. Five bytes a block, nothing to unpack.
 #pragma once
 
 #include <stdint.h>
@@ -14,7 +20,8 @@ typedef enum {
   LAYER_CONV = 0,          // convInt8: stride 1, no padding
   LAYER_MAX_POOL = 1,      // maxPoolInt8: stride = kernel, no padding, remainder dropped
   LAYER_DENSE = 2,         // denseInt8: input taken as one vector
-  LAYER_SPARSE_DENSE = 3,  // sparseDenseInt8: dense layer whose weights are blocks of four
+  LAYER_SPARSE_DENSE = 3,  // sparseDenseInt8: the same with sparse weights
+  LAYER_SPARSE_CONV = 4,   // convInt8 with sparse weights, blocks within a filter's row, column, channel order
 } layerKind_t;
 
 typedef struct {
@@ -30,7 +37,7 @@ typedef struct {
   int32_t outputZeroPoint;
   int32_t outputMin;  // clamp of the output; a ReLU is outputMin = outputZeroPoint
   int32_t outputMax;
-  const int8_t *weights;        // conv: [out][row][column][in]; dense: [out][in]; sparse: [block][4]
+  const int8_t *weights;        // aligned to 4; conv: [out][row][column][in]; dense: [out][in]; sparse: [block][4]
   const int32_t *bias;          // [out], input zero point folded in
   const int32_t *multiplier;    // [out], Q31 mantissa of inputScale * weightScale / outputScale
   const int8_t *shift;          // [out], its exponent: positive is a shift to the left

@@ -1,6 +1,7 @@
 #include "network_int8.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #include "conv_int8.h"
 #include "dense_int8.h"
@@ -20,11 +21,18 @@ static int32_t aligned(int32_t bytes) {
   return (bytes + 3) & ~3;
 }
 
+// Layers that step i takes: two where a pool is done with the convolution before it.
+static int32_t layersOfStep(const networkInt8_t *network, int32_t i) {
+  const int32_t kind = network->layers[i].kind;
+  const int32_t conv = kind == LAYER_CONV || kind == LAYER_SPARSE_CONV;
+  return conv && i + 1 < network->layerCount && convCanPool(&network->layers[i + 1]) ? 2 : 1;
+}
+
 int32_t networkInt8ArenaBytes(const networkInt8_t *network) {
   int32_t largest = 0;
-  for (int32_t i = 0; i < network->layerCount; i++) {
-    const layerInt8_t *layer = &network->layers[i];
-    const int32_t bytes = (i > 0 ? aligned(inputSize(layer)) : 0) + aligned(outputSize(layer));
+  for (int32_t i = 0; i < network->layerCount; i += layersOfStep(network, i)) {
+    const layerInt8_t *last = &network->layers[i + layersOfStep(network, i) - 1];
+    const int32_t bytes = (i > 0 ? aligned(inputSize(&network->layers[i])) : 0) + aligned(outputSize(last));
     largest = bytes > largest ? bytes : largest;
   }
   return largest;
@@ -37,8 +45,12 @@ static int layerFits(const layerInt8_t *layer) {
   }
   switch (layer->kind) {
     case LAYER_CONV:
-      return layer->outRows >= 1 && layer->outRows == layer->inRows - layer->kernelRows + 1 &&
+    case LAYER_SPARSE_CONV: {
+      const int32_t filter = layer->kernelRows * layer->kernelColumns * layer->inChannels;
+      return filter <= CONV_MAX_FILTER && (layer->kind == LAYER_CONV || filter % 4 == 0) &&
+             layer->outRows >= 1 && layer->outRows == layer->inRows - layer->kernelRows + 1 &&
              layer->outColumns >= 1 && layer->outColumns == layer->inColumns - layer->kernelColumns + 1;
+    }
     case LAYER_MAX_POOL:
       return layer->outRows >= 1 && layer->outRows == layer->inRows / layer->kernelRows &&
              layer->outColumns >= 1 && layer->outColumns == layer->inColumns / layer->kernelColumns &&
@@ -73,25 +85,38 @@ void networkInt8Quantise(const networkInt8_t *network, const float *x, int32_t c
   }
 }
 
-static void runLayer(const layerInt8_t *layer, const int8_t *input, int8_t *output) {
-  switch (layer->kind) {
-    case LAYER_CONV: convInt8(layer, input, output); break;
-    case LAYER_MAX_POOL: maxPoolInt8(layer, input, output); break;
-    case LAYER_DENSE: denseInt8(layer, input, output); break;
-    default: sparseDenseInt8(layer, input, output); break;
+void layerInt8Run(const jobInt8_t *job) {
+  switch (job->layer->kind) {
+    case LAYER_CONV:
+    case LAYER_SPARSE_CONV: convInt8(job); break;
+    case LAYER_MAX_POOL: maxPoolInt8(job); break;
+    case LAYER_DENSE: denseInt8(job); break;
+    default: sparseDenseInt8(job); break;
   }
 }
 
-const int8_t *networkInt8Run(const networkInt8_t *network, const int8_t *input, int8_t *arena) {
-  // Outputs alternate between the start and the end of the arena, so that a layer
+const int8_t *networkInt8RunTeam(const networkInt8_t *network, const int8_t *input, int8_t *arena,
+                                 const teamInt8_t *team) {
+  // Outputs alternate between the start and the end of the arena, so that a step
   // never writes over its own input.
   const int32_t bytes = networkInt8ArenaBytes(network);
   const int8_t *x = input;
-  for (int32_t i = 0; i < network->layerCount; i++) {
-    const layerInt8_t *layer = &network->layers[i];
-    int8_t *y = i % 2 == 0 ? arena : arena + bytes - aligned(outputSize(layer));
-    runLayer(layer, x, y);
+  int32_t atEnd = 0;
+  for (int32_t i = 0; i < network->layerCount; i += layersOfStep(network, i)) {
+    const int32_t pooled = layersOfStep(network, i) > 1;
+    const layerInt8_t *last = &network->layers[i + pooled];
+    int8_t *y = atEnd ? arena + bytes - aligned(outputSize(last)) : arena;
+    layerInt8Run(&(jobInt8_t){.layer = &network->layers[i], .pool = pooled ? last : NULL, .input = x, .output = y,
+                              .core = team->core, .cores = team->cores});
+    if (team->barrier != NULL) {
+      team->barrier(team->context);
+    }
     x = y;
+    atEnd = !atEnd;
   }
   return x;
+}
+
+const int8_t *networkInt8Run(const networkInt8_t *network, const int8_t *input, int8_t *arena) {
+  return networkInt8RunTeam(network, input, arena, &(teamInt8_t){.core = 0, .cores = 1});
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "layer_int8.h"
+#include "job_int8.h"
 
 // A network: layers in order, each reading what the one before wrote.
 typedef struct {
@@ -15,14 +15,15 @@ typedef struct {
 /**
  * @brief Bytes of working memory that networkInt8Run needs.
  *
- * The largest sum of one layer's input and output; the network's own input is read
- * where it lies and does not count. 7,056 for the paper's network.
+ * The largest sum of one step's input and output, a convolution and the pool after it
+ * being one step; the network's own input is read where it lies and does not count. 4,560
+ * for the paper's network.
  */
 int32_t networkInt8ArenaBytes(const networkInt8_t *network);
 
 /**
  * @brief Whether the layers fit each other: each one's input is the output of the one
- * before it, and each one's output follows from its input and kernel.
+ * before it, each one's output follows from its input and kernel, and the kernels can run it.
  *
  * @return -1 where they do, else the index of the first layer that does not.
  */
@@ -35,14 +36,29 @@ int32_t networkInt8Check(const networkInt8_t *network);
 void networkInt8Quantise(const networkInt8_t *network, const float *x, int32_t count, int8_t *q);
 
 /**
- * @brief Run the network over one quantised input.
+ * @brief Run the network over one quantised input, on one core.
  *
- * Needs a network that networkInt8Check accepts, with at least one layer, and an arena
- * of networkInt8ArenaBytes bytes, aligned to 4, that the caller owns; nothing is kept
- * in it between calls. Integer arithmetic only, no allocation, the same work for every
- * input: 266 k multiplications for the paper's network, 238 k with a dense layer of
- * 80 % zeros.
+ * Needs a network that networkInt8Check accepts, with at least one layer, an input and an
+ * arena of networkInt8ArenaBytes bytes, both aligned to 4 and owned by the caller;
+ * nothing is kept in the arena between calls. Integer arithmetic only, no allocation, the
+ * same work for every input: 262 k multiplications for the paper's network, 233 k with a
+ * dense layer of 80 % zeros (a row that its pool drops is not computed).
  *
  * @return the last layer's output, inside the arena.
  */
 const int8_t *networkInt8Run(const networkInt8_t *network, const int8_t *input, int8_t *arena);
+
+/**
+ * @brief The same on several cores: each calls this with its own `team->core`, all else alike.
+ *
+ * The result is the same to the last bit for any number of cores. The barrier is called
+ * once after each step (4 for the paper's network), so the output may be read
+ * by any core that has returned.
+ */
+const int8_t *networkInt8RunTeam(const networkInt8_t *network, const int8_t *input, int8_t *arena,
+                                 const teamInt8_t *team);
+
+/**
+ * @brief What one core does of one layer, by the layer's kind. No barrier.
+ */
+void layerInt8Run(const jobInt8_t *job);

@@ -8,27 +8,45 @@
 
 #include <stdint.h>
 
-// round(a * b / 2^31) for b >= 0. Ties up.
+#include "layer_int8.h"
+#include "xpulp.h"
+
+// round(a * b / 2^31), ties up, for b >= 0 and a result within +-2^30, of which one word holds twice the value.
 static inline int32_t roundingDoublingHighMultiply(int32_t a, int32_t b) {
-  return (int32_t)(((int64_t)a * (int64_t)b + (1LL << 30)) >> 31);
+  const int32_t halves = (int32_t)(((int64_t)a * (int64_t)b) >> 30);
+  return (halves + 1) >> 1;
 }
 
-// round(x / 2^exponent) for exponent 0 to 31. Ties away from zero.
+// round(x / 2^exponent), ties away from zero, for exponent 1 to 31 and |x| < 2^30.
 static inline int32_t roundingShiftRight(int32_t x, int32_t exponent) {
-  const int32_t mask = (int32_t)((1LL << exponent) - 1);
-  const int32_t threshold = (mask >> 1) + (x < 0 ? 1 : 0);
-  return (x >> exponent) + ((x & mask) > threshold ? 1 : 0);
+  const int32_t towardsZero = x >> 31;  // -1 where x is negative: its ties go down
+#if AIRTOUCH_XPULP
+  return xpulpAddRoundShift(x, towardsZero, exponent);
+#else
+  return (x + towardsZero + (int32_t)(1u << (exponent - 1))) >> exponent;
+#endif
 }
 
-// The activation of an accumulator. The product accumulator * 2^shift must fit
-// in int32 for a positive shift, as it does for every layer that training makes.
-static inline int8_t requantise(int32_t accumulator, int32_t multiplier, int32_t shift,
-                                int32_t zeroPoint, int32_t min, int32_t max) {
-  const int32_t left = shift > 0 ? shift : 0;
-  const int32_t right = shift > 0 ? 0 : -shift;
-  const int32_t scaled = (int32_t)((uint32_t)accumulator << left);
-  int32_t value = roundingShiftRight(roundingDoublingHighMultiply(scaled, multiplier), right) + zeroPoint;
-  value = value < min ? min : value;
-  value = value > max ? max : value;
+// Zero point and clamp of a layer's output, read once: bytes that a kernel writes might alias the layer.
+typedef struct {
+  int32_t zeroPoint;
+  int32_t min;
+  int32_t max;
+} outputRange_t;
+
+static inline outputRange_t outputRange(const layerInt8_t *layer) {
+  return (outputRange_t){.zeroPoint = layer->outputZeroPoint, .min = layer->outputMin, .max = layer->outputMax};
+}
+
+// The activation of an accumulator. Accumulator and activation, before clamping, must lie
+// within +-2^30, as in every layer that training makes and loading accepts. Never falls
+// with a rising accumulator, so that the largest of several may be taken before it.
+static inline int8_t requantise(int32_t accumulator, int32_t multiplier, int32_t shift, outputRange_t range) {
+  int32_t value = shift < 0
+                      ? roundingShiftRight(roundingDoublingHighMultiply(accumulator, multiplier), -shift)
+                      : roundingDoublingHighMultiply((int32_t)((uint32_t)accumulator << shift), multiplier);
+  value += range.zeroPoint;
+  value = value < range.min ? range.min : value;
+  value = value > range.max ? range.max : value;
   return (int8_t)value;
 }

@@ -104,10 +104,11 @@ static void gather(const streamConv_t *conv, streamState_t *state, int32_t i) {
 }
 
 static void run(const layerInt8_t *layer, const int8_t *input, int8_t *output) {
+  const jobInt8_t job = {.layer = layer, .input = input, .output = output, .core = 0, .cores = 1};
   if (layer->kind == LAYER_DENSE) {
-    denseInt8(layer, input, output);
+    denseInt8(&job);
   } else {
-    sparseDenseInt8(layer, input, output);
+    sparseDenseInt8(&job);
   }
 }
 

@@ -11,7 +11,7 @@ from airtouch.kernels.library import ffi, lib
 from airtouch.reference.int8_network import Int8Layer, Int8Network, runs_sparse, sparse_blocks
 
 _KIND = {"conv": 0, "max_pool": 1, "dense": 2}
-_SPARSE_DENSE = 3
+_SPARSE = {"dense": 3, "conv": 4}
 
 
 class Model(Protocol):
@@ -128,7 +128,7 @@ def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 def layer_shape(layer: Int8Layer) -> list[int]:
     """The twelve integers of `flatNetworkInt8_t.shapes`."""
-    kind = _SPARSE_DENSE if runs_sparse(layer) else _KIND[layer.kind]
+    kind = (_SPARSE if runs_sparse(layer) else _KIND)[layer.kind]
     return [kind, *layer.input_shape, *layer.output_shape, *layer.kernel,
             layer.output_zero_point, layer.output_min, 127]
 
@@ -144,9 +144,10 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[object, list[np.ndarray]]:
     """The C view of layers, one after the other, and the arrays that must outlive it."""
     weighted = [layer for layer in layers if layer.kind != "max_pool"]
     packed = [packed_weights(layer) for layer in weighted]
+    padded = [np.pad(np.ravel(weights), (0, -weights.size % 4)) for weights, _, _ in packed]
     multipliers = [layer.multipliers() for layer in weighted]
     weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
-                              zip(zip(*packed), (np.int8, np.uint16, np.uint8)))
+                              zip((padded, *list(zip(*packed))[1:]), (np.int8, np.uint16, np.uint8)))
     bias = _joined([layer.folded_bias() for layer in weighted], np.int32)
     multiplier, shift = (_joined(parts, dtype)
                          for parts, dtype in zip(zip(*multipliers), (np.int32, np.int8)))

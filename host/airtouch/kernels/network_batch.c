@@ -42,7 +42,8 @@ int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
     if (channel > flat->channelCount) {
       return i;
     }
-    if (s[0] == LAYER_SPARSE_DENSE) {
+    if (s[0] == LAYER_SPARSE_DENSE || s[0] == LAYER_SPARSE_CONV) {
+      const int32_t filter = s[0] == LAYER_SPARSE_CONV ? s[7] * s[8] * s[3] : inputs(s);
       for (int32_t o = 0; o < s[6]; o++) {
         int32_t reached = 0;  // blocks of input passed over or used
         for (int32_t b = flat->blockCounts[sparseChannel++]; b > 0; b--) {
@@ -52,12 +53,12 @@ int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
           reached += flat->blockSkips[block++] + 1;
           weight += 4;
         }
-        if (4 * reached > inputs(s)) {
+        if (4 * reached > filter) {
           return i;
         }
       }
     }
-    weight += weights(s);
+    weight = (weight + weights(s) + 3) & ~3;  // each layer's weights are aligned to 4
     if (weight > flat->weightCount) {
       return i;
     }
@@ -106,7 +107,7 @@ int32_t networkFloatBatchArena(const flatNetworkFloat_t *flat) {
     const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
     weight += weights(s);
     channel += s[0] == LAYER_MAX_POOL ? 0 : s[6];
-    if (s[0] == LAYER_SPARSE_DENSE || weight > flat->weightCount || channel > flat->channelCount) {
+    if (s[0] > LAYER_DENSE || weight > flat->weightCount || channel > flat->channelCount) {
       return -1 - i;
     }
   }

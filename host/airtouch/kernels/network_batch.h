@@ -9,7 +9,7 @@
 // outChannels, kernelRows, kernelColumns, outputZeroPoint, outputMin, outputMax.
 typedef struct {
   int32_t layerCount;
-  int32_t weightCount;   // length of weights, checked against the shapes
+  int32_t weightCount;   // length of weights, checked against the shapes; each layer's padded to 4
   int32_t channelCount;  // length of bias, multiplier and shift
   int32_t blockCount;    // length of blockSkips
   const int32_t *shapes;

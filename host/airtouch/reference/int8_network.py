@@ -67,14 +67,17 @@ class Int8Network:
 
 
 def multiplications(network: Int8Network) -> int:
-    """Multiplications of one inference as the C kernels do it: a pruned dense layer skips its empty blocks."""
+    """Multiplications of one inference as the C kernels do it: pruned layers skip their empty blocks, and
+    no position is computed that the pool after a convolution drops."""
     total = 0
-    for layer in network.layers:
-        if layer.kind == "conv":
-            rows, columns, _ = layer.output_shape
-            total += rows * columns * layer.weights.size
-        elif layer.kind == "dense":
-            total += 4 * len(sparse_blocks(layer.weights)[0]) if runs_sparse(layer) else layer.weights.size
+    for layer, after in zip(network.layers, (*network.layers[1:], None)):
+        if layer.kind == "max_pool":
+            continue
+        weights = 4 * len(sparse_blocks(layer.weights)[0]) if runs_sparse(layer) else layer.weights.size
+        rows, columns, _ = layer.output_shape
+        if after is not None and after.kind == "max_pool":
+            rows, columns = (n - n % k for n, k in zip((rows, columns), after.kernel))
+        total += rows * columns * weights
     return total
 
 
@@ -155,11 +158,11 @@ def _max_pool(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
 
 
 def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A dense layer's weights (out, inputs) as blocks of four that run where they lie.
+    """A layer's weights (out, ...) as blocks of four neighbouring inputs that run where they lie.
 
     Returns blocks int8 (b, 4), counts uint16 (out,): blocks of each output, and skips
     uint8 (b,): blocks of four inputs passed over before each. A gap of more than 255
-    is bridged by blocks of zeros. inputs must be divisible by four.
+    is bridged by blocks of zeros. The inputs of an output must be divisible by four.
     """
     blocks, counts, skips = [], [], []
     for row in weights.reshape(len(weights), -1, 4):
@@ -179,7 +182,7 @@ def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def runs_sparse(layer: Int8Layer) -> bool:
     """Whether blocks of four (five bytes each, two an output for their count) take less room."""
-    if layer.kind != "dense" or layer.weights.shape[1] % 4:
+    if layer.kind == "max_pool" or layer.weights[0].size % 4:
         return False
     _, counts, skips = sparse_blocks(layer.weights)
     return 5 * len(skips) + 2 * len(counts) < layer.weights.size
