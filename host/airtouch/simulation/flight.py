@@ -11,14 +11,12 @@ from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.simulation import controller, loop
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import PARAMETERS, wrench
-from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
 from airtouch.simulation.radio import received
-from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
+from airtouch.simulation.stepper import Stepper, prepare
 from airtouch.vehicle import Vehicle
 
-MOST_HOVER_PWM = 62000  #: of 65535; the rest is what attitude control needs
+__all__ = ["Chosen", "Diverged", "choose", "fly", "fly_plan", "prepare"]
 DECIMALS = 6  #: of logged values, in their SI units
 Chosen = Mapping[str, Mapping[str, float]] | Sequence[Any]
 
@@ -36,11 +34,6 @@ class Diverged:
     def __str__(self) -> str:
         return (f"{self.scenario}, seed {self.seed}, flight {self.flight}: {self.reason} "
                 f"after {self.time_s:.2f} s; not written")
-
-
-@wrench
-def _nothing(p, s, memory, stream, out):
-    pass
 
 
 def fly(scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: int = 0, *, effects: Chosen = (),
@@ -64,44 +57,15 @@ def choose(plan: FlightPlan, effects: Chosen = (), without: Sequence[str] = ()) 
     return [a for a in registry.activate([*kept, *added]) if a.effect.name not in without]
 
 
-def prepare(vehicle: Vehicle, active: Sequence[Active]) -> tuple[np.ndarray, list[Active]]:
-    """The plant (1,) with the settings of the effects, and the effects that act in flight.
-
-    The vehicle's own rotor drag flies as the effect of that name.
-    """
-    plant = from_vehicle(vehicle)
-    acting = [a for a in active if a.effect.wrench is not None]
-    if vehicle.rotor_drag_kg_per_rad > 0.0:
-        drag = vehicle.rotor_drag_kg_per_rad * 4.0 * hover_speed(plant)
-        acting += registry.activate({"rotor_drag": {"horizontal": drag}})
-    for a in active:
-        if a.effect.settings is not None:
-            a.effect.settings(plant[0], a.values)
-    if len(acting) > loop.SLOTS:
-        raise AirTouchError(f"{len(acting)} effects with a force at once; at most {loop.SLOTS}")
-    return plant, acting
-
-
 def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
              name: str) -> FlightLog | Diverged:
     """Fly a drawn flight with these effects."""
-    if hover_pwm(vehicle) > MOST_HOVER_PWM:
-        raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM {hover_pwm(vehicle):.0f}")
-    plant, acting = prepare(vehicle, active)
-    functions = tuple(a.effect.wrench for a in acting) + (_nothing,) * (loop.SLOTS - len(acting))
-    parameters = np.zeros((loop.SLOTS, PARAMETERS))
-    streams = np.zeros((loop.SLOTS, 1), np.uint64)
-    seen: dict[str, int] = {}
-    for i, a in enumerate(acting):
-        parameters[i] = a.effect.vector(a.values)
-        seen[a.effect.name] = seen.get(a.effect.name, 0) + 1
-        streams[i] = stream(seed, flight, f"{a.effect.name}/{seen[a.effect.name]}")
-    core = np.array([stream(seed, flight, n) for n in ("motors", "imu", "ranging", "start")])
+    stepper = Stepper(plan, vehicle, seed, flight, active)
+    plant = stepper.plant
     table = np.full((len(plan.setpoints), loop.COLUMNS), np.nan)
     radio = (float(plant[0]["time_jitter"]), float(plant[0]["packet_loss"]), float(plant[0]["loss_burst"]))
-    w = plan.world
-    ending, rows = loop.fly(plant, w.corners, w.first, w.surface, w.box, plan.room, plan.setpoints, functions,
-                            len(acting), parameters, streams, core, table)
+    stepper.begin(plan.setpoints[0])
+    ending, rows = stepper.fly(plan.setpoints, table)
     if ending != loop.OK:
         return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / 100.0)
     climb = plan.setpoints[:, controller.Z].max() - plan.setpoints[0, controller.Z]

@@ -15,6 +15,7 @@ from airtouch.simulation import (
     contact,
     controller,
     estimator,
+    kept,
     motors,
     rigid_body,
     sensors,
@@ -23,13 +24,13 @@ from airtouch.simulation import (
 )
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects.effect import MEMORY, WrenchFunction
+from airtouch.simulation.kept import SLOTS
 from airtouch.simulation.plant import DTYPE
-from airtouch.simulation.random_stream import normal, normals
+from airtouch.simulation.random_stream import normals
 from airtouch.simulation.rotation import euler
+from airtouch.simulation.sensors import RING
 
-SLOTS = 16  #: effects with a wrench that may be on at once
 LOG_STEPS = 5  #: physics steps a logged row
-RING = 64  #: delays of up to 63 steps
 OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended
 ENDINGS = ("ok", "a value is not finite", "it turned over", "it struck a surface", "it flew away")
 FOCUS_M = 0.08  #: the flow sensor's least distance; closer, its picture scales no further
@@ -40,72 +41,62 @@ FLOOR_DEPTH_M = 0.015  #: legs this far inside a surface: it struck it
 _LOOP = types.Tuple((int64, int64))(
     from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[::1],
     float64[:, ::1], types.UniTuple(WrenchFunction, SLOTS), int64, float64[:, ::1],
-    uint64[:, ::1], uint64[:, ::1], float64[:, ::1])
+    uint64[:, ::1], uint64[:, ::1], float64[::1], float64[:, ::1])
 
 
 @njit(_LOOP, cache=True, nogil=True)
 def fly(plant_array, corners, first, surface, box, room, setpoints, effects, used, parameters,
-        effect_streams, streams, table):
-    """Fly one flight and fill `table` (rows, 33), the columns of the flight log.
+        effect_streams, streams, memory, table):
+    """Fly as many rows as `table` (rows, 33) has, the columns of the flight log.
 
     plant_array (1,); corners, first, surface, box: a World; room (4,): walls for the
     Multi-ranger; setpoints (rows, 8): one a logged row; effects: SLOTS wrenches, `used` of
-    them on, with parameters (SLOTS, 8) and streams (SLOTS, 1). Returns how it ended (OK or
-    a reason) and the number of rows that are filled.
+    them on, with parameters (SLOTS, 8) and streams (SLOTS, 1). memory (kept.SIZE,): as
+    `kept.begin` leaves it; the next call with it (and the same plant and streams) continues,
+    and many short calls give the same numbers as one long one. Returns how it ended (OK or a
+    reason) and the number of rows of this call that are filled.
     """
     plant = plant_array[0]
     h = plant.step
     hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
     leg = plant.range_below_rotors + plant.leg_below_range
-    state, speed, target = np.zeros(13), np.zeros(4), np.zeros(4)
-    middle, middle_speed, work = np.zeros(13), np.zeros(4), np.zeros((6, 13))
-    s, patch, force = np.zeros(at.COUNT), np.zeros(7), np.zeros(6)
-    memory, pid_memory, est = np.zeros((SLOTS, MEMORY)), np.zeros(controller.SIZE), np.zeros(estimator.SIZE)
-    pwm, flicker, base_gain = np.zeros(4), np.zeros(4), plant.gain.copy()
-    phase, ring, command = np.zeros(4), np.zeros((RING, 6)), np.zeros((RING, 4))
+    state, speed = memory[kept.STATE:kept.SPEED], memory[kept.SPEED:kept.FORCE]
+    force, pwm = memory[kept.FORCE:kept.SLOPE], memory[kept.PWM:kept.FLICKER]
+    effect_memory = memory[kept.EFFECTS:kept.PID].reshape((SLOTS, MEMORY))
+    pid_memory, est = memory[kept.PID:kept.ESTIMATE], memory[kept.ESTIMATE:kept.PWM]
+    flicker, base_gain = memory[kept.FLICKER:kept.GAIN], memory[kept.GAIN:kept.PHASE]
+    phase, ring = memory[kept.PHASE:kept.SENSED], memory[kept.SENSED:kept.COMMANDED].reshape((RING, 6))
+    command = memory[kept.COMMANDED:kept.ACC_FILTER].reshape((RING, 4))
+    acc_filter = memory[kept.ACC_FILTER:kept.GYRO_FILTER]
+    gyro_filter = memory[kept.GYRO_FILTER:kept.ACC_MEMORY]
+    acc_memory = memory[kept.ACC_MEMORY:kept.GYRO_MEMORY].reshape((3, 2))
+    gyro_memory = memory[kept.GYRO_MEMORY:kept.ACC_RMS].reshape((3, 2))
+    acc_rms, drift = memory[kept.ACC_RMS:kept.DRIFT], memory[kept.DRIFT:kept.RANGES]
+    ranges = memory[kept.RANGES:kept.SIZE]
+    target, middle, middle_speed, work = np.zeros(4), np.zeros(13), np.zeros(4), np.zeros((6, 13))
+    s, patch = np.zeros(at.COUNT), np.zeros(7)
     motor_n, imu_n, other_n = np.zeros(4), np.zeros(6), np.zeros(4)
     acc, gyro, seen_acc, seen_gyro = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    acc_filter, gyro_filter = np.zeros(5), np.zeros(5)
-    acc_memory, gyro_memory = np.zeros((3, 2)), np.zeros((3, 2))
-    sensors.lowpass_coefficients(plant.acc_lowpass, h, acc_filter)
-    sensors.lowpass_coefficients(plant.gyro_lowpass, h, gyro_filter)
-    acc_rms = plant.acc_noise / sensors.noise_gain(acc_filter)
-    drift = np.zeros(3)
+    world_force, seen_velocity = np.zeros(3), np.zeros(3)
     drift_decay = math.exp(-LOG_STEPS * h / plant.flow_noise_time)
     drift_fresh = math.sqrt(1.0 - drift_decay * drift_decay)
-    ranges = np.full(4, np.nan)
-    world_force, seen_velocity = np.zeros(3), np.zeros(3)
-
-    state[0], state[1] = setpoints[0, controller.X], setpoints[0, controller.Y]
-    ground = world.top_at(corners, first, surface, box, state[0], state[1])
-    state[2] = ground + leg - contact.SINK_M
-    yaw = setpoints[0, controller.YAW]
-    state[6], state[9] = math.cos(yaw / 2), math.sin(yaw / 2)
-    for i in range(4):
-        phase[i] = 6.283185307179586 * i * 0.381966 + normal(streams[3])
-    est[0], est[1], est[2] = 0.005 * normal(streams[3]), 0.005 * normal(streams[3]), yaw
-    est[6], est[7], est[8] = state[0], state[1], state[2] - plant.range_below_rotors
-    controller.reset(pid_memory, math.degrees(yaw))
-    force[2] = plant.mass * plant.gravity
-    for i in range(3):
-        sensors.settle(acc_filter, acc_memory[i], plant.gravity if i == 2 else 0.0)
-    charge = plant.battery_charge
-    power, battery_volts = 0.0, plant.nominal_voltage
-    down, last_down_top = 0.01, ground
-    next_range, next_ranges = 0.0, 0.0
-    flying, changed = False, -1e3
+    ground, charge, battery_volts = memory[kept.GROUND], memory[kept.CHARGE], memory[kept.VOLTS]
+    down, last_down_top, changed = memory[kept.DOWN], memory[kept.TOP], memory[kept.CHANGED]
+    next_range, next_ranges = memory[kept.NEXT_RANGE], memory[kept.NEXT_RANGES]
+    flying = memory[kept.FLYING] > 0.5
     power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     decay = math.exp(-h / plant.motor_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
     attitude, slope = state[6:10], work[0]
     motor_stream, imu_stream, other_stream = streams[0], streams[1], streams[2]
     rows = table.shape[0]
-    steps = rows * LOG_STEPS
-    rigid_body.derivative(plant, state, attitude, patch[:4] * 0.0, 0.0, 0.0, force, work[0])
+    begun = int(memory[kept.STEP])
+    slope[:] = memory[kept.SLOPE:kept.EFFECTS]
 
-    for k in range(steps):
+    for n in range(rows * LOG_STEPS):
+        k = begun + n
         t = k * h
-        row = k // LOG_STEPS
+        row = n // LOG_STEPS
         setpoint = setpoints[row]
         # --- IMU: specific force at the sensor, which sits in the geometric centre
         lift = 0.0
@@ -135,8 +126,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             value = state[10 + i] + plant.gyro_bias[i] + plant.gyro_noise[i] * imu_n[3 + i]
             value += plant.vibration_gyro * shake
             gyro[i] = min(max(value, -plant.gyro_range), plant.gyro_range)
-            ring[k % RING, i] = acc[i]
-            ring[k % RING, 3 + i] = sensors.lowpass(gyro_filter, gyro_memory[i], gyro[i])
+            ring[k & (RING - 1), i] = acc[i]
+            ring[k & (RING - 1), 3 + i] = sensors.lowpass(gyro_filter, gyro_memory[i], gyro[i])
         if k == 0:
             for j in range(RING):
                 ring[j] = ring[0]
@@ -185,7 +176,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         else:
             wx, wy, wz = acc[0], acc[1], acc[2]
         world_force[0], world_force[1], world_force[2] = wx, wy, wz
-        if k % LOG_STEPS == 0:
+        if n % LOG_STEPS == 0:
             normals(other_stream, other_n)
             for i in range(3):
                 drift[i] = drift_decay * drift[i] + drift_fresh * plant.flow_noise[i] * other_n[i]
@@ -200,7 +191,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         factor = motors.voltage_factor(plant, volts)
         if setpoint[controller.MOTORS] > 0.5:
             flying = True
-            if k % controller.POSITION_STEPS == 0:
+            if n % controller.POSITION_STEPS == 0:
                 seen_velocity[0], seen_velocity[1], seen_velocity[2] = est[3], est[4], est[5] + drift[2]
                 controller.position_loop(plant, pid_memory, setpoint, est[6:9], seen_velocity, est[2])
             controller.attitude_loop(plant, pid_memory, est[0], est[1], est[2], seen_gyro, pwm)
@@ -216,9 +207,9 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             est[3], est[4], est[5] = 0.0, 0.0, 0.0
 
         # --- log
-        if k % LOG_STEPS == 0:
+        if n % LOG_STEPS == 0:
             out = table[row]
-            out[T] = row * LOG_STEPS * h
+            out[T] = (begun + row * LOG_STEPS) * h
             roll, pitch, yaw = euler(attitude)
             out[ANGLES], out[ANGLES + 1], out[ANGLES + 2] = roll, pitch, yaw
             for i in range(3):
@@ -232,7 +223,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
 
         # --- motors
         for i in range(4):
-            command[k % RING, i] = pwm[i]
+            command[k & (RING - 1), i] = pwm[i]
             if k == 0:
                 command[:, i] = pwm[i]
         normals(motor_stream, motor_n)
@@ -257,7 +248,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         for i in range(6):
             force[i] = 0.0
         for i in range(used):
-            effects[i](parameters[i], s, memory[i], effect_streams[i], force)
+            effects[i](parameters[i], s, effect_memory[i], effect_streams[i], force)
         deepest = contact.legs(plant, middle, s, leg, force)
 
         rigid_body.step(plant, state, speed, target, h, force, work)
@@ -272,4 +263,9 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             return STRUCK, row + 1
         if abs(state[0]) > 1000.0 or abs(state[1]) > 1000.0 or abs(state[2]) > 100.0:
             return LOST, row + 1
+    memory[kept.STEP], memory[kept.CHARGE], memory[kept.VOLTS] = begun + rows * LOG_STEPS, charge, battery_volts
+    memory[kept.DOWN], memory[kept.TOP], memory[kept.CHANGED] = down, last_down_top, changed
+    memory[kept.NEXT_RANGE], memory[kept.NEXT_RANGES] = next_range, next_ranges
+    memory[kept.FLYING] = 1.0 if flying else 0.0
+    memory[kept.SLOPE:kept.EFFECTS] = slope
     return OK, rows

@@ -8,6 +8,7 @@ MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
 RANGE_PERIOD_S = 0.025
 MULTIRANGER_PERIOD_S = 0.1
 CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
+RING = 64  #: rows of a delay line, a power of two: delays of up to 63 steps
 CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
 
 
@@ -58,14 +59,13 @@ def noise_gain(b):
 
 @njit(cache=True)
 def delayed(ring, at, steps, column):
-    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a ring buffer."""
-    size = ring.shape[0]
+    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (RING, columns)."""
     whole = int(math.floor(steps))
     part = steps - whole
-    now = ring[(at - whole) % size, column]
+    now = ring[(at - whole) & (RING - 1), column]
     if part == 0.0:
         return now
-    return now + part * (ring[(at - whole - 1) % size, column] - now)
+    return now + part * (ring[(at - whole - 1) & (RING - 1), column] - now)
 
 
 @njit(cache=True)

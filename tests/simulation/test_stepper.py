@@ -1,0 +1,32 @@
+"""A flight flown in pieces is the flight flown in one call, bit for bit."""
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle
+from airtouch.simulation import loop, scenario
+from airtouch.simulation.flight import choose
+from airtouch.simulation.stepper import Stepper
+
+
+@pytest.mark.parametrize("name", ["paper-9cm", "gusts", "randomised"])
+def test_pieces_equal_the_whole(name):
+    plan = scenario.draw_flight(scenario.load(name), 5, 2)
+    rows = min(len(plan.setpoints), 1500)
+
+    def flown(sizes):
+        stepper = Stepper(plan, vehicle.load(), 5, 2, choose(plan))
+        table, done = np.full((rows, loop.COLUMNS), np.nan), 0
+        stepper.begin(plan.setpoints[0])
+        while done < rows:
+            size = min(next(sizes), rows - done)
+            ending, filled = stepper.fly(plan.setpoints[done:done + size], table[done:done + size])
+            assert (ending, filled) == (loop.OK, size)
+            done += size
+        return table
+
+    whole = flown(iter([rows]))
+    assert np.ptp(whole[:, loop.PLACE + 2]) > 0.3  # it does fly
+    rng = np.random.default_rng(1)
+    for sizes in (iter(lambda: 1, 0), iter(lambda: int(rng.integers(1, 40)), 0)):
+        np.testing.assert_array_equal(flown(sizes), whole)
