@@ -129,10 +129,11 @@ def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (),
 
 
 def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, period_s: float = 0.01,
-        signals: np.ndarray | None = None, seed: int = 0) -> Replay:
+        signals: np.ndarray | None = None, pwm: np.ndarray | None = None, seed: int = 0) -> Replay:
     """Replay a log's motor commands through a vehicle with effects switched on.
 
-    signals: (n, COUNT) where more is known than `signals_of` finds in the log. A logged
+    signals: (n, COUNT) where more is known than `signals_of` finds in the log; pwm: (n, 4)
+    where the log's own has holes. A logged
     battery voltage is used where the vehicle declares the voltage of its thrust curve.
     Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands.
     """
@@ -148,7 +149,7 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     for i, a in enumerate(acting):
         parameters[i], streams[i] = a.effect.vector(a.values), stream(seed, 0, a.effect.name)
     out, speeds, volts_out = np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n)
-    pwm = np.ascontiguousarray(np.nan_to_num(log.stack(PWM)))
+    pwm = np.ascontiguousarray(np.nan_to_num(log.stack(PWM) if pwm is None else pwm))
     _run(plant, s, pwm, volts, functions, len(acting), parameters, streams, out, speeds, volts_out)
     row = plant[0]
     rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]

@@ -1,0 +1,129 @@
+"""How each effect of the registry is fitted: its free parameters, its variants, how it shows.
+
+An effect that adds a known force, delay or gain moves the gap's mean; one that is random
+changes its spectrum; one of the clock or the radio shows in the logged times alone.
+An effect that this table does not know (a user's own) has every parameter with a neutral
+value free, and counts as random when two seeds give two forces.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import EFFECTS, Active, Effect, get
+
+MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
+_FREE = {
+    "ground_effect": ("strength",), "rotor_drag": ("horizontal", "vertical"), "wind": ("x", "y", "z"),
+    "gust": ("rms",), "blade_flapping": ("tilt",), "motor_lag": ("factor",), "motor_noise": ("rms",),
+    "thrust_coefficient": ("loss",), "weak_motor": ("thrust_loss",), "battery_sag": ("strength",),
+    "mass": ("fraction",), "com_offset": ("x", "y"), "inertia": ("fraction",), "slung_load": ("load",),
+    "imu_bias": ("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z"), "imu_noise": ("factor",),
+    "vibration": ("amplitude",), "sensor_latency": ("delay",), "actuator_delay": ("delay",),
+    "time_jitter": ("rms",), "packet_loss": ("share",), "range_step": ("residual", "kick"),
+    "flow_scale": ("share", "transient"), "controller_gain": ("rate", "attitude", "position", "height"),
+}
+_KIND = {"gust": SPECTRUM, "motor_noise": SPECTRUM, "imu_noise": SPECTRUM, "vibration": SPECTRUM,
+         "time_jitter": CLOCK, "packet_loss": CLOCK}
+_VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
+    "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
+    "slung_load": tuple({"length": x} for x in (0.1, 0.2, 0.4)),
+    "gust": tuple({"length": x} for x in (0.2, 0.5, 1.5)),
+    "motor_noise": tuple({"time": x} for x in (0.005, 0.02, 0.1)),
+    "battery_sag": tuple({"charge": x} for x in (0.95, 0.6)),
+}
+_FIXED = {"ground_effect": {"turbulence": 0.0}}
+#: names for one thing in the logs at hand, with what would tell them apart
+TWINS = (
+    (frozenset({"mass", "thrust_coefficient"}),
+     "add a fast climb or drop: the same thrust moves a heavier vehicle less, in proportion to its mass only "
+     "where an outside force acts; weigh the vehicle, or run one motor on a scale"),
+)
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect as a hypothesis: values of every parameter, those that are free, and how it shows."""
+
+    effect: Effect
+    kind: str
+    free: tuple[str, ...]
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        return self.effect.name
+
+    def active(self, x: np.ndarray | None = None) -> Active:
+        """The effect at scaled parameters x (0: neutral, 1: its default), clipped to its bounds."""
+        return Active(self.effect, dict(self.values) if x is None else self.at(x))
+
+    def at(self, x: np.ndarray) -> dict[str, float]:
+        values = dict(self.values)
+        for name, amount in zip(self.free, x, strict=True):
+            p = self._parameter(name)
+            values[name] = float(np.clip(_neutral(p) + amount * unit(p), p.low, p.high))
+        return values
+
+    def fitted(self, x: np.ndarray) -> "Term":
+        return replace(self, values=self.at(x))
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest scaled parameters."""
+        low, high = [], []
+        for name in self.free:
+            p = self._parameter(name)
+            low.append((p.low - _neutral(p)) / unit(p))
+            high.append((p.high - _neutral(p)) / unit(p))
+        return np.array(low), np.array(high)
+
+    def _parameter(self, name: str):
+        return next(p for p in self.effect.parameters if p.name == name)
+
+
+def unit(p) -> float:
+    """A natural step of a parameter: from neutral to default, else a twentieth of its range."""
+    step = abs(p.default - _neutral(p))
+    return step if step > 0.0 else 0.05 * (p.high - p.low)
+
+
+def _neutral(p) -> float:
+    return 0.0 if p.neutral is None else p.neutral
+
+
+def terms(name: str) -> list[Term]:
+    """The hypotheses of one effect: one for each variant, all free parameters at neutral."""
+    effect = get(name)
+    free = _FREE.get(name) or tuple(p.name for p in effect.parameters if p.neutral is not None)
+    kind = _KIND.get(name) or (MEAN if name in _FREE or not _random(effect) else SPECTRUM)
+    base = effect.scaled(effect.values(), 0.0) | _FIXED.get(name, {})
+    return [Term(effect, kind, free, base | variant) for variant in _VARIANTS.get(name, ({},))]
+
+
+def every(without: tuple[str, ...] = ()) -> dict[str, list[Term]]:
+    """All effects of the registry as hypotheses, in its order."""
+    return {name: terms(name) for name in EFFECTS if name not in without}
+
+
+def twins_of(name: str) -> tuple[frozenset[str], str] | None:
+    """The set that an effect cannot be told from in these logs, and what would separate it."""
+    return next(((group, advice) for group, advice in TWINS if name in group), None)
+
+
+def _random(effect: Effect) -> bool:
+    """Whether two seeds give two forces on the same signals."""
+    if effect.wrench is None:
+        return False
+    from airtouch.simulation import replay
+    signals = np.zeros((50, at.COUNT))
+    signals[:, at.STEP], signals[:, at.MASS], signals[:, at.GRAVITY] = 0.01, 0.03, 9.81
+    signals[:, at.HOVER_SPEED], signals[:, at.ROTOR_SPEED:at.ROTOR_SPEED + 4] = 2000.0, 2000.0
+    signals[:, at.THRUST:at.THRUST + 4] = 0.08
+    signals[:, at.ROTATION], signals[:, at.ROTATION + 4], signals[:, at.ROTATION + 8] = 1.0, 1.0, 1.0
+    signals[:, at.VELOCITY] = 0.5
+    signals[:, at.LOWER_HEIGHT:at.UPPER_HEIGHT + 4], signals[:, at.HEIGHT] = 0.1, 0.1
+    active = Active(effect, effect.values())
+    one, two = (replay.wrench_of(active, signals, seed) for seed in (1, 2))
+    return not np.allclose(one, two)

@@ -1,0 +1,316 @@
+"""Fitting hypotheses to flights: Whittle likelihood of the gap's spectra against the floor.
+
+A bin's power e over what the floor and the random effects give is exponential when the
+hypothesis holds; since the floor itself is estimated from few flights, a Student-like
+tail stands in for it. Mean effects are fitted by Gauss-Newton on the whitened spectra,
+random ones by their strength; what differs from flight to flight (offsets) has a prior.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from airtouch.gap import random_effects
+from airtouch.gap.candidates import CLOCK, MEAN, SPECTRUM, Term
+from airtouch.gap.channels import COUNT, residual
+from airtouch.gap.control import Controller
+from airtouch.gap.flight import Flight
+from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, Floor, blocks, judged, starts
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
+ITERATIONS = 8
+PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
+FREEDOM = 12.0  #: of the Student-like tail at most
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a diagnosis holds flights against: vehicle, calibration, controller and floor."""
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    controller: Controller | None
+    floor: Floor
+
+
+@dataclass
+class Data:
+    """Flights with their blocks and the spectra of the gap before any effect is added."""
+
+    study: Study
+    flights: Sequence[Flight]
+    first: list[dict[str, np.ndarray]] = field(default_factory=list)
+    base: list[dict[str, np.ndarray]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
+        self.base = spectra(self, ())
+
+
+def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+    """Spectra of the gap with effects in the model, by flight and regime."""
+    study, out = data.study, []
+    for flight, first in zip(data.flights, data.first, strict=True):
+        left = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
+        left = np.where(flight.lost[:, None], 0.0, left)
+        out.append({r: blocks(left, first[r], r) for r in first})
+    return out
+
+
+@dataclass(frozen=True)
+class Part:
+    """Which blocks of which flights: (flight, regime, chosen bool array), for fitting or judging."""
+
+    pieces: tuple[tuple[int, str, np.ndarray], ...]
+
+
+@dataclass
+class Fit:
+    """A hypothesis fitted: its terms with values, covariance of the scaled parameters, offsets."""
+
+    terms: tuple[Term, ...]
+    scaled: np.ndarray
+    covariance: np.ndarray
+    offsets: np.ndarray
+    gained: float  #: log likelihood over the hypothesis of no effect, on the blocks fitted
+
+
+class Problem:
+    """Blocks flattened to one array: rows are (block, bin, channel) values that count."""
+
+    def __init__(self, data: Data, part: Part) -> None:
+        self.data, self.part = data, part
+        self.keep = {r: judged(r) for r in (AIR, REST)}
+        self.power = self._gather([{r: np.broadcast_to(data.study.floor.power[r], s[r].shape) for r in s}
+                                   for s in data.base]).real
+        self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
+                                     for s in data.base]).real.astype(int)
+        self.flight = np.concatenate([np.full(self._size(p), p[0]) for p in part.pieces]) \
+            if part.pieces else np.zeros(0, int)
+        self.base = self._gather(data.base)
+        self.known = np.isfinite(self.base)
+        self.power = np.where(self.known, self.power, 1.0)
+        self.base = np.where(self.known, self.base, 0.0)
+        counts = data.study.floor.blocks
+        nu = [np.full(self._size(p), np.clip(3.0 * counts[p[1]], 2.0, FREEDOM)) for p in part.pieces]
+        self.freedom = np.concatenate(nu) if nu else np.zeros(0)
+
+    def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
+        return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
+
+    def _gather(self, by_flight: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
+        parts = [by_flight[i][r][chosen][:, self.keep[r]].ravel() for i, r, chosen in self.part.pieces]
+        return np.concatenate(parts).astype(complex) if parts else np.zeros(0, complex)
+
+    def values(self, active: Sequence[Active]) -> np.ndarray:
+        """Spectra with effects in the model, flattened."""
+        return np.where(self.known, self._gather(spectra(self.data, active)), 0.0)
+
+    def constant(self) -> list[tuple[np.ndarray, float]]:
+        """Spectra of a unit offset in each of the OFFSETS channels of each flight, with its prior's deviation."""
+        columns = []
+        tell = self.data.study.floor.offset
+        for i, flight in enumerate(self.data.flights):
+            for c in range(OFFSETS):
+                if tell[c] <= 0.0:
+                    continue
+                ones = np.zeros((len(flight), COUNT))
+                ones[~flight.on_ground, c] = 1.0
+                made = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
+                         for r in f} for j, f in enumerate(self.data.first)]
+                columns.append((self._gather(made), float(tell[c])))
+        return columns
+
+    def random_power(self, terms: Sequence[Term]) -> np.ndarray:
+        """PSD that random effects add, flattened."""
+        total = np.zeros(len(self.base))
+        for term in terms:
+            total += self._gather(random_effects.power(self.data, term)).real
+        return total
+
+    def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+        """Log likelihood of what is left, over nothing in particular; only differences mean something."""
+        return float(self.each(values, added).sum())
+
+    def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+        power = self.power + added
+        e = np.abs(values) ** 2 / power
+        nu = self.freedom
+        return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + (nu + 1.0) * np.log1p(e / nu)), 0.0)
+
+
+def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None = None) -> Fit:
+    """Fit effects to the blocks of `part`; what is left is judged elsewhere."""
+    problem = Problem(data, part)
+    terms = tuple(terms)
+    mean = tuple(t for t in terms if t.kind == MEAN)
+    random = [t for t in terms if t.kind == SPECTRUM]
+    x = _start(mean) if start is None else start
+    added = problem.random_power(random) if random else 0.0
+    offsets, covariance = np.zeros(0), np.zeros((0, 0))
+    for _ in range(2 if mean and random else 1):
+        x, offsets, covariance, values = _gauss_newton(problem, mean, x, added)
+        random = [_strength(problem, random, i, values) for i in range(len(random))]
+        added = problem.random_power(random) if random else 0.0
+    fitted, place = [], 0
+    chosen = iter(random)
+    for t in terms:
+        if t.kind == MEAN:
+            fitted.append(t.fitted(x[place:place + len(t.free)]))
+            place += len(t.free)
+        else:
+            fitted.append(next(chosen) if t.kind == SPECTRUM else t)
+    gained = problem.likelihood(values, added)
+    return Fit(tuple(fitted), x, covariance, offsets, gained)
+
+
+def judge(data: Data, part: Part, terms: Sequence[Term]) -> float:
+    """Log likelihood of blocks under effects fitted elsewhere; offsets between flights found anew."""
+    problem = Problem(data, part)
+    added = problem.random_power([t for t in terms if t.kind == SPECTRUM])
+    values = problem.values([t.active() for t in terms if t.kind == MEAN]) \
+        if any(t.kind == MEAN for t in terms) else problem.base
+    values, penalty = _without_offsets(problem, values, added)
+    return problem.likelihood(values, added) - penalty
+
+
+def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem, what is left (flattened, offsets taken off) and the power that it should have."""
+    problem = Problem(data, part)
+    added = problem.random_power([t for t in terms if t.kind == SPECTRUM])
+    active = [t.active() for t in terms if t.kind == MEAN]
+    values = problem.values(active) if active else problem.base
+    values, _ = _without_offsets(problem, values, added)
+    return problem, values, problem.power + added
+
+
+def _start(mean: Sequence[Term]) -> np.ndarray:
+    return np.concatenate([np.full(len(t.free), 0.05) for t in mean]) if mean else np.zeros(0)
+
+
+def _active(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
+    out, place = [], 0
+    for t in mean:
+        out.append(t.active(x[place:place + len(t.free)]))
+        place += len(t.free)
+    return out
+
+
+def _limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
+    pairs = [t.bounds() for t in mean]
+    return (np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])) if pairs \
+        else (np.zeros(0), np.zeros(0))
+
+
+def _weights(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+    power = problem.power + added
+    e = np.abs(values) ** 2 / power
+    return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.freedom + e) / power * problem.known
+
+
+def _solve(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
+           at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Step of ridge regression that lowers values + sum(step * column), and the covariance."""
+    j = np.array(columns)
+    wj = j.conj() * weights
+    normal = 2.0 * (wj @ j.T).real + np.diag(1.0 / prior ** 2)
+    slope = -2.0 * (wj @ values).real - at / prior ** 2
+    covariance = np.linalg.pinv(normal, hermitian=True)
+    return covariance @ slope, covariance
+
+
+def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
+                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Scaled parameters, offsets, covariance of the parameters, and what is left."""
+    constants = problem.constant()
+    low, high = _limits(mean)
+    x = np.clip(x, low, high)
+    offsets = np.zeros(len(constants))
+    prior = np.concatenate([np.full(len(x), PRIOR_UNITS), [p for _, p in constants]])
+    push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
+    raw = problem.values(_active(mean, x)) if mean else problem.base
+    values = raw - push(offsets)
+    covariance = np.zeros((len(x), len(x)))
+    if not mean and not constants:
+        return x, offsets, covariance, values
+    cost = _cost(problem, values, added, x, offsets, prior)
+    for _ in range(ITERATIONS):
+        columns = []
+        for i in range(len(x)):
+            step = 0.02 if x[i] + 0.02 <= high[i] else -0.02
+            moved = x.copy()
+            moved[i] += step
+            columns.append((problem.values(_active(mean, moved)) - raw) / step)
+        columns += [-c for c, _ in constants]
+        change, full = _solve(columns, prior, values, _weights(problem, values, added),
+                              np.concatenate([x, offsets]))
+        covariance = full[:len(x), :len(x)]
+        scale, better = 1.0, False
+        while scale > 0.05:
+            new_x = np.clip(x + scale * change[:len(x)], low, high)
+            new_o = offsets + scale * change[len(x):]
+            new_raw = problem.values(_active(mean, new_x)) if mean else problem.base
+            new_values = new_raw - push(new_o)
+            new_cost = _cost(problem, new_values, added, new_x, new_o, prior)
+            if new_cost < cost - 1e-9:
+                better = True
+                break
+            scale *= 0.4
+        if not better:
+            break
+        gain, cost = cost - new_cost, new_cost
+        x, offsets, raw, values = new_x, new_o, new_raw, new_values
+        if gain < 0.01:
+            break
+    return x, offsets, covariance, values
+
+
+def _cost(problem: Problem, values: np.ndarray, added: np.ndarray | float, x: np.ndarray,
+          offsets: np.ndarray, prior: np.ndarray) -> float:
+    return -problem.likelihood(values, added) + 0.5 * float(((np.concatenate([x, offsets]) / prior) ** 2).sum())
+
+
+def _without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float,
+                     ) -> tuple[np.ndarray, float]:
+    constants = problem.constant()
+    if not constants:
+        return values, 0.0
+    prior, found = np.array([p for _, p in constants]), np.zeros(len(constants))
+    left = values
+    for _ in range(2):
+        step, _ = _solve([-c for c, _ in constants], prior, left, _weights(problem, left, added), found)
+        found = found + step
+        left = values - sum(a * c for a, (c, _) in zip(found, constants, strict=True))
+    return left, 0.5 * float(((found / prior) ** 2).sum())
+
+
+def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray) -> Term:
+    """A random effect's strength of highest likelihood, the others as they are."""
+    term = random[which]
+    others = problem.random_power([t for i, t in enumerate(random) if i != which])
+    low, high = term.bounds()
+    unit = problem.random_power([term.fitted(np.ones(len(term.free)))])
+    if not unit.any():
+        return term
+
+    def cost(log_x: float) -> float:
+        return -problem.likelihood(values, others + random_effects.growth(term, np.exp(log_x)) * unit)
+
+    top = np.log(min(float(high[0]), 1e3))
+    grid = np.linspace(np.log(0.003), top, 40)
+    costs = [cost(g) for g in grid]
+    best = int(np.argmin(costs))
+    found = minimize_scalar(cost, bounds=(grid[max(best - 1, 0)], grid[min(best + 1, 39)]), method="bounded")
+    return term.fitted(np.full(len(term.free), float(np.exp(found.x))))
+
+
+def replace_terms(f: Fit, terms: Sequence[Term]) -> Fit:
+    """A fit with other terms."""
+    return replace(f, terms=tuple(terms))
+
+
+__all__ = ["CLOCK", "Data", "Fit", "Part", "Problem", "Study", "fit", "judge", "left_over", "spectra"]

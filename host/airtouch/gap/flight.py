@@ -1,0 +1,155 @@
+"""A flight made ready for the diagnosis: a regular clock, what effects see, what was measured."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.gap import motion
+from airtouch.logs.clock import lost_samples, true_period
+from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, FlightLog
+from airtouch.logs.resample import resample
+from airtouch.logs.segments import KINDS, segments
+from airtouch.simulation import replay
+from airtouch.simulation import signals as at
+from airtouch.simulation.flight import prepare
+from airtouch.simulation.rotation import as_matrix
+from airtouch.vehicle import Vehicle
+
+PERIOD_S = 0.01
+GROUND = KINDS.index("ground")
+LEAST_AIR_S = 3.0  #: less time in the air than this is not diagnosed
+CONTACT_S = 0.3  #: left out around the moments at which the vehicle touches the ground
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight on a regular 10 ms clock.
+
+    signals (n, COUNT) for effects; acceleration (n, 3) m/s^2: specific force, body axes;
+    rates (n, 3) rad/s or None; pwm (n, 4); turn (n, 3, 3) body to world; phase (n,) places
+    in `segments.KINDS`; usable (n,): neither lost nor close to touching the ground;
+    clock_s (m,): logged times of the m rows that arrived minus the regular ones.
+    """
+
+    name: str
+    log: FlightLog
+    signals: np.ndarray
+    acceleration: np.ndarray
+    rates: np.ndarray | None
+    pwm: np.ndarray
+    turn: np.ndarray
+    phase: np.ndarray
+    usable: np.ndarray
+    clock_s: np.ndarray
+    lost: np.ndarray
+    notes: tuple[str, ...] = ()
+    cannot: tuple[str, ...] = ()
+    memory: dict = field(default_factory=dict, repr=False)  #: what was worked out once
+
+    def __len__(self) -> int:
+        return len(self.pwm)
+
+    @property
+    def on_ground(self) -> np.ndarray:
+        """Whether the vehicle stands with its motors off, bool (n,)."""
+        return (self.phase == GROUND) & (self.pwm.max(axis=1) <= 0.0)
+
+
+def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
+    """Make a log ready.
+
+    Raises AirTouchError, with the file and the remedy, without motor commands or
+    accelerations, when the clock runs backwards, and when there is no flight in it.
+    """
+    name, notes, cannot = log.source, [], []
+    for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
+        if not log.has(*columns):
+            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
+                                "compares what the motors were told with what the IMU felt")
+    log = _at_100_hz(log, name)
+    log, clock, lost = _regular(log, name)
+    if not log.has(*GYRO):
+        cannot.append("no gyro: torque only at low frequency, from the balance of the motors")
+    if not log.has("zrange_m"):
+        cannot.append("no down range: ground effect, range steps and flow scale cannot be seen")
+    if not log.has("vx_mps", "vy_mps"):
+        cannot.append("no velocity: drag, flapping and wind cannot be told from a constant push")
+    angles = motion.attitude(log, PERIOD_S)
+    known = log.with_columns(dict(zip(ATTITUDE, angles.T, strict=True)))
+    turn = as_matrix(*angles.T)
+    force = motion.held(log.stack(ACC))
+    if log.meta.get("acc_frame") == "world":
+        force = np.einsum("nji,nj->ni", turn, force)
+        if np.median(force[:, 2]) < 0.5 * vehicle.gravity_mps2:
+            force += np.einsum("nji,j->ni", turn, [0.0, 0.0, vehicle.gravity_mps2])
+    phase = np.zeros(len(log), np.int8)
+    for part in segments(log):
+        phase[part.start:part.stop] = KINDS.index(part.kind)
+    pwm = motion.held(log.stack(PWM))
+    if (phase != GROUND).sum() * PERIOD_S < LEAST_AIR_S:
+        raise AirTouchError(f"{name}: no flight in it ({(phase != GROUND).sum() * PERIOD_S:.1f} s in the air); "
+                            f"at least {LEAST_AIR_S:g} s are needed")
+    signals = replay.signals_of(FlightLog({k: motion.held(v) for k, v in known.columns.items()}, known.meta),
+                                vehicle, (), PERIOD_S)
+    row = prepare(vehicle, ())[0][0]
+    heights = motion.rotor_heights(log, turn, row["rotor_x"], row["rotor_y"], row["range_below_rotors"], PERIOD_S)
+    if heights is not None:
+        signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
+        signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
+    rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
+    usable = ~lost & ~_near_contact(phase, pwm)
+    return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
+                  tuple(notes), tuple(cannot))
+
+
+def _at_100_hz(log: FlightLog, name: str) -> FlightLog:
+    if len(log) < 2:
+        raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    if log.has("t_s"):
+        backwards = np.flatnonzero(np.diff(log["t_s"]) < -0.05)
+        if len(backwards):
+            raise AirTouchError(f"{name}, sample {backwards[0] + 1}: the clock runs backwards by "
+                                f"{-np.diff(log['t_s'])[backwards[0]]:.3f} s; cut the log there")
+        period = true_period(log["t_s"])
+        if period is not None and period < 0.006:
+            return resample(log, 100.0)
+    return log
+
+
+def _regular(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np.ndarray]:
+    """The log with lost rows put back as NaN, the clock's wandering and which rows were lost."""
+    n = len(log)
+    if not log.has("t_s"):
+        return log, np.zeros(n), np.zeros(n, bool)
+    time = motion.held(log["t_s"])
+    period = true_period(time) or PERIOD_S
+    place = np.arange(n)
+    for gap in lost_samples(time, period):
+        place[gap.sample:] += gap.lost
+    if place[-1] > 3 * n + 1000:
+        raise AirTouchError(f"{name}: {place[-1] - n} of {place[-1]} samples are missing; check the clock column")
+    clock = time - np.polyval(np.polyfit(place, time, 1), place) if n > 2 else np.zeros(n)
+    lost = np.ones(place[-1] + 1, bool)
+    lost[place] = False
+    columns = {}
+    for key, values in log.columns.items():
+        columns[key] = np.full(len(lost), np.nan)
+        columns[key][place] = values
+    columns["t_s"] = np.arange(len(lost)) * PERIOD_S
+    meta = {**log.meta, "sample_period_s": PERIOD_S}
+    return FlightLog(columns, meta), clock, lost
+
+
+def _near_contact(phase: np.ndarray, pwm: np.ndarray) -> np.ndarray:
+    """Samples at which legs may touch: motors run on the ground, and around take-off and touch-down."""
+    moving = pwm.max(axis=1) > 0.0
+    rest = (phase == GROUND) & ~moving
+    touching = (phase == GROUND) & moving
+    change = np.diff(((phase == GROUND) | ~moving).astype(np.int8))
+    wide = int(CONTACT_S / PERIOD_S)
+    for k in np.flatnonzero(change):
+        touching[max(k - wide, 0):k + wide] = True
+    before = rest & (np.cumsum(moving) == 0)
+    before[np.argmax(moving) - 1 if moving.any() else 0:] = False
+    return touching & ~before

@@ -1,0 +1,103 @@
+"""Attitude and heights that a log does not hold, worked out from what it does hold."""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import butter, sosfiltfilt
+
+from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, POSITION, VELOCITY, FlightLog
+
+CROSSOVER_HZ = 0.4  #: below it the tilt comes from the acceleration over ground, above it from the gyro
+GRAVITY = 9.81
+
+
+def held(values: np.ndarray) -> np.ndarray:
+    """Missing samples (n,) or (n, c) filled along the flight by straight lines; 0 where all are missing."""
+    out = np.array(values, dtype=np.float64)
+    table = out[:, None] if out.ndim == 1 else out
+    index = np.arange(len(table))
+    for j in range(table.shape[1]):
+        good = np.isfinite(table[:, j])
+        if not good.all():
+            table[:, j] = np.interp(index, index[good], table[good, j]) if good.any() else 0.0
+    return out
+
+
+def attitude(log: FlightLog, period_s: float) -> np.ndarray:
+    """Roll, pitch, yaw (n, 3) in rad: logged angles where they are logged, else estimated.
+
+    A multirotor's thrust points along its own z axis, so what it accelerates over ground
+    gives the tilt at low frequency; the gyro gives the rest. Without a gyro the tilt is
+    that of the specific force in world axes.
+    """
+    n = len(log)
+    estimate = np.zeros((n, 3))
+    tilt = _tilt(log, period_s)
+    if log.has(*GYRO):
+        turned = np.cumsum(held(log.stack(GYRO)), axis=0) * period_s
+        estimate[:, 2] = turned[:, 2] - turned[0, 2] if not log.has("yaw_rad") else 0.0
+        low = butter(2, CROSSOVER_HZ * 2.0 * period_s, output="sos")
+        if n > 100:
+            estimate[:, :2] = turned[:, :2] - sosfiltfilt(low, turned[:, :2], axis=0)
+            estimate[:, :2] += sosfiltfilt(low, tilt, axis=0)
+    else:
+        estimate[:, :2] = tilt
+    for i, name in enumerate(ATTITUDE):
+        if log.has(name):
+            estimate[:, i] = held(log[name])
+    return estimate
+
+
+def _tilt(log: FlightLog, period_s: float) -> np.ndarray:
+    """Roll and pitch (n, 2) of the specific force, in axes that are turned by yaw only."""
+    n = len(log)
+    if log.has(*VELOCITY[:2]):
+        speed = held(log.stack(VELOCITY[:2]))
+        push = np.gradient(gaussian_filter1d(speed, 0.05 / period_s, axis=0, mode="nearest"), period_s, axis=0)
+        up = np.full(n, GRAVITY)
+    elif log.has(*ACC_WORLD):
+        force = held(log.stack(ACC_WORLD))
+        push, up = force[:, :2], np.maximum(force[:, 2], 0.5 * GRAVITY)
+    elif log.meta.get("acc_frame") == "world" and log.has(*ACC):
+        force = held(log.stack(ACC))
+        push, up = force[:, :2], np.maximum(force[:, 2], 0.5 * GRAVITY)
+    else:
+        return np.zeros((n, 2))
+    yaw = held(log["yaw_rad"]) if log.has("yaw_rad") else np.zeros(n)
+    forward = np.cos(yaw) * push[:, 0] + np.sin(yaw) * push[:, 1]
+    left = -np.sin(yaw) * push[:, 0] + np.cos(yaw) * push[:, 1]
+    return np.column_stack([-np.arctan2(left, up), np.arctan2(forward, up)])
+
+
+def rotor_heights(log: FlightLog, turn: np.ndarray, rotor_x: np.ndarray, rotor_y: np.ndarray,
+                  below_rotors_m: float, period_s: float) -> np.ndarray | None:
+    """Height (n, 4) of each rotor over what is under it, m, from the down range under the middle.
+
+    The edge passes under a rotor earlier or later than under the sensor, by the rotor's
+    distance along the path over the speed. None without a down range.
+    """
+    if not log.has("zrange_m"):
+        return None
+    n, height = len(log), held(log["zrange_m"]) + below_rotors_m
+    index = np.arange(n, dtype=np.float64)
+    step = np.zeros((n, 4))
+    if log.has(*VELOCITY[:2]):
+        speed = gaussian_filter1d(held(log.stack(VELOCITY[:2])), 0.2 / period_s, axis=0, mode="nearest")
+        size = np.hypot(speed[:, 0], speed[:, 1])
+        moving = size > 0.05
+        along = np.einsum("nij,nj->ni", turn[:, :2, :2].transpose(0, 2, 1), speed)
+        ahead = along[:, :1] * rotor_x + along[:, 1:] * rotor_y
+        step[moving] = ahead[moving] / size[moving, None] ** 2 / period_s
+    rise = turn[:, 2, :1] * rotor_x + turn[:, 2, 1:2] * rotor_y
+    top = _altitude(log, height, period_s) - height
+    here = _altitude(log, height, period_s)
+    shifted = np.column_stack([np.interp(index + np.clip(step[:, i], -100, 100), index, top) for i in range(4)])
+    return np.maximum(here[:, None] - shifted + rise, 0.0)
+
+
+def _altitude(log: FlightLog, height: np.ndarray, period_s: float) -> np.ndarray:
+    """Height over the floor (n,): the logged one, else the down range without its steps."""
+    if log.has(POSITION[2]):
+        return held(log[POSITION[2]])
+    change = np.diff(height, prepend=height[0])
+    change[np.abs(change) > 0.06] = 0.0
+    return height[0] + np.cumsum(change)

@@ -1,0 +1,108 @@
+"""What a diagnosis says, and its JSON form (the fixed interface of `airtouch gap diagnose --json`)."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number with its 90 % interval and unit; low and high None where there is none."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+    unit: str = "1"
+
+    def plain(self) -> dict[str, Any]:
+        return {k: v for k, v in asdict(self).items() if v is not None}
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that the diagnosis names, with its fitted parameters."""
+
+    name: str
+    parameters: Mapping[str, Quantity]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A candidate: its probability and the share of the gap that it takes away on held-out data."""
+
+    name: str
+    probability: float
+    shrink: Quantity
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of the gap map: rms in a channel, band and phase, beside the floor.
+
+    regime: the condition beyond the phase ("all", "low", "high voltage", ...); n blocks of
+    `flights` flights; interval by block bootstrap over flights.
+    """
+
+    channel: str
+    band_hz: tuple[float, float]
+    phase: str
+    gap: float
+    floor: float
+    unit: str
+    low: float | None = None
+    high: float | None = None
+    regime: str = "all"
+    blocks: int = 0
+    flights: int = 0
+    after: float | None = None  #: the same cell with the named effects in the model
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """verdict "effect", "none" or "unknown"; gap: {"before", "after", "floor"} as rms over the floor's
+
+    unit (dimensionless, floor 1 per bin), judged on held-out blocks; control: the same with
+    a deliberately wrong effect; arms: shrink with the vehicle as declared and as calibrated.
+    """
+
+    verdict: str
+    effects: tuple[Found, ...]
+    ranking: tuple[Ranked, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    where: tuple[Cell, ...]
+    gap: Mapping[str, float]
+    shrink: Quantity | None
+    control: Mapping[str, Any]
+    advice: str
+    arms: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    cannot: tuple[str, ...] = ()
+    flights: tuple[str, ...] = ()
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready, GAP.md's fields and more; floats rounded to six digits."""
+        made = {
+            "verdict": self.verdict,
+            "effects": [{"name": e.name, "parameters": {k: q.plain() for k, q in e.parameters.items()}}
+                        for e in self.effects],
+            "ranking": [{"name": r.name, "probability": r.probability, "shrink": r.shrink.plain()}
+                        for r in self.ranking],
+            "indistinguishable": [list(g) for g in self.indistinguishable],
+            "where": [{k: v for k, v in asdict(c).items() if v is not None} for c in self.where],
+            "gap": dict(self.gap), "shrink": self.shrink.plain() if self.shrink else None,
+            "control": dict(self.control), "advice": self.advice, "arms": dict(self.arms),
+            "notes": list(self.notes), "cannot": list(self.cannot), "flights": list(self.flights),
+        }
+        return _rounded(made)
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {k: _rounded(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(f"{float(value):.6g}") if np.isfinite(value) else None
+    return int(value) if isinstance(value, np.integer) else value

@@ -1,0 +1,125 @@
+"""Short-time spectra of the gap, and the floor that they are held against.
+
+Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping. A bin's
+value over the floor's standard deviation is one standard normal number (real and
+imaginary part each) when nothing is wrong.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from airtouch.gap.channels import CHANNELS, COUNT
+from airtouch.gap.flight import GROUND, PERIOD_S, Flight
+
+AIR, REST = "air", "ground"
+LENGTH = {AIR: 256, REST: 24}  #: samples
+OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
+MOST_LOST = 0.1  #: of a block
+
+
+def starts(flight: Flight, regime: str) -> np.ndarray:
+    """First samples of the blocks of a regime that hold usable samples only."""
+    length = LENGTH[regime]
+    good = flight.on_ground if regime == REST else (flight.phase != GROUND) & ~flight.on_ground
+    near = good & (flight.usable | flight.lost)
+    found, k = [], 0
+    bad = np.cumsum(np.concatenate([[0], ~near]))
+    lost = np.cumsum(np.concatenate([[0], flight.lost]))
+    while k + length <= len(flight):
+        if bad[k + length] == bad[k] and lost[k + length] - lost[k] <= MOST_LOST * length:
+            found.append(k)
+            k += length // 2
+        else:
+            k += 1
+    return np.array(found, int)
+
+
+def frequencies(regime: str) -> np.ndarray:
+    """Hz, (bins,)."""
+    return np.fft.rfftfreq(LENGTH[regime], PERIOD_S)
+
+
+def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
+    """Spectra (blocks, bins, channels) of values (n, channels), unit/sqrt(Hz), two-sided.
+
+    |.|^2 has the mean of the one-sided PSD; a constant x gives x * sqrt(duration / 1.5).
+    """
+    length = LENGTH[regime]
+    window = np.hanning(length + 1)[:-1]
+    scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
+    cut = values[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length, values.shape[1]))
+    spectrum = np.fft.rfft(cut * window[:, None], axis=1) * scale
+    spectrum[:, 0] /= np.sqrt(2.0)
+    if length % 2 == 0:
+        spectrum[:, -1] /= np.sqrt(2.0)
+    return spectrum
+
+
+def judged(regime: str) -> np.ndarray:
+    """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only."""
+    f = frequencies(regime)[:, None]
+    keep = np.array([[c.low_hz <= x <= c.high_hz for c in CHANNELS] for x in f[:, 0]])
+    if regime == REST:
+        force_or_rate = np.array([c.name.startswith(("force", "rate")) for c in CHANNELS])
+        keep = np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
+    return keep
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What nominal flights leave: power[regime] (bins, COUNT), unit^2/Hz, from `blocks` blocks;
+
+    offset (COUNT,): standard deviation between flights of a channel's mean in the air;
+    clock_s: rms of the logged times around regular ones; lost: share of lost samples.
+    """
+
+    power: dict[str, np.ndarray]
+    blocks: dict[str, int]
+    offset: np.ndarray
+    clock_s: float
+    lost: float
+
+
+def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], least: np.ndarray) -> Floor:
+    """The floor of flights declared nominal, from what the calibrated model leaves of them.
+
+    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at
+    100 Hz (angular acceleration: of its difference), below which the floor never goes.
+    """
+    power, count = {}, {}
+    for regime in (AIR, REST):
+        first = [starts(f, regime) for f in flights]
+        spectra = [blocks(np.nan_to_num(r), s, regime) for r, s in zip(residuals, first, strict=True)]
+        every = np.concatenate(spectra) if spectra else np.zeros((0, 1, COUNT))
+        sensor = sensor_power(least, regime)
+        count[regime] = len(every)
+        if len(every) >= 4:
+            mean = (np.abs(every) ** 2).mean(axis=0)
+            power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
+        else:
+            power[regime] = 2.0 * sensor
+    means = np.array([r[(f.phase != GROUND) & f.usable].mean(axis=0)
+                      for f, r in zip(flights, residuals, strict=True)])
+    offset = np.nan_to_num(means.std(axis=0, ddof=1)) if len(means) > 1 else np.zeros(COUNT)
+    clock = np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2)) if flights else 0.0
+    lost = float(np.mean(np.concatenate([f.lost for f in flights]))) if flights else 0.0
+    return Floor(power, count, offset, float(clock), lost)
+
+
+def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
+    """PSD (bins, COUNT) of the sensors' white noise; differences of the gyro rise with frequency."""
+    f = frequencies(regime)
+    white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
+    shape = 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2
+    white[:, 3:6] = shape[:, None] * 2.0 * PERIOD_S * (least[3:6] / PERIOD_S) ** 2
+    return white
+
+
+def _smooth(power: np.ndarray) -> np.ndarray:
+    """Averaged over neighbouring bins in the logarithm, the lowest two left as they are."""
+    out = np.exp(gaussian_filter1d(np.log(np.maximum(power, 1e-300)), 1.5, axis=0, mode="nearest"))
+    out[:2] = np.maximum(power[:2], out[:2])
+    return out
