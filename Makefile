@@ -1,7 +1,8 @@
 # AirTouch. `make demo` and `make test` do all the set-up they need.
 PYTHON ?= python3
 BIN := .venv/bin
-SOURCES := $(wildcard firmware/kernels/*.[ch] gap8/kernels/*.[ch] host/airtouch/kernels/*.[ch])
+SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
+  gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
 
 .PHONY: help setup demo test bench clean
 

@@ -1,0 +1,325 @@
+#include "app_core.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "airtouch_model.h"
+#include "app_level.h"
+#include "stream_window.h"
+
+enum { EVENT_NON_FINITE, EVENT_PARAM, EVENT_DROPPED, EVENT_LATE };
+enum { EDGE_UNKNOWN = 3 };
+
+static bool usesGap8(const appCore_t *core) {
+  return core->log.detector == APP_BEST_GAP8 || core->log.detector == APP_PAPER_GAP8;
+}
+
+static uint8_t detectorInForce(const appCore_t *core) {
+  if (core->haveGap8 || core->params.detector < APP_BEST_GAP8) {
+    return core->params.detector;
+  }
+  return core->params.detector == APP_BEST_GAP8 ? APP_BEST : APP_CFAR;
+}
+
+static bool filters(const appCore_t *core) {
+  return core->params.filter == APP_FILTER_ON ||
+         (core->params.filter == APP_FILTER_AS_TRAINED && core->log.detector == APP_PAPER_GAP8);
+}
+
+/** Settings that the kernels read as they run. */
+static void setThresholds(appCore_t *core) {
+  core->pipeline.config.probabilityEntry = core->params.probabilityIn;
+  core->pipeline.config.probabilityExit = core->params.probabilityOut;
+  core->pipeline.config.physicalFilter = filters(core);
+  core->best.decoder.config.entryScore = core->params.scoreIn;
+  core->best.decoder.config.exitScore = core->params.scoreOut;
+}
+
+static void beginPipeline(appCore_t *core) {
+  edgePipelineConfig_t config;
+  edgePipelineDefaults(&config, &airtouchStreamMotion.vehicle);
+  config.lowHz = core->params.bandLow;
+  config.highHz = core->params.bandHigh;
+  config.pFa = core->params.pFa;
+  config.dwellSamples = APP_PAPER_DWELL_SAMPLES;
+  config.alertHold = APP_PAPER_ALERT_HOLD;
+  edgePipelineInit(&core->pipeline, &config);
+  core->nonFinite = 0;
+}
+
+static void beginLink(appCore_t *core) {
+  uint8_t digest[EDGE_LINK_DIGEST_BYTES];
+  const bool paper = core->log.detector == APP_PAPER_GAP8;
+  edgeLinkDigest(paper ? AIRTOUCH_MODEL_SHA256 : AIRTOUCH_STREAM_SHA256, digest);
+  const uint16_t refill =
+      paper ? AIRTOUCH_MODEL_ROWS : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
+  const uint8_t session = (uint8_t)(core->link.session == 255 ? 1 : core->link.session + 1);
+  const linkCounters_t counters = core->link.counters;
+  linkSenderInit(&core->link, paper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, refill, core->nonce, session);
+  core->link.counters = counters;
+}
+
+/** Kernels, detector and stream begin anew; counters stay. */
+static void begin(appCore_t *core) {
+  core->log.detector = detectorInForce(core);
+  core->log.over = 0;
+  core->log.probability = NAN;
+  core->probability = NAN;
+  core->wasAlert = false;
+  core->sinceEdge = UINT16_MAX;
+  beginPipeline(core);
+  streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
+                     &airtouchStreamDecoder, core->arena);
+  beginLink(core);
+  setThresholds(core);
+}
+
+static void happened(appCore_t *core, int event) { core->since[event] = 0; }
+
+void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce) {
+  memset(core, 0, sizeof *core);
+  memset(core->since, 0xff, sizeof core->since);
+  core->haveGap8 = haveGap8;
+  core->nonce = nonce;
+  appParamsDefaults(&core->params);
+  core->log.threshold = NAN;
+  if (params != NULL) {
+    core->params = *params;
+    core->log.paramErrors = appParamsClamp(&core->params);
+  }
+  begin(core);
+}
+
+uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
+  const appParams_t old = core->params;
+  const uint16_t errors = appParamsClamp(params);
+  if (errors > 0) {
+    core->log.paramErrors = (uint16_t)(core->log.paramErrors + errors);
+    happened(core, EVENT_PARAM);
+  }
+  core->params = *params;
+  if (params->detector != old.detector || params->enable != old.enable) {
+    begin(core);
+  } else if (params->bandLow != old.bandLow || params->bandHigh != old.bandHigh || params->pFa != old.pFa) {
+    beginPipeline(core);
+    beginLink(core);
+  }
+  setThresholds(core);
+  return errors;
+}
+
+static void report(appCore_t *core, uint8_t kind) {
+  core->log.edge = kind;
+  core->log.edges++;
+  core->log.edgeSample = core->log.samples;
+  if (kind != EDGE_UNKNOWN) {
+    core->log.over = kind == EDGE_ENTRY;
+  }
+  core->reported = true;
+}
+
+static float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
+
+/** The logits of one step of the streaming network become log values and, where they say so, an edge. */
+static void takeLogits(appCore_t *core, const float logits[3], bool airborne, uint8_t edge) {
+  memcpy(core->log.logit, logits, sizeof core->log.logit);
+  core->log.probability = airborne ? sigmoid(logits[0]) : 0.0f;
+  core->log.answers++;
+  const bool vouched = core->pipeline.sinceAlert < core->pipeline.config.alertHold;
+  if (edge != EDGE_NONE && (vouched || !filters(core))) {
+    report(core, edge);
+  }
+}
+
+static void setAirborne(appCore_t *core, uint32_t sequence, bool airborne) {
+  const uint32_t at = sequence % LINK_HISTORY;
+  const uint32_t bit = UINT32_C(1) << (at % 32);
+  core->airborneBits[at / 32] = airborne ? core->airborneBits[at / 32] | bit : core->airborneBits[at / 32] & ~bit;
+}
+
+static bool wasAirborne(const appCore_t *core, uint32_t sequence) {
+  const uint32_t at = sequence % LINK_HISTORY;
+  return (core->airborneBits[at / 32] >> (at % 32)) & 1u;
+}
+
+static void stepBest(appCore_t *core) {
+  const float *held = core->pipeline.held;
+  streamEvent_t event;
+  streamDetectorStep(&core->best, held, held + 3, held + 6, &event);
+  if (event.ready) {
+    takeLogits(core, event.logits, event.airborne, event.edge);
+  }
+}
+
+/** The streaming network's inputs, quantised here as the network on the STM32 would. */
+static void sendChannels(appCore_t *core) {
+  const float *held = core->pipeline.held;
+  float channels[MOTION_CHANNELS];
+  int8_t quantised[EDGE_LINK_SAMPLE_BYTES];
+  motionChannelsStep(&core->best.motion, held, held + 3, held + 6, channels);
+  streamQuantise(&core->best.quantisation, channels, MOTION_CHANNELS, quantised);
+  setAirborne(core, core->link.samples, core->best.motion.airborne > 0);
+  linkSenderPush(&core->link, (const uint8_t *)quantised);
+}
+
+static void sendFeatures(appCore_t *core, const edgeEvent_t *event) {
+  uint8_t sample[EDGE_LINK_SAMPLE_BYTES];
+  _Static_assert(sizeof event->features == EDGE_LINK_SAMPLE_BYTES, "three features are a sample");
+  memcpy(sample, event->features, sizeof sample);  // both processors are little endian
+  linkSenderPush(&core->link, sample);
+}
+
+static void takeAnswer(appCore_t *core, const linkAnswer_t *answer) {
+  const uint32_t lag = core->link.samples - 1 - answer->sequence;
+  core->log.lag = (uint16_t)(lag < UINT16_MAX ? lag : UINT16_MAX);
+  if (core->log.detector == APP_PAPER_GAP8) {
+    const float difference = (float)(answer->output[0] - answer->output[1]);
+    core->probability = sigmoid(-airtouchNetwork.outputScale * difference);
+    core->log.probability = core->probability;
+    core->log.answers++;
+    return;
+  }
+  const streamQuantisation_t *quantisation = &core->best.quantisation;
+  for (int i = 0; i < 3; i++) {
+    core->best.logits[i] = quantisation->outputScale * (float)(answer->output[i] - quantisation->outputZeroPoint);
+  }
+  const bool airborne = lag < LINK_HISTORY && wasAirborne(core, answer->sequence);
+  const uint8_t edge = edgeDecoderStep(&core->best.decoder, core->best.logits, airborne);
+  takeLogits(core, core->best.logits, airborne, edge);
+}
+
+void appCoreReceive(appCore_t *core, const uint8_t *bytes, uint16_t length) {
+  linkAnswer_t answers[EDGE_LINK_ANSWERS];
+  if (!core->params.enable || !usesGap8(core)) {
+    return;
+  }
+  const int count = linkSenderTake(&core->link, bytes, length, answers);
+  for (int i = 0; i < count; i++) {
+    takeAnswer(core, &answers[i]);
+  }
+}
+
+/** The alert itself is the edge: its kind is not known. */
+static void stepCfar(appCore_t *core, const edgeEvent_t *event) {
+  core->sinceEdge = (uint16_t)(core->sinceEdge + (core->sinceEdge < UINT16_MAX ? 1 : 0));
+  if (event->alert && !core->wasAlert && event->armed && core->sinceEdge >= AIRTOUCH_DWELL_SAMPLES) {
+    core->sinceEdge = 0;
+    report(core, EDGE_UNKNOWN);
+  }
+  core->wasAlert = event->alert;
+}
+
+static void runDetector(appCore_t *core, const edgeEvent_t *event) {
+  switch (core->log.detector) {
+    case APP_BEST:
+      stepBest(core);
+      break;
+    case APP_BEST_GAP8:
+      sendChannels(core);
+      break;
+    case APP_PAPER_GAP8:
+      if (event->ready) {
+        sendFeatures(core, event);
+      }
+      if (event->edge != EDGE_NONE) {
+        report(core, event->edge);
+      }
+      break;
+    default:
+      stepCfar(core, event);
+      break;
+  }
+}
+
+static void logEvent(appCore_t *core, const edgeEvent_t *event) {
+  appLog_t *log = &core->log;
+  memcpy(log->feature, event->features, sizeof log->feature);
+  memcpy(log->force, event->force, sizeof log->force);
+  log->cfarPower = event->cfarPower;
+  log->threshold = event->threshold;
+  log->alert = event->alert;
+  if (event->nonFinite != core->nonFinite) {
+    happened(core, EVENT_NON_FINITE);
+    log->nonFinite += event->nonFinite - core->nonFinite;
+    core->nonFinite = event->nonFinite;
+  }
+}
+
+static void logLink(appCore_t *core) {
+  const linkCounters_t *counters = &core->link.counters;
+  appLog_t *log = &core->log;
+  log->dropped = counters->dropped;
+  log->lost = counters->lost;
+  log->timeouts = counters->timeouts;
+  log->gap8Resets = counters->resets;
+  log->gap8Uptime = counters->uptimeMs;
+  log->link = core->link.state;
+  if (usesGap8(core) && core->link.state != LINK_UP) {
+    log->probability = NAN;
+    core->probability = NAN;
+  }
+}
+
+static uint16_t linkHealth(const appCore_t *core) {
+  switch (core->link.state) {
+    case LINK_UP:
+      return 0;
+    case LINK_FILLING:
+      return APP_LINK_FILLING;
+    case LINK_REFUSED:
+      return APP_MODEL_REFUSED;
+    default:
+      return APP_LINK_DOWN;
+  }
+}
+
+static uint16_t healthOf(appCore_t *core) {
+  static const uint16_t flags[APP_EVENTS] = {APP_NON_FINITE, APP_PARAM_CLAMPED, APP_DROPPED, APP_LATE};
+  uint16_t health = usesGap8(core) ? linkHealth(core) : 0;
+  for (int i = 0; i < APP_EVENTS; i++) {
+    health = (uint16_t)(health | (core->since[i] < APP_RECENT_STEPS ? flags[i] : 0));
+    core->since[i] = (uint16_t)(core->since[i] + (core->since[i] < UINT16_MAX ? 1 : 0));
+  }
+  health = (uint16_t)(health | (core->log.detector != core->params.detector ? APP_NO_GAP8 : 0));
+  return (uint16_t)(health | (core->noSensor ? APP_NO_SENSOR : 0));
+}
+
+bool appCoreStep(appCore_t *core, const appSample_t *sample) {
+  core->log.samples++;
+  if (core->params.enable) {
+    edgeSample_t level;
+    edgeEvent_t event;
+    appLevel(sample, &level);
+    level.probability = core->probability;
+    edgePipelineStep(&core->pipeline, &level, &event);
+    logEvent(core, &event);
+    runDetector(core, &event);
+    logLink(core);
+  }
+  core->log.health = healthOf(core);
+  const bool reported = core->reported;
+  core->reported = false;
+  return reported;
+}
+
+uint16_t appCoreOutgoing(appCore_t *core, uint8_t *bytes) {
+  return core->params.enable && usesGap8(core) ? linkSenderPoll(&core->link, bytes) : 0;
+}
+
+void appCoreSent(appCore_t *core, bool taken) {
+  linkSenderSent(&core->link, taken);
+  if (!taken) {
+    happened(core, EVENT_DROPPED);
+  }
+}
+
+void appCoreTime(appCore_t *core, uint32_t microseconds, bool late) {
+  core->log.load = (uint16_t)(microseconds < UINT16_MAX ? microseconds : UINT16_MAX);
+  core->log.loadMax = core->log.load > core->log.loadMax ? core->log.load : core->log.loadMax;
+  if (late) {
+    core->log.late++;
+    happened(core, EVENT_LATE);
+  }
+}
+
+void appCoreNoSensor(appCore_t *core) { core->noSensor = true; }

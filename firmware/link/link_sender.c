@@ -1,0 +1,218 @@
+#include "link_sender.h"
+
+#include <string.h>
+
+#define HOLD_OFF_STEPS 4
+
+static void restart(linkSender_t *sender, uint8_t session) {
+  sender->session = session;
+  sender->state = LINK_STARTING;
+  sender->outstanding = 0;
+  sender->holdOff = 0;
+  sender->waited = LINK_RETRY_STEPS;
+}
+
+static void restartAnew(linkSender_t *sender) {
+  restart(sender, (uint8_t)(sender->session == 255 ? 1 : sender->session + 1));
+}
+
+void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t digest[EDGE_LINK_DIGEST_BYTES],
+                    uint16_t refill, uint32_t nonce, uint8_t session) {
+  memset(sender, 0, sizeof *sender);
+  memcpy(sender->digest, digest, EDGE_LINK_DIGEST_BYTES);
+  sender->algorithm = algorithm;
+  sender->refill = refill < LINK_HISTORY ? refill : LINK_HISTORY;
+  sender->nonce = nonce;
+  restart(sender, session == 0 ? 1 : session);
+}
+
+static void count(uint16_t *steps) { *steps = (uint16_t)(*steps + (*steps < UINT16_MAX ? 1 : 0)); }
+
+/** Moves the base past what the history no longer holds. */
+static void forget(linkSender_t *sender) {
+  if (sender->samples - sender->base > LINK_HISTORY) {
+    sender->counters.lost += sender->samples - sender->base - LINK_HISTORY;
+    sender->base = sender->samples - LINK_HISTORY;
+    if (edgeLinkAfter(sender->base, sender->next) > 0) {
+      sender->next = sender->base;
+    }
+  }
+}
+
+void linkSenderPush(linkSender_t *sender, const uint8_t sample[EDGE_LINK_SAMPLE_BYTES]) {
+  memcpy(sender->history[sender->samples % LINK_HISTORY], sample, EDGE_LINK_SAMPLE_BYTES);
+  sender->samples++;
+  if (sender->state == LINK_STARTING || sender->state == LINK_REFUSED) {
+    const uint32_t held = sender->samples < sender->refill ? sender->samples : sender->refill;
+    sender->base = sender->samples - held;
+    sender->next = sender->base;
+  }
+  forget(sender);
+  count(&sender->silent);
+  count(&sender->waited);
+  sender->holdOff = (uint8_t)(sender->holdOff - (sender->holdOff > 0 ? 1 : 0));
+  if (sender->silent >= LINK_DOWN_STEPS && (sender->state == LINK_UP || sender->state == LINK_FILLING)) {
+    sender->state = LINK_DOWN;
+  }
+}
+
+static void packReset(const linkSender_t *sender, edgeLinkPacket_t *packet) {
+  packet->type = EDGE_LINK_RESET;
+  packet->sequence = sender->samples;
+  packet->reset.nonce = sender->nonce;
+  packet->reset.algorithm = sender->algorithm;
+  memcpy(packet->reset.digest, sender->digest, EDGE_LINK_DIGEST_BYTES);
+}
+
+/** The samples from `next` on; those before it that are unconfirmed fill the packet up. */
+static void packFeatures(linkSender_t *sender, edgeLinkPacket_t *packet) {
+  uint32_t from = sender->next;
+  const uint32_t unconfirmed = sender->samples - sender->base;
+  if (sender->samples - from < EDGE_LINK_SAMPLES) {
+    from = sender->samples - (unconfirmed < EDGE_LINK_SAMPLES ? unconfirmed : EDGE_LINK_SAMPLES);
+  }
+  const uint32_t left = sender->samples - from;
+  packet->type = EDGE_LINK_FEATURES;
+  packet->sequence = from;
+  packet->features.back = (uint16_t)(from - sender->base);
+  packet->features.count = (uint8_t)(left < EDGE_LINK_SAMPLES ? left : EDGE_LINK_SAMPLES);
+  for (uint32_t i = 0; i < packet->features.count; i++) {
+    memcpy(packet->features.sample[i], sender->history[(from + i) % LINK_HISTORY], EDGE_LINK_SAMPLE_BYTES);
+  }
+  sender->sending = true;
+  sender->sendingFrom = sender->next;
+  sender->next = from + packet->features.count;
+}
+
+/** Whether the sender may speak; goes back to the base where no answer has come for too long. */
+static bool mayContinue(linkSender_t *sender) {
+  const bool silent = sender->silent >= LINK_RETRY_STEPS;
+  if (silent && sender->waited >= LINK_RETRY_STEPS) {
+    sender->counters.timeouts++;
+    sender->next = sender->base;
+    sender->outstanding = 0;
+    sender->waited = 0;
+    return true;
+  }
+  return !silent && sender->outstanding < LINK_WINDOW;
+}
+
+uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes) {
+  edgeLinkPacket_t packet = {.session = sender->session};
+  sender->sending = false;
+  const bool refused = sender->state == LINK_REFUSED;
+  if (refused || sender->state == LINK_STARTING) {
+    if (sender->waited < (refused ? LINK_REFUSED_STEPS : LINK_RETRY_STEPS)) {
+      return 0;
+    }
+    sender->waited = 0;
+    packReset(sender, &packet);
+  } else {
+    if (sender->next == sender->samples && sender->silent < LINK_RETRY_STEPS) {
+      return 0;
+    }
+    if (sender->base == sender->samples || !mayContinue(sender)) {
+      return 0;
+    }
+    packFeatures(sender, &packet);
+  }
+  return edgeLinkPack(&packet, bytes);
+}
+
+void linkSenderSent(linkSender_t *sender, bool taken) {
+  if (taken) {
+    sender->counters.sent++;
+    sender->outstanding = (uint8_t)(sender->outstanding + (sender->sending && sender->outstanding < 255 ? 1 : 0));
+    return;
+  }
+  sender->counters.dropped++;
+  if (sender->sending) {
+    sender->next = sender->sendingFrom;
+  }
+}
+
+static int newAnswers(linkSender_t *sender, const edgeLinkResult_t *result, linkAnswer_t *answers) {
+  int found = 0;
+  for (int i = 0; i < result->count; i++) {
+    const edgeLinkAnswer_t *answer = &result->answer[i];
+    const uint32_t sequence = result->expected - answer->back;
+    const bool known = sender->answered && edgeLinkAfter(sequence, sender->lastAnswer) <= 0;
+    if (answer->back == 0 || known) {
+      continue;
+    }
+    sender->answered = true;
+    sender->lastAnswer = sequence;
+    answers[found].sequence = sequence;
+    memcpy(answers[found].output, answer->output, EDGE_LINK_OUTPUTS);
+    found++;
+  }
+  return found;
+}
+
+/** Confirms what the receiver has, and goes back where it lacks something. */
+static void confirm(linkSender_t *sender, const edgeLinkResult_t *result) {
+  if (edgeLinkAfter(result->expected, sender->base) > 0) {
+    sender->base = result->expected;
+    if (edgeLinkAfter(sender->base, sender->next) > 0) {
+      sender->next = sender->base;
+    }
+  }
+  if ((result->flags & EDGE_LINK_GAP) && sender->holdOff == 0) {
+    sender->counters.goneBack++;
+    sender->next = sender->base;
+    sender->holdOff = HOLD_OFF_STEPS;
+  }
+}
+
+static int takeResult(linkSender_t *sender, const edgeLinkResult_t *result, linkAnswer_t *answers) {
+  sender->outstanding = 0;
+  if (result->flags & EDGE_LINK_MISMATCH) {
+    sender->state = LINK_REFUSED;
+    return 0;
+  }
+  if (result->flags & EDGE_LINK_UNKNOWN) {
+    sender->counters.resets += sender->state == LINK_STARTING ? 0 : 1;
+    restartAnew(sender);
+    return 0;
+  }
+  const bool empty = (result->flags & EDGE_LINK_EMPTY) != 0;
+  if (!empty && edgeLinkAfter(result->expected, sender->samples) > 0) {
+    restartAnew(sender);  // it confirms what was never sent: not our stream
+    return 0;
+  }
+  sender->state = result->flags & (EDGE_LINK_FILLING | EDGE_LINK_EMPTY) ? LINK_FILLING : LINK_UP;
+  if (empty) {
+    return 0;
+  }
+  confirm(sender, result);
+  return newAnswers(sender, result, answers);
+}
+
+int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, linkAnswer_t *answers) {
+  edgeLinkPacket_t packet;
+  if (!edgeLinkParse(bytes, length, &packet)) {
+    sender->counters.refused++;
+    return 0;
+  }
+  const bool result = packet.type == EDGE_LINK_RESULT;
+  if (!result && packet.type != EDGE_LINK_HEARTBEAT) {
+    sender->counters.refused++;
+    return 0;
+  }
+  sender->counters.received++;
+  if (!result) {
+    sender->counters.uptimeMs = packet.heartbeat.uptimeMs;
+    if (packet.session != sender->session && sender->state != LINK_STARTING && sender->state != LINK_REFUSED) {
+      sender->counters.resets++;
+      restartAnew(sender);
+    }
+    return 0;
+  }
+  if (packet.session != sender->session) {
+    return 0;  // an answer to an earlier session
+  }
+  sender->silent = 0;
+  return takeResult(sender, &packet.result, answers);
+}
+
+uint32_t linkSenderBacklog(const linkSender_t *sender) { return sender->samples - sender->base; }

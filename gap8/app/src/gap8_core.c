@@ -1,0 +1,78 @@
+#include "gap8_core.h"
+
+#include <string.h>
+
+#include "feature_window.h"
+#include "stream_window.h"
+
+static void resetStream(void *context) {
+  gap8Stream_t *stream = context;
+  streamInt8Reset(stream->network, &stream->state, stream->arena);
+}
+
+static bool stepStream(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_BYTES],
+                       int8_t output[EDGE_LINK_OUTPUTS]) {
+  gap8Stream_t *stream = context;
+  const int8_t *logits = streamInt8Step(stream->network, &stream->state, (const int8_t *)sample);
+  if (logits == NULL) {
+    return false;
+  }
+  memcpy(output, logits, EDGE_LINK_OUTPUTS);
+  return true;
+}
+
+static void resetWindow(void *context) {
+  gap8Window_t *window = context;
+  window->rows = 0;
+  window->oldest = 0;
+}
+
+static bool stepWindow(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_BYTES],
+                       int8_t output[EDGE_LINK_OUTPUTS]) {
+  gap8Window_t *window = context;
+  const int32_t columns = AIRTOUCH_MODEL_COLUMNS;
+  memcpy(window->ring + window->oldest * columns, sample, EDGE_LINK_SAMPLE_BYTES);  // little endian at both ends
+  window->oldest = window->oldest + 1 < AIRTOUCH_MODEL_ROWS ? window->oldest + 1 : 0;
+  window->rows += window->rows < AIRTOUCH_MODEL_ROWS ? 1 : 0;
+  if (window->rows < AIRTOUCH_MODEL_ROWS) {
+    return false;
+  }
+  const int32_t tail = GAP8_VALUES - window->oldest * columns;
+  memcpy(window->window, window->ring + window->oldest * columns, (size_t)tail * sizeof(float));
+  memcpy(window->window + tail, window->ring, (size_t)(GAP8_VALUES - tail) * sizeof(float));
+  zScoreWindow(window->window, AIRTOUCH_MODEL_ROWS, AIRTOUCH_MODEL_COLUMNS, window->window);
+  networkInt8Quantise(window->network, window->window, GAP8_VALUES, window->quantised);
+  const int8_t *logits = networkInt8Run(window->network, window->quantised, window->arena);
+  memcpy(output, logits, AIRTOUCH_MODEL_OUTPUTS);
+  return true;
+}
+
+void gap8CoreInit(gap8Core_t *core, const streamInt8_t *stream, const networkInt8_t *window) {
+  memset(core, 0, sizeof *core);
+  core->stream.network = stream;
+  core->window.network = window;
+  core->networks[0] = (linkNetwork_t){.context = &core->stream,
+                                      .reset = resetStream,
+                                      .step = stepStream,
+                                      .window = streamWindow(stream),
+                                      .stride = (uint16_t)stream->stride,
+                                      .algorithm = EDGE_LINK_BEST};
+  core->networks[1] = (linkNetwork_t){.context = &core->window,
+                                      .reset = resetWindow,
+                                      .step = stepWindow,
+                                      .window = AIRTOUCH_MODEL_ROWS,
+                                      .stride = 1,
+                                      .algorithm = EDGE_LINK_PAPER};
+  edgeLinkDigest(AIRTOUCH_STREAM_SHA256, core->networks[0].digest);
+  edgeLinkDigest(AIRTOUCH_MODEL_SHA256, core->networks[1].digest);
+  resetStream(&core->stream);
+  linkReceiverInit(&core->receiver, core->networks, GAP8_NETWORKS);
+}
+
+uint16_t gap8CoreTake(gap8Core_t *core, const uint8_t *bytes, uint16_t length, uint8_t *reply) {
+  return linkReceiverTake(&core->receiver, bytes, length, reply);
+}
+
+uint16_t gap8CoreHeartbeat(gap8Core_t *core, uint32_t uptimeMs, uint8_t *bytes) {
+  return linkReceiverHeartbeat(&core->receiver, uptimeMs, bytes);
+}
