@@ -1,0 +1,152 @@
+"""Which command to send when: legs against the drone's clock, answers, silence and requests to stop.
+
+A state machine without threads and without a radio. The firmware answers every command of the high-level
+commander; one that is not answered is sent again. While the link is silent the firmware finishes
+its leg and hovers there, so a stop means: land as soon as a command gets through.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from airtouch.crazyflie.mission import LANDING_MPS, Leg
+
+RESEND_S = 0.3  #: without an answer the command goes out again
+TRIES = 8  #: then, if the drone is heard all the same, it counts as taken
+SETTLE_S = 1.0  #: after a landing, until the motors are told to stop
+BUSY = 16  #: the firmware's EBUSY: the supervisor does not let it fly
+CODES = {"take-off": 7, "land": 8, "go": 12, "stop": 3}  #: as answered; go is 4 before protocol 8
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command for the high-level commander: kind take-off, go, land or stop; metres, radians, seconds."""
+
+    kind: str
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+    yaw_rad: float = 0.0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where and how the drone stood before take-off, in its own estimate."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+    yaw_rad: float = 0.0
+
+
+@dataclass
+class Autopilot:
+    """Flies legs. Call `step` often; it says what to send. `phase` is mission, landing or done.
+
+    refused: why the drone would not do what it was told, once it says so. reason: why it landed early.
+    """
+
+    legs: Sequence[Leg]
+    origin: Origin = field(default_factory=Origin)
+    phase: str = "mission"
+    reason: str | None = None
+    refused: str | None = None
+    index: int = -1
+    in_air: bool = False
+    _command: Command | None = None
+    _answered: bool = True
+    _tries: int = 0
+    _sent_s: float = -math.inf
+    _until_s: float = -math.inf
+    _wall_sent_s: float = -math.inf
+
+    @property
+    def leg(self) -> Leg | None:
+        """The leg being flown."""
+        return self.legs[self.index] if 0 <= self.index < len(self.legs) else None
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the last command was not answered yet."""
+        return not self._answered
+
+    def answer(self, kind: str, code: int) -> None:
+        """What the drone said to a command of this kind; 0 is yes. Late answers to others are passed over."""
+        if self._command is None or kind != self._command.kind or self._answered:
+            return
+        repeated = self._tries > 1  # the first may have been taken and its answer lost
+        if code == 0 or self.phase == "landing" or (repeated and code != BUSY):
+            self._answered = True
+            return
+        self.refused = f"the drone refused {kind} (code {code}); restart it"
+        if code == BUSY:
+            self.refused = f"the drone's supervisor refuses {kind}: it is not ready to fly; put it upright and restart it"
+        self.in_air = self.in_air and kind != "take-off"
+        self.land(self.refused)
+
+    def land(self, reason: str | None) -> None:
+        """Stop the mission and come down; without a drone in the air just end."""
+        if self.phase != "mission":
+            return
+        self.reason = reason
+        if not self.in_air:
+            self.phase = "done"
+            return
+        self.phase, self._command = "landing", None
+        self._until_s = -math.inf
+
+    def step(self, now_s: float, wall_s: float, silence_s: float = 0.0) -> list[Command]:
+        """Commands to send now. now_s: the drone's clock. wall_s: the host's. silence_s: since a packet came."""
+        if self.phase == "done":
+            return []
+        if self._command is not None and not self._answered:
+            return self._again(now_s, wall_s, silence_s)
+        if now_s < self._until_s:
+            return []
+        if self.phase == "landing":
+            return self._come_down(now_s, wall_s)
+        self.index += 1
+        if self.index >= len(self.legs):
+            self.phase = "done"
+            return [Command("stop")] if self.in_air else []
+        leg = self.legs[self.index]
+        if leg.kind in ("wait", "hover"):
+            landed = leg.kind == "wait" and self.in_air
+            self.in_air = self.in_air and leg.kind != "wait"
+            self._until_s = max(now_s, self._until_s if math.isfinite(self._until_s) else now_s) + leg.seconds
+            return [Command("stop")] if landed else []
+        self.in_air = True
+        return self._send(self._of(leg), now_s, wall_s)
+
+    def _come_down(self, now_s: float, wall_s: float) -> list[Command]:
+        if self._command is not None:  # it was sent, answered, and its time is over
+            self.phase, self.in_air = "done", False
+            return [Command("stop")]
+        height = max((leg.z_m for leg in self.legs[:self.index + 1]), default=0.0)
+        seconds = max(2.0, height / LANDING_MPS)
+        return self._send(Command("land", z_m=self.origin.z_m, seconds=seconds), now_s, wall_s)
+
+    def _send(self, command: Command, now_s: float, wall_s: float) -> list[Command]:
+        self._command, self._answered, self._tries = command, False, 1
+        self._sent_s, self._wall_sent_s = now_s, wall_s
+        rest = SETTLE_S if command.kind == "land" else 0.0
+        self._until_s = now_s + command.seconds + rest
+        return [command]
+
+    def _again(self, now_s: float, wall_s: float, silence_s: float) -> list[Command]:
+        if wall_s - self._wall_sent_s < RESEND_S:
+            return []
+        if self._tries >= TRIES and silence_s < RESEND_S:
+            self._answered = True
+            return []
+        tries = self._tries + 1
+        sent = self._send(self._command, now_s, wall_s)
+        self._tries = tries
+        return sent
+
+    def _of(self, leg: Leg) -> Command:
+        o = self.origin
+        cos, sin = math.cos(o.yaw_rad), math.sin(o.yaw_rad)
+        return Command(leg.kind, o.x_m + cos * leg.x_m - sin * leg.y_m, o.y_m + sin * leg.x_m + cos * leg.y_m,
+                       o.z_m + leg.z_m, o.yaw_rad, leg.seconds)

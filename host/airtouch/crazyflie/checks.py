@@ -1,0 +1,83 @@
+"""What must be right before take-off, each fault in one line with its remedy."""
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from airtouch.errors import AirTouchError
+
+LEAST_V = 3.7  #: on the ground; a LiPo cell below it has a third of its charge
+LOWEST_V = 3.1  #: in flight: land
+CONFLICTS = {"is tumbled": 5, "is locked": 6, "has crashed": 7}
+#: integer types of parameters: least and greatest value
+INTEGERS = {f"{sign}int{bits}_t": (0, 2**bits - 1) if sign else (-(2**(bits - 1)), 2**(bits - 1) - 1)
+            for bits in (8, 16, 32, 64) for sign in ("u", "")}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What the drone says of itself: battery (V), decks by parameter, supervisor bits, down range (m)."""
+
+    vbat_v: float
+    decks: Mapping[str, bool]
+    supervisor: int | None = None
+    zrange_m: float | None = None
+
+    def has(self, *decks: str) -> bool:
+        """Whether one of the decks is there."""
+        return any(self.decks.get(deck, False) for deck in decks)
+
+
+def problems(seen: Condition, least_v: float = LEAST_V) -> list[str]:
+    """Why it must not take off: one line each, the remedy in it; empty when it may."""
+    found = []
+    if not seen.vbat_v >= least_v:
+        found.append(f"battery at {seen.vbat_v:.2f} V, less than {least_v:.2f} V; charge it "
+                     "(--min-battery lowers the limit)")
+    if not seen.has("bcFlow2", "bcFlow"):
+        found.append("no Flow deck found (deck.bcFlow2 is 0): without it the drone cannot hold its place; "
+                     "attach it and restart the drone")
+    elif seen.zrange_m is not None and not seen.zrange_m < 0.3:
+        found.append(f"the down range reads {seen.zrange_m:.2f} m on the ground; clean or replace the Flow deck's sensor")
+    if seen.supervisor is not None:
+        found += [f"the drone {what}; put it upright and restart it" for what, bit in CONFLICTS.items()
+                  if seen.supervisor >> bit & 1]
+    return found
+
+
+def notes(seen: Condition) -> list[str]:
+    """What is good to know and no reason to stay on the ground."""
+    found = []
+    if not seen.has("bcMultiranger"):
+        found.append("no Multi-ranger: landmarks are not logged; the down range alone tells the true edges")
+    if not seen.has("bcAI"):
+        found.append("no AI-deck: the network does not run on a GAP8 in this flight")
+    return found
+
+
+def parse_setting(text: str) -> tuple[str, str]:
+    """"group.name=value" as its two parts."""
+    name, equals, value = text.partition("=")
+    if not equals or name.count(".") != 1 or not value:
+        raise AirTouchError(f"--param {text}: write it as group.name=value")
+    return name.strip(), value.strip()
+
+
+def representable(name: str, text: str, ctype: str) -> float:
+    """The value as the parameter's type holds it. Raises AirTouchError where it cannot."""
+    if ctype in INTEGERS:
+        low, high = INTEGERS[ctype]
+        try:
+            value = int(text, 0)
+        except ValueError:
+            raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; give a whole number") from None
+        if not low <= value <= high:
+            raise AirTouchError(f"{name} = {text}: out of range; the drone keeps it as {ctype}, {low} to {high}")
+        return value
+    try:
+        value = float(text)
+        return struct.unpack("<f", struct.pack("<f", value))[0]
+    except ValueError:
+        raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; give a number") from None
+    except OverflowError:
+        raise AirTouchError(f"{name} = {text}: out of range for {ctype}") from None

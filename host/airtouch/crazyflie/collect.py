@@ -1,0 +1,221 @@
+"""`collect`: from a connected drone to flights on the disk."""
+
+import csv
+import datetime
+import io
+import math
+import os
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from airtouch import __version__
+from airtouch.crazyflie import blocks, checks, recorder
+from airtouch.crazyflie.autopilot import Autopilot, Origin
+from airtouch.crazyflie.drone import Drone, drain
+from airtouch.crazyflie.flight import LINK_TIMEOUT_S, Flight
+from airtouch.crazyflie.guard import guarding
+from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.mission import LANDING_MPS, Mission
+from airtouch.crazyflie.recorder import LEAST_FREE_BYTES, Recorder
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
+
+DECKS = ("bcFlow2", "bcFlow", "bcMultiranger", "bcAI", "bcZRanger2", "bcLighthouse4", "bcLoco")
+FIRST_DATA_S = 3.0
+RESET_S = 1.0  #: that the estimator gets to settle
+MANIFEST_COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
+CLEAN_LOSS = 0.01  #: share of lost samples up to which a flight counts as clean
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What `collect` was asked for."""
+
+    uri: str
+    out: Path
+    name: str
+    vehicle: str = "crazyflie-2.1-flow"
+    settings: Sequence[tuple[str, str]] = ()
+    least_v: float = checks.LEAST_V
+    link_timeout_s: float = LINK_TIMEOUT_S
+    force: bool = False
+    guarded: bool = True
+
+
+@dataclass
+class Outcome:
+    """One flight on the disk: its file, how it ended, and the log itself."""
+
+    path: Path
+    ended: str
+    log: FlightLog
+    silences: list[float] = field(default_factory=list)
+
+    @property
+    def planned(self) -> bool:
+        """Whether the mission was flown to its end."""
+        return self.ended == "as planned"
+
+
+@dataclass
+class Readiness:
+    """A drone that may fly: what it is, which slow block it logs, and where it stands."""
+
+    condition: checks.Condition
+    slow: blocks.Block | None
+    firmware: str
+
+
+def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
+    """Make the folder, see that there is room, and finish what a killed run left. AirTouchError otherwise."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        free = shutil.disk_usage(out).free
+    except OSError as error:
+        raise AirTouchError(f"{out}: cannot make this folder: {error.strerror}") from None
+    if not os.access(out, os.W_OK):
+        raise AirTouchError(f"{out}: cannot be written to; choose another --out")
+    if free < LEAST_FREE_BYTES:
+        raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, {LEAST_FREE_BYTES / 2**20:.0f} are needed")
+    for path in recorder.recover(out):
+        say(f"{path}: recovered from a flight whose process was killed")
+
+
+def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readiness:
+    """Check log variables, block size, decks; start the log blocks; set parameters.
+
+    Raises AirTouchError with one line a fault. Nothing has moved yet.
+    """
+    known = drone.variables
+    blocks.check(blocks.MOTION, known)
+    decks = {deck: bool(drone.parameter(f"deck.{deck}") or 0) for deck in DECKS if drone.has_parameter(f"deck.{deck}")}
+    without = () if decks.get("bcMultiranger") else blocks.MULTIRANGER
+    slow = blocks.available(blocks.STATE, known, without)
+    blocks.check(slow, known)
+    slow = slow if slow.variables else None
+    for name, text in plan.settings:
+        drone.set_parameter(name, text)
+    drone.start(blocks.MOTION)
+    if slow:
+        drone.start(slow)
+    intake = listen(drone, slow, FIRST_DATA_S)
+    condition = checks.Condition(intake.latest["vbat_V"], decks, intake.supervisor, intake.latest["zrange_m"])
+    found = checks.problems(condition, plan.least_v)
+    if found:
+        for line in found[:-1]:
+            say(f"not ready: {line}")
+        raise AirTouchError(f"not ready: {found[-1]}")
+    for line in checks.notes(condition):
+        say(line)
+    return Readiness(condition, slow, firmware(drone))
+
+
+def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake:
+    """Packets until both blocks came, or for so long. Raises AirTouchError when the fast one did not."""
+    drain(drone.samples)
+    intake, until = Intake(slow), time.monotonic() + patience_s
+    while time.monotonic() < until:
+        intake.take(drain(drone.samples))
+        if intake.received > 20 and (slow is None or intake._past):
+            return intake
+        time.sleep(0.02)
+    if not intake.received:
+        raise AirTouchError(f"the log block started, but no data came within {patience_s:g} s; is the link good?")
+    return intake
+
+
+def firmware(drone: Drone) -> str:
+    """The firmware's revision, as far as it says."""
+    parts = [drone.parameter(f"firmware.revision{i}", 2.0) for i in (0, 1)]
+    if None in parts:
+        return "unknown"
+    dirty = "+" if drone.parameter("firmware.modified", 2.0) else ""
+    return f"{int(parts[0]):08x}{int(parts[1]):04x}{dirty}"
+
+
+def reset_estimator(drone: Drone) -> None:
+    """Let the position estimate start at this place, where the firmware can."""
+    if drone.has_parameter("kalman.resetEstimation"):
+        drone.set_parameter("kalman.resetEstimation", "1")
+        time.sleep(0.1)
+        drone.set_parameter("kalman.resetEstimation", "0")
+        time.sleep(RESET_S)
+
+
+def origin_of(latest: dict[str, float]) -> Origin:
+    """Where the drone thinks that it stands; zero where it does not say."""
+    values = [latest.get(name, math.nan) for name in ("x_m", "y_m", "z_m", "yaw_rad")]
+    return Origin(*(v if math.isfinite(v) else 0.0 for v in values))
+
+
+def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int, *, stop: Event,
+        say: Callable[[str], None], show: Callable[[Flight], None] = lambda _: None) -> Outcome:
+    """One flight, from the ground to the file. Raises AirTouchError where it could not be written."""
+    reset_estimator(drone)
+    standing = listen(drone, ready.slow, FIRST_DATA_S)
+    found = checks.problems(replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor),
+                            plan.least_v)
+    if found:
+        raise AirTouchError(f"not ready: {found[0]}")
+    origin = origin_of(standing.latest)
+    intake = Intake(ready.slow)
+    path = recorder.flight_path(plan.out, plan.name, number)
+    book = Recorder(path, intake.names, meta_of(drone, ready, mission, plan, number), plan.force)
+    height = max((leg.z_m for leg in mission.legs), default=0.0)
+    watch = guarding(plan.uri, origin.z_m, max(2.0, height / LANDING_MPS)) if plan.guarded else nullcontext(None)
+    ended = "an error"
+    with watch as guard:
+        flight = Flight(drone, Autopilot(mission.legs, origin), intake, book, stop, plan.link_timeout_s, show, say)
+        try:
+            ended = flight.run()
+        finally:
+            if guard is not None:
+                guard.landed = flight.landed
+            log = book.finish(ended=ended, silences_s=flight.silences)
+    outcome = Outcome(path, ended, log, flight.silences)
+    if len(log):
+        list_flight(plan.out, outcome, mission, number)
+    if flight.pilot.refused:
+        raise AirTouchError(flight.pilot.refused)
+    return outcome
+
+
+def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int) -> dict[str, Any]:
+    """What is known of a flight before it is flown."""
+    now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+    held = {"period_s": blocks.STATE.period_ms / 1000.0, "longest_s": blocks.HELD_S} if ready.slow else {}
+    return {
+        "vehicle": plan.vehicle, "condition": dict(mission.values), "acc_frame": "body", "mission": mission.name,
+        "speed_mps": mission.speed_mps, "flight": number, "firmware": ready.firmware, "protocol": drone.protocol,
+        "decks": sorted(deck for deck, there in ready.condition.decks.items() if there), "uri": plan.uri,
+        "started": now, "recorded_by": f"airtouch {__version__}", "held_columns": held, "warnings": [],
+        "settings": [f"{name}={text}" for name, text in plan.settings],
+    }
+
+
+def list_flight(folder: Path, outcome: Outcome, mission: Mission, number: int) -> None:
+    """Add a flight to the folder's manifest.csv, which `evaluate` reads; clean when it went as planned."""
+    path = folder / "manifest.csv"
+    rows = []
+    if path.is_file():
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row.get("file") != outcome.path.name]
+    total = len(outcome.log) + outcome.log.meta["lost_samples"]
+    clean = outcome.planned and outcome.log.meta["lost_samples"] <= CLEAN_LOSS * total
+    clearance = mission.values.get("clearance")
+    rows.append({"file": outcome.path.name, "use": "clean" if clean else "messy", "fold": number % 5,
+                 "height": f"{1000 * clearance:.0f}mm" if clearance is not None else "",
+                 "angle_deg": mission.values.get("angle", ""), "wind": mission.values.get("wind", "none"),
+                 "speed_mps": mission.speed_mps or ""})
+    text = io.StringIO()
+    writer = csv.DictWriter(text, MANIFEST_COLUMNS, extrasaction="ignore", restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_bytes(text.getvalue().encode(), path, force=True)

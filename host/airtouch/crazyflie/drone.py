@@ -1,0 +1,281 @@
+"""One Crazyflie through cflib: connection, log blocks, parameters, commands, answers. Thin on purpose."""
+
+import logging
+import queue
+import struct
+import threading
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from airtouch.crazyflie.autopilot import CODES, Command
+from airtouch.crazyflie.blocks import Block
+from airtouch.crazyflie.checks import representable
+from airtouch.errors import AirTouchError
+
+CONNECT_S = 20.0
+ATTEMPT_S = 4.0  #: a first packet that is lost over UDP is never asked for again
+BLOCK_S = 3.0
+ECHO_CHANNEL, LINKCTRL = 0, 15
+KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
+LOG_PORT, SETTINGS_CHANNEL = 5, 1
+LOG_COMMANDS = {0: "create", 1: "append to", 3: "start", 6: "create", 7: "append to"}
+LOG_ERRORS = {2: "a variable or the block is unknown to it", 7: "it is larger than a packet",
+              8: "it does not know the command", 12: "its memory for log blocks is full; restart the drone",
+              17: "another block has its number"}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One log packet: its block, the drone's 24-bit clock (ms), arrival (host, s) and values."""
+
+    block: str
+    stamp: int
+    arrival_s: float
+    values: dict[str, float]
+
+
+def cflib_or_error() -> Any:
+    """The cflib package; AirTouchError with the remedy where it is not installed. Its own messages are silenced."""
+    try:
+        import cflib.crtp
+        import cflib.crazyflie
+    except ImportError:
+        raise AirTouchError("flying needs cflib: pip install 'airtouch[fly]'") from None
+    logger = logging.getLogger("cflib")
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
+        logger.propagate = False
+    if not cflib.crtp.CLASSES:
+        cflib.crtp.init_drivers()
+    return cflib
+
+
+class Drone:
+    """A connected drone. `samples` and `answers` fill up from cflib's thread; everything else is called from ours.
+
+    Raises AirTouchError for a URI that nobody answers at.
+    """
+
+    def __init__(self, uri: str, cache: Path | None = None, patience_s: float = CONNECT_S) -> None:
+        self.uri, self.cache = uri, cache
+        self.samples: queue.SimpleQueue[Sample] = queue.SimpleQueue()
+        self.answers: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
+        self.console: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self.blocks: list[Block] = []
+        self.lost = threading.Event()
+        self.round_trip_s = float("nan")
+        self._refusals: queue.SimpleQueue[tuple[int, int]] = queue.SimpleQueue()
+        self._started: set[str] = set()
+        self._cf: Any = None
+        self._open(patience_s)
+
+    # connection
+
+    def _open(self, patience_s: float) -> None:
+        cflib = cflib_or_error()
+        deadline, reason = time.monotonic() + patience_s, "nobody answers there"
+        while time.monotonic() < deadline:
+            cf = cflib.crazyflie.Crazyflie(rw_cache=str(self.cache) if self.cache else None)
+            done, failure = threading.Event(), []
+            heard = threading.Event()
+            cf.connected.add_callback(lambda _: done.set())
+            cf.link_established.add_callback(lambda _: heard.set())
+            cf.connection_failed.add_callback(lambda _, text: (failure.append(str(text)), done.set()))
+            cf.connection_lost.add_callback(lambda _, text: (failure.append(str(text)), done.set()))
+            cf.open_link(self.uri)
+            if cf.link is not None:
+                cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
+            limit = min(deadline, time.monotonic() + ATTEMPT_S)
+            while not done.is_set() and time.monotonic() < limit:
+                done.wait(0.1)
+                if heard.is_set():
+                    limit = deadline
+            if done.is_set() and not failure:
+                self._listen(cf)
+                return
+            if failure:
+                reason = failure[0].strip().splitlines()[0]
+            self._drop(cf)
+            if failure and time.monotonic() + 1.0 < deadline:
+                time.sleep(0.5)
+        raise AirTouchError(f"{self.uri}: no connection: {reason}; is the drone on, the radio plugged in and the URI "
+                            "right (radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850)?")
+
+    def _listen(self, cf: Any) -> None:
+        self._cf = cf
+        self.lost.clear()
+        cf.connection_lost.add_callback(lambda *_: self.lost.set())
+        cf.add_port_callback(8, self._on_answer)
+        cf.add_header_callback(self._on_log_setting, LOG_PORT, SETTINGS_CHANNEL)
+        cf.console.receivedChar.add_callback(self.console.put)
+        cf.link_statistics.stop()  # its thread would wait for itself, for ever, where the link breaks under it
+        cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
+
+    @staticmethod
+    def _drop(cf: Any) -> None:
+        """Close without the zero set-point that cflib sends: it would stop the motors of a flying drone."""
+        link, cf.link = cf.link, None
+        if link is not None:
+            link.close()
+        cf.close_link()
+
+    def reopen(self, patience_s: float) -> None:
+        """Connect anew after the link died, with the same log blocks. Raises AirTouchError if it stays dead."""
+        blocks, self.blocks = self.blocks, []
+        self._drop(self._cf)
+        self._open(patience_s)
+        for block in blocks:
+            self.start(block)
+
+    def close(self) -> None:
+        """Close the link. The drone must be on the ground."""
+        self._drop(self._cf)
+
+    # what it is and has
+
+    @property
+    def variables(self) -> set[str]:
+        """Names of its log variables."""
+        return {f"{group}.{name}" for group, names in self._cf.log.toc.toc.items() for name in names}
+
+    def has_parameter(self, name: str) -> bool:
+        """Whether the firmware knows the parameter."""
+        return self._cf.param.toc.get_element(*name.split(".", 1)) is not None
+
+    def parameter(self, name: str, patience_s: float = 10.0) -> float | None:
+        """A parameter's value, None where the firmware has none of that name or it never came."""
+        if not self.has_parameter(name):
+            return None
+        group, short = name.split(".", 1)
+        deadline = time.monotonic() + patience_s
+        while time.monotonic() < deadline:
+            value = self._cf.param.values.get(group, {}).get(short)
+            if value is not None:
+                return float(value)
+            time.sleep(0.02)
+        return None
+
+    def set_parameter(self, name: str, text: str, patience_s: float = 10.0) -> None:
+        """Set a parameter and see that the drone took it. Raises AirTouchError where it did not or cannot."""
+        element = self._cf.param.toc.get_element(*name.split(".", 1))
+        if element is None:
+            raise AirTouchError(f"{name}: this firmware has no such parameter")
+        if element.get_readable_access() == "RO":
+            raise AirTouchError(f"{name}: this parameter is read-only")
+        wanted = representable(name, text, element.ctype)
+        if self.parameter(name, patience_s) is None:
+            raise AirTouchError(f"{name}: the drone does not tell its value; is the link good?")
+        echoed, told = threading.Event(), []
+
+        def seen(_: str, value: str) -> None:
+            told.append(float(value))
+            echoed.set()
+
+        group, short = name.split(".", 1)
+        self._cf.param.add_update_callback(group, short, seen)
+        try:
+            deadline = time.monotonic() + patience_s
+            while not self._cf.param.is_updated and time.monotonic() < deadline:
+                time.sleep(0.02)
+            self._cf.param.set_value(name, wanted)
+            echoed.wait(patience_s)
+            self._cf.param.request_param_update(name)  # what it says it was given is not what it keeps
+            count = len(told)
+            while len(told) <= count and time.monotonic() < deadline:
+                time.sleep(0.02)
+        finally:
+            self._cf.param.remove_update_callback(group, short, seen)
+        if not told:
+            raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
+        if abs(told[-1] - wanted) > 1e-6 * max(abs(wanted), 1.0):
+            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {told[-1]:g}")
+
+    @property
+    def protocol(self) -> int:
+        """Version of its radio protocol."""
+        return int(self._cf.platform.get_protocol_version())
+
+    # log blocks
+
+    def start(self, block: Block) -> None:
+        """Have a block logged into `samples`. Raises AirTouchError that says what the drone has against it."""
+        from cflib.crazyflie.log import LogConfig
+
+        while not self._refusals.empty():
+            self._refusals.get()
+        config = LogConfig(block.name, block.period_ms)
+        for name, kind in block.variables:
+            config.add_variable(name, kind)
+        started = threading.Event()
+        config.started_cb.add_callback(lambda _, on: started.set() if on else None)
+        config.data_received_cb.add_callback(
+            lambda stamp, values, _: self.samples.put(Sample(block.name, stamp, time.monotonic(), values)))
+        try:
+            self._cf.log.add_config(config)
+            config.start()
+        except (KeyError, AttributeError) as error:
+            raise AirTouchError(f"log block {block.name}: {str(error).strip(chr(39))}") from None
+        deadline = time.monotonic() + BLOCK_S
+        while not started.wait(0.05):
+            self._raise_refusal(block)
+            if time.monotonic() > deadline:
+                raise AirTouchError(f"log block {block.name}: the drone does not answer; is the link good?")
+        self._raise_refusal(block)
+        self.blocks.append(block)
+
+    def _raise_refusal(self, block: Block) -> None:
+        if not self._refusals.empty():
+            command, code = self._refusals.get()
+            what = LOG_ERRORS.get(code, f"error {code}")
+            raise AirTouchError(f"log block {block.name} rejected: the drone could not {LOG_COMMANDS[command]} it: {what}")
+
+    def _on_log_setting(self, packet: Any) -> None:
+        if len(packet.data) >= 3 and packet.data[0] in LOG_COMMANDS and packet.data[2] not in (0, 17):
+            self._refusals.put((packet.data[0], packet.data[2]))
+
+    # commands
+
+    def ping(self) -> None:
+        """Ask for an echo; `round_trip_s` is what the last one took."""
+        if not self.lost.is_set():
+            self._cf.link_statistics.latency.ping()
+
+    def _on_echo(self, packet: Any) -> None:
+        if len(packet.data) == 9:
+            self.round_trip_s = time.time() - struct.unpack("<Bd", packet.data)[1]
+
+    def send(self, commands: Iterable[Command]) -> None:
+        """Send commands to the high-level commander; answers come in `answers`. Nothing is sent on a dead link."""
+        if self.lost.is_set():
+            return
+        high = self._cf.high_level_commander
+        for c in commands:
+            if c.kind == "take-off":
+                high.takeoff(c.z_m, c.seconds, yaw=c.yaw_rad)
+            elif c.kind == "land":
+                high.land(c.z_m, c.seconds, yaw=None)
+            elif c.kind == "go":
+                high.go_to(c.x_m, c.y_m, c.z_m, c.yaw_rad, c.seconds, linear=self.protocol >= 8)
+            else:
+                high.stop()
+
+    def arm(self) -> None:
+        """Ask to be armed, as brushless drones need; others are armed by themselves."""
+        self._cf.supervisor.send_arming_request(True)
+
+    def _on_answer(self, packet: Any) -> None:
+        if len(packet.data) >= 4 and packet.data[0] in KINDS:
+            self.answers.put((KINDS[packet.data[0]], packet.data[3]))
+
+
+def drain(source: "queue.SimpleQueue[Any]") -> list[Any]:
+    """Everything that is in a queue now."""
+    found = []
+    while True:
+        try:
+            found.append(source.get_nowait())
+        except queue.Empty:
+            return found

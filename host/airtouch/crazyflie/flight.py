@@ -1,0 +1,178 @@
+"""One flight: packets in, rows to the file, commands out, and what makes it land early."""
+
+import statistics
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from threading import Event
+from typing import Protocol
+
+from airtouch.crazyflie.autopilot import Autopilot, Command
+from airtouch.crazyflie.checks import CONFLICTS, LOWEST_V
+from airtouch.crazyflie.drone import drain
+from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.recorder import Recorder
+from airtouch.crazyflie.ticks import Restarted
+from airtouch.errors import AirTouchError
+
+TURN_S = 0.02  #: of the loop
+PING_S = 0.5
+LINK_TIMEOUT_S = 3.0  #: of silence, then it lands as soon as it is heard again
+GIVE_UP_S = 60.0  #: without an answer to the land command
+AFTER_S = 0.5  #: of log after the motors stopped
+BATTERY_SAMPLES = 100
+
+
+class Craft(Protocol):
+    """What a flight needs of a drone; `drone.Drone` is one."""
+
+    samples: object
+    answers: object
+    lost: Event
+
+    def send(self, commands: list[Command]) -> None:
+        """Send commands."""
+
+    def ping(self) -> None:
+        """Ask for an echo."""
+
+    def reopen(self, patience_s: float) -> None:
+        """Connect anew; AirTouchError if that fails."""
+
+
+@dataclass
+class Flight:
+    """Runs one flight to its end. `run` returns how it ended; never leaves a drone in the air on purpose.
+
+    stop: set by whoever wants it to land (Ctrl-C). show: called every turn with the flight.
+    """
+
+    craft: Craft
+    pilot: Autopilot
+    intake: Intake
+    recorder: Recorder
+    stop: Event = field(default_factory=Event)
+    link_timeout_s: float = LINK_TIMEOUT_S
+    show: Callable[["Flight"], None] = lambda _: None
+    say: Callable[[str], None] = lambda _: None
+    silences: list[float] = field(default_factory=list)
+    landed: bool = False
+    _volts: deque = field(default_factory=lambda: deque(maxlen=BATTERY_SAMPLES))
+    _silent_since: float | None = None
+
+    def run(self) -> str:
+        """Fly. Returns how it ended: "as planned", or why it landed early."""
+        began, last_ping, landing_since = time.monotonic(), 0.0, None
+        try:
+            while self.pilot.phase != "done":
+                wall = time.monotonic()
+                if not self._receive():
+                    return self._over("the drone restarted in flight")
+                silence = self._silence(wall, began)
+                for kind, code in drain(self.craft.answers):
+                    self.pilot.answer(kind, code)
+                reason = self._reason(silence)
+                if reason and self.pilot.phase == "mission":
+                    self.say(f"{reason}: landing")
+                    self.pilot.land(reason)
+                    landing_since = wall
+                if self.craft.lost.is_set():
+                    self._reconnect()
+                self.craft.send(self.pilot.step(self._now(silence), wall, silence))
+                if wall - last_ping > PING_S:
+                    self.craft.ping()
+                    last_ping = wall
+                if landing_since and self.pilot.waiting and wall - landing_since > GIVE_UP_S:
+                    return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
+                self.show(self)
+                time.sleep(TURN_S)
+            self._tail()
+            return self._over(self.pilot.reason)
+        except BaseException:
+            self._bring_down()
+            raise
+
+    def _over(self, reason: str | None) -> str:
+        self.landed = True
+        return reason or "as planned"
+
+    def _receive(self) -> bool:
+        """Take what came; False when the drone's clock started anew."""
+        try:
+            times, columns = self.intake.take(drain(self.craft.samples))
+        except Restarted:
+            return False
+        if len(times):
+            self.recorder.add(times, columns)
+            self._volts.extend(columns["vbat_V"])
+        return True
+
+    def _silence(self, wall: float, began: float) -> float:
+        heard = self.intake.last_arrival_s
+        silence = wall - (began if heard is None else max(heard, began))
+        if silence > 0.5 and self._silent_since is None:
+            self._silent_since = wall - silence
+        elif silence < 0.5 and self._silent_since is not None:
+            self.silences.append(round(wall - self._silent_since, 2))
+            self.say(f"the drone is heard again after {self.silences[-1]:.1f} s of silence")
+            self._silent_since = None
+        return silence
+
+    def _now(self, silence: float) -> float:
+        """The drone's clock, running on while nothing comes."""
+        return (self.intake.newest_ms or 0) / 1000.0 + max(silence, 0.0)
+
+    def _reason(self, silence: float) -> str | None:
+        """Why it must land now, if it must."""
+        if self.stop.is_set():
+            return "stopped by the user"
+        if self.recorder.error:
+            return f"the log cannot be written ({self.recorder.error})"
+        if silence > self.link_timeout_s or self.craft.lost.is_set():
+            return f"link lost for {silence:.1f} s"
+        if len(self._volts) == BATTERY_SAMPLES and statistics.median(self._volts) < LOWEST_V:
+            return f"battery at {statistics.median(self._volts):.2f} V"
+        if self.pilot.in_air and self.intake.supervisor is not None:
+            bad = [what for what, bit in CONFLICTS.items() if self.intake.supervisor >> bit & 1]
+            if bad:
+                return f"the drone {bad[0]}"
+        return None
+
+    def _reconnect(self) -> None:
+        self.say("the link broke; connecting anew")
+        try:
+            self.craft.reopen(GIVE_UP_S)
+        except AirTouchError as error:
+            self.say(f"{error}: the drone hovers where its leg ended; land it by hand")
+            self.pilot.phase = "done"
+            self.pilot.reason = f"{self.pilot.reason}; NO CONTACT, land by hand"
+            raise
+
+    def _tail(self) -> None:
+        """Half a second more of log, and "stop" once more in case it was lost."""
+        until = time.monotonic() + AFTER_S
+        while time.monotonic() < until:
+            self._receive()
+            self.craft.send([Command("stop")])
+            time.sleep(5 * TURN_S)
+        self._receive()
+
+    def _bring_down(self) -> None:
+        """Something went wrong here: land first, complain later."""
+        if not self.pilot.in_air:
+            self.landed = True
+            return
+        self.say("an error in flight: landing")
+        command = Command("land", z_m=self.pilot.origin.z_m, seconds=3.0)
+        for _ in range(50):
+            try:
+                self.craft.send([command])
+                time.sleep(0.1)
+                if any(kind == "land" for kind, _ in drain(self.craft.answers)):
+                    self.landed = True
+                    time.sleep(command.seconds + 1.0)
+                    self.craft.send([Command("stop")])
+                    return
+            except Exception:  # whatever it is: the guard process lands when this one gives up
+                return

@@ -1,0 +1,149 @@
+"""Missions: a scenario file's [mission] as the legs that a high-level commander flies.
+
+The file that the simulator flies is the file that the drone flies: way-points, speeds and
+times come from the simulator's own set-points.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation import controller as c
+from airtouch.simulation import scenario
+from airtouch.simulation.mission import RATE_HZ
+
+SHORTEST_S = 0.05  #: a stop shorter than this is a corner, no hover
+LANDING_MPS = 0.3
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One thing to do: kind wait, take-off, go, hover or land; where it ends (m, rad) and how long it takes.
+
+    Positions are relative to the place and heading at take-off: x forward, y left, z up.
+    """
+
+    kind: str
+    x_m: float
+    y_m: float
+    z_m: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Mission:
+    """What is flown: legs, their values, and the scenario that they come from."""
+
+    name: str
+    legs: tuple[Leg, ...]
+    values: dict
+    speed_mps: float | None  #: of the longest level leg, which is what scores need
+
+    @property
+    def seconds(self) -> float:
+        """From the start of the log to the motors' stop."""
+        return sum(leg.seconds for leg in self.legs)
+
+    @property
+    def room_m(self) -> tuple[float, float, float, float, float]:
+        """Least x, greatest x, least y, greatest y, greatest height."""
+        x, y, z = ([0.0, *(getattr(leg, a) for leg in self.legs)] for a in ("x_m", "y_m", "z_m"))
+        return min(x), max(x), min(y), max(y), max(z)
+
+    def describe(self) -> str:
+        """One line: what is flown and how much room it takes."""
+        x0, x1, y0, y1, z1 = self.room_m
+        speed = f", {self.speed_mps:g} m/s" if self.speed_mps else ""
+        return (f"{self.name}: {self.seconds:.0f} s{speed}; x {x0:.1f} to {x1:.1f} m ahead, y {y0:.1f} to {y1:.1f} m "
+                f"to the left, up to {z1:.2f} m high")
+
+
+def names() -> list[str]:
+    """The missions that come with the package."""
+    return sorted(f.name[:-5] for f in _folder().iterdir() if f.name.endswith(".toml"))
+
+
+def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
+    """A mission by name (ready ones and scenarios) or .toml file; its values are drawn by seed and flight.
+
+    Raises AirTouchError in one line for what cannot be read or flown.
+    """
+    if str(name_or_path) in names():
+        text = (_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
+        scene = scenario.parse(text, str(name_or_path))
+    elif Path(name_or_path).suffix != ".toml" and str(name_or_path) not in scenario.names():
+        raise AirTouchError(f"no mission {str(name_or_path)!r}; ready ones: {', '.join(names())}; "
+                            "or give a .toml file")
+    else:
+        scene = scenario.load(name_or_path)
+    plan = scenario.draw_flight(scene, seed, flight)
+    legs = legs_of(plan.setpoints)
+    if not any(leg.kind == "take-off" for leg in legs):
+        raise AirTouchError(f"{scene.name}: this mission never takes off")
+    level = [(leg.seconds, speed) for leg, speed in zip(legs, _speeds(legs), strict=True) if leg.kind == "go"]
+    return Mission(scene.name, tuple(legs), plan.values, round(max(level)[1], 4) if level else None)
+
+
+def legs_of(setpoints: np.ndarray) -> list[Leg]:
+    """The legs of set-points (rows, 8) at 100 Hz: one for each stretch of constant motion.
+
+    A flight that does not end with a landing gets one.
+    """
+    rows = np.asarray(setpoints, dtype=np.float64)
+    places, motors = rows[:, c.X:c.Z + 1], rows[:, c.MOTORS] > 0.0
+    steps = np.diff(places, axis=0, prepend=2 * places[:1] - places[1:2])
+    changed = (np.abs(np.diff(steps, axis=0)) > 1e-7).any(axis=1) | (np.diff(motors.astype(int)) != 0)
+    bounds = np.r_[0, np.flatnonzero(changed) + 1, len(rows)]
+    local = _at_start(places, rows[0, c.YAW])
+    legs: list[Leg] = []
+    flying = False
+    for first, stop in zip(bounds[:-1], bounds[1:], strict=True):
+        seconds = (stop - first) / RATE_HZ
+        end, step = local[stop - 1], steps[stop - 1]
+        if not motors[stop - 1]:
+            legs.append(_leg("wait", (end[0], end[1], 0.0), seconds))
+            flying = False
+            continue
+        kind = "go" if np.abs(step).max() > 1e-9 else "hover"
+        if not flying:
+            kind, flying = "take-off", True
+        elif kind == "hover" and seconds < SHORTEST_S:
+            continue
+        elif stop < len(rows) and not motors[stop]:
+            kind, end = "land", (end[0], end[1], 0.0)
+        legs.append(_leg(kind, end, seconds))
+    if legs and flying:
+        legs.append(landing(legs[-1]))
+    return legs
+
+
+def _leg(kind: str, end: Sequence[float], seconds: float) -> Leg:
+    return Leg(kind, *(round(float(v), 6) for v in end), float(seconds))
+
+
+def landing(last: Leg) -> Leg:
+    """The landing below the end of a leg."""
+    return replace(last, kind="land", z_m=0.0, seconds=max(2.0, last.z_m / LANDING_MPS))
+
+
+def _at_start(places: np.ndarray, yaw: float) -> np.ndarray:
+    """World positions seen from the start, nose along x."""
+    moved = places - places[0]
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.column_stack([cos * moved[:, 0] + sin * moved[:, 1], cos * moved[:, 1] - sin * moved[:, 0],
+                            moved[:, 2]])
+
+
+def _speeds(legs: Sequence[Leg]) -> list[float]:
+    """Horizontal speed of each leg, m/s."""
+    before = [Leg("wait", 0.0, 0.0, 0.0, 0.0), *legs[:-1]]
+    return [float(np.hypot(b.x_m - a.x_m, b.y_m - a.y_m)) / b.seconds
+            for a, b in zip(before, legs, strict=True)]
+
+
+def _folder():
+    return resources.files("airtouch") / "crazyflie" / "missions"

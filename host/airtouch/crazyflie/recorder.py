@@ -1,0 +1,141 @@
+"""Writing a flight while it is flown: every row reaches the file at once, the whole log at the end.
+
+The unfinished file `NAME.part` is a canonical CSV that `airtouch logs` reads, cut off or not. Rows are in
+the order of arrival there; the finished file is sorted. A full disk ends the writing, not the flight.
+"""
+
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.crazyflie.ticks import gaps, in_order
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import COLUMNS, FlightLog
+
+SUFFIX, PART = ".csv.gz", ".part"
+LEAST_FREE_BYTES = 50 * 2**20
+
+
+def flight_path(folder: Path, name: str, number: int) -> Path:
+    """The file of one flight."""
+    return folder / f"{name}_{number:04d}{SUFFIX}"
+
+
+def next_number(folder: Path, name: str) -> int:
+    """The first number that no finished or unfinished flight in the folder has."""
+    taken = [0]
+    for path in folder.glob(f"{name}_*"):
+        number = path.name.removeprefix(f"{name}_").removesuffix(PART).removesuffix(SUFFIX)
+        taken += [int(number)] if number.isdigit() else []
+    return max(taken) + 1
+
+
+class Recorder:
+    """One flight's file. Raises AirTouchError where it cannot be opened.
+
+    error: why writing stopped, None as long as it works; rows are then kept in memory only.
+    """
+
+    def __init__(self, path: Path, names: list[str], meta: Mapping[str, Any], force: bool = False) -> None:
+        if path.exists() and not force:
+            raise AirTouchError(f"{path}: exists already; use --force to replace it")
+        self.path, self.part = path, path.with_name(path.name + PART)
+        self.names = [name for name in COLUMNS if name in names]
+        self.meta = dict(meta)
+        self.error: str | None = None
+        self._rows: list[np.ndarray] = []
+        self._times: list[np.ndarray] = []
+        try:
+            flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if force else os.O_EXCL)
+            self._file = os.open(self.part, flags, 0o644)
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise AirTouchError(f"{self.part}: cannot be written: {error.strerror}; is another flight being "
+                                "recorded there? --force replaces it") from None
+        header = [f"# {key}: {json.dumps(value, default=str)}" for key, value in self.meta.items()]
+        self._write("\n".join([*header, ",".join(self.names)]) + "\n")
+
+    def add(self, times_ms: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
+        """Append rows: the drone's clock (n,) in ms and SI columns (n,). Never raises."""
+        table = np.column_stack([times_ms / 1000.0 if name == "t_s" else columns[name] for name in self.names])
+        self._rows.append(table)
+        self._times.append(np.asarray(times_ms, dtype=np.int64))
+        if self.error is None:
+            self._write("".join(",".join(f"{v:.10g}" for v in row) + "\n" for row in table))
+
+    def log(self, **meta: Any) -> FlightLog:
+        """Everything received so far, in order, with its gaps counted in the metadata."""
+        times = np.concatenate([np.empty(0, np.int64), *self._times])
+        table = np.concatenate([np.empty((0, len(self.names))), *self._rows])
+        kept = in_order(times)
+        missing = gaps(times[kept])
+        counted = {"lost_samples": sum(g.lost for g in missing), "longest_gap_s": max((g.seconds for g in missing), default=0.0),
+                   "doubled_samples": int(len(times) - len(kept))}
+        return FlightLog({name: table[kept, i] for i, name in enumerate(self.names)},
+                         {"source": str(self.path), "format": "canonical", **self.meta, **counted, **meta})
+
+    def finish(self, **meta: Any) -> FlightLog:
+        """Write the whole log under its own name and remove the unfinished file; without rows only the latter.
+
+        Raises AirTouchError where it cannot be written; the unfinished file then stays.
+        """
+        log = self.log(**meta)
+        if len(log):
+            try:
+                logs.write(log, self.path, force=True)
+            except AirTouchError as error:
+                self._close()
+                raise AirTouchError(f"{error}; what was received is in {self.part}: make room, then "
+                                    "airtouch collect --recover") from None
+        self._close()
+        self.part.unlink(missing_ok=True)
+        return log
+
+    def _write(self, text: str) -> None:
+        data = text.encode()
+        try:
+            whole = os.lseek(self._file, 0, os.SEEK_END)
+            while data:
+                data = data[os.write(self._file, data):]
+        except OSError as error:
+            self.error = f"{self.part}: {error.strerror}"
+            try:
+                os.ftruncate(self._file, whole)
+            except (OSError, UnboundLocalError):
+                pass  # the reader drops a last line that is cut off
+
+    def _close(self) -> None:
+        os.close(self._file)
+
+
+def recover(folder: Path) -> list[Path]:
+    """Finish what killed flights left in a folder: sorted, gaps counted. Returns the files.
+
+    Files that another process still writes are passed over. Raises AirTouchError for one that cannot be read.
+    """
+    finished = []
+    for part in sorted(folder.glob(f"*{SUFFIX}{PART}")):
+        with part.open("rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+        path = part.with_name(part.name.removesuffix(PART))
+        log = logs.read(part)
+        times = np.round(log["t_s"] * 1000.0).astype(np.int64)
+        kept = in_order(times)
+        missing = gaps(times[kept])
+        whole = FlightLog({name: values[kept] for name, values in log.columns.items()}, dict(log.meta))
+        whole.meta |= {"ended": "the process was killed", "lost_samples": sum(g.lost for g in missing),
+                       "longest_gap_s": max((g.seconds for g in missing), default=0.0)}
+        if len(whole):
+            logs.write(whole, path)
+            finished.append(path)
+        part.unlink()
+    return finished

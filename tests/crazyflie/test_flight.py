@@ -1,0 +1,153 @@
+"""Whole flights with a fake craft: what goes wrong in the air ends on the ground, with the data kept."""
+
+import errno
+import os
+import threading
+import time
+
+import numpy as np
+import pytest
+from fake_craft import FakeCraft
+
+from airtouch import logs
+from airtouch.crazyflie import blocks, mission
+from airtouch.crazyflie.autopilot import Autopilot
+from airtouch.crazyflie.flight import Flight
+from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.recorder import Recorder
+
+HEIGHT = 0.8
+LEGS = (mission.Leg("wait", 0, 0, 0, 1.0), mission.Leg("take-off", 0, 0, HEIGHT, 2.0),
+        mission.Leg("hover", 0, 0, HEIGHT, 3.0), mission.Leg("go", 3.0, 0, HEIGHT, 10.0),
+        mission.Leg("hover", 3.0, 0, HEIGHT, 1.0), mission.Leg("land", 3.0, 0, 0, 2.7),
+        mission.Leg("wait", 3.0, 0, 0, 0.5))
+
+
+def fly(craft, folder, stop=None, show=lambda _: None, **more):
+    intake = Intake(blocks.STATE)
+    book = Recorder(folder / "f_0001.csv.gz", intake.names, {"mission": "test", "acc_frame": "body"})
+    flight = Flight(craft, Autopilot(LEGS), intake, book, stop or threading.Event(), show=show, **more)
+    ended = flight.run()
+    return flight, book, ended
+
+
+def kinds(craft):
+    return [c.kind for _, c in craft.heard]
+
+
+def test_a_mission_flies_as_planned_and_the_log_shows_its_edges(tmp_path):
+    craft = FakeCraft(speed=15.0)
+    flight, book, ended = fly(craft, tmp_path)
+    log = book.finish(ended=ended)
+    assert ended == "as planned" and flight.landed and not craft.flying and not craft.crashed
+    assert [k for k in dict.fromkeys(kinds(craft))] == ["take-off", "go", "land", "stop"]
+    read = logs.read(tmp_path / "f_0001.csv.gz")
+    assert not list(tmp_path.glob("*.part"))
+    assert [e.kind for e in logs.true_edges(read)] == ["entry", "exit"]
+    assert read.meta["lost_samples"] == 0 and read.meta["ended"] == "as planned"
+    assert np.allclose(np.diff(read["t_s"]), 0.01)
+    entry, leave = logs.true_edges(read)
+    distance = 0.3 * 0.01 * (leave.sample - entry.sample)
+    assert distance == pytest.approx(1.0, abs=0.02)
+    assert read["x_m"][entry.sample] == pytest.approx(1.0, abs=0.03)
+    assert len(log) == len(read)
+
+
+def test_thirty_percent_loss_is_counted_and_every_command_gets_through(tmp_path):
+    craft = FakeCraft(speed=10.0, loss=0.3)
+    flight, book, ended = fly(craft, tmp_path)
+    log = book.finish()
+    assert ended == "as planned" and not craft.flying and not craft.crashed
+    span = round((log["t_s"][-1] - log["t_s"][0]) / 0.01) + 1
+    assert len(log) + log.meta["lost_samples"] == span
+    assert 0.25 < log.meta["lost_samples"] / span < 0.35
+    assert np.diff(log["t_s"]).max() > 0.015  # gaps stay gaps
+
+
+def test_a_five_second_drop_in_mid_sweep_ends_on_the_ground(tmp_path):
+    craft = FakeCraft(speed=4.0, silent=[(9.0, 29.0)])  # 5 s for the host
+    flight, book, ended = fly(craft, tmp_path)
+    log = book.finish(ended=ended)
+    assert "link lost" in ended and not craft.flying and not craft.crashed
+    assert flight.silences and flight.silences[0] == pytest.approx(5.0, abs=0.4)
+    assert log.meta["longest_gap_s"] == pytest.approx(20.0, abs=0.5) and log.meta["lost_samples"] > 1900
+    assert kinds(craft).count("land") >= 1
+    assert log["t_s"][-1] > 29.0 and log["t_s"][0] < 1.0  # both sides of the drop are there
+
+
+def test_a_short_drop_is_flown_through(tmp_path):
+    craft = FakeCraft(speed=10.0, silent=[(8.0, 16.0)])
+    flight, book, ended = fly(craft, tmp_path)
+    assert ended == "as planned" and not craft.flying and book.log().meta["longest_gap_s"] == pytest.approx(8.0, abs=0.3)
+
+
+def test_a_broken_link_is_opened_again_to_land(tmp_path):
+    craft = FakeCraft(speed=10.0, dead_link_at=9.0)
+    flight, book, ended = fly(craft, tmp_path)
+    assert craft.reopened == 1 and "link lost" in ended and not craft.flying and not craft.crashed
+
+
+@pytest.mark.parametrize("after_s", [0.5, 2.0, 5.0, 9.0, 17.0])
+def test_a_request_to_stop_lands_whenever_it_comes(tmp_path, after_s):
+    stop = threading.Event()
+    craft = FakeCraft(speed=20.0)
+
+    def show(flight):
+        if flight.intake.newest_ms and flight.intake.newest_ms > 1000 * after_s:
+            stop.set()
+
+    flight, book, ended = fly(craft, tmp_path, stop, show)
+    assert ended == "stopped by the user" and not craft.flying and not craft.crashed and flight.landed
+    assert ("take-off" in kinds(craft)) == (after_s > 1.0)
+    assert len(book.finish()) > 20
+
+
+def test_a_full_disk_lands_and_keeps_what_was_written(tmp_path, monkeypatch):
+    craft, real, written = FakeCraft(speed=20.0), os.write, [0]
+
+    def write(handle, data):
+        written[0] += len(data)
+        if written[0] > 60_000:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return real(handle, data)
+
+    monkeypatch.setattr("airtouch.crazyflie.recorder.os.write", write)
+    flight, book, ended = fly(craft, tmp_path)
+    assert "No space left" in ended and not craft.flying and not craft.crashed
+    kept = logs.read(tmp_path / "f_0001.csv.gz.part")
+    assert 100 < len(kept) < len(book.log())
+    assert not any("cut off" in w for w in kept.meta["warnings"])
+    monkeypatch.undo()
+    assert len(book.finish()) == len(book.log()) and not list(tmp_path.glob("*.part"))
+
+
+def test_a_low_battery_lands(tmp_path):
+    craft = FakeCraft(speed=20.0, volts=3.3)
+    _, _, ended = fly(craft, tmp_path)
+    assert "battery at 3.0" in ended and not craft.flying
+
+
+def test_a_refusing_supervisor_stays_on_the_ground(tmp_path):
+    craft = FakeCraft(speed=20.0, busy=True)
+    flight, _, ended = fly(craft, tmp_path)
+    assert "supervisor refuses take-off" in ended and flight.pilot.refused and "land" not in kinds(craft)
+
+
+def test_a_drone_that_restarts_in_flight_ends_it(tmp_path):
+    craft = FakeCraft(speed=20.0, restart_at=9.0)
+    _, book, ended = fly(craft, tmp_path)
+    assert ended == "the drone restarted in flight" and len(book.finish()) > 500
+
+
+def test_an_error_of_ours_lands_first(tmp_path):
+    craft = FakeCraft(speed=20.0)
+
+    def show(flight):
+        if flight.pilot.phase == "mission" and flight.pilot.leg and flight.pilot.leg.kind == "go":
+            raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError, match="a bug"):
+        fly(craft, tmp_path, show=show)
+    assert not craft.flying and not craft.crashed
+    time.sleep(0.05)
+    assert len(logs.read(tmp_path / "f_0001.csv.gz.part")) > 300  # readable though nobody finished it
