@@ -64,7 +64,7 @@ def theirs(peer, given, aero):
 def ours(vehicle, given, drag=None):
     """The same from our rigid body; drag: the effect that is on, or none."""
     plant = from_vehicle(vehicle)
-    state, speed, work = np.zeros(13), np.full(4, given[0].mean()), np.zeros((6, 13))
+    state, speed, slope = np.zeros(13), np.full(4, given[0].mean()), np.zeros(13)
     state[6] = 1.0
     s, rows = np.zeros((1, at.COUNT)), []
     s[:, at.HOVER_SPEED] = hover_speed(plant)
@@ -74,7 +74,7 @@ def ours(vehicle, given, drag=None):
             s[0, at.ROTOR_SPEED:at.ROTOR_SPEED + 4] = speed
             s[0, at.VELOCITY:at.VELOCITY + 3] = rotate_back(state[6:10], *state[3:6])
             force = replay.wrench_of(drag, s)[0]
-        rigid_body.step(plant[0], state, speed, command, STEP_S, force, work)
+        rigid_body.step(plant[0], state, speed, command, STEP_S, force, slope)
         rows.append(state[:10].copy())
     return np.array(rows)
 

@@ -1,14 +1,14 @@
 """A lithium-polymer battery: open-circuit voltage by charge, internal resistance, drain."""
 
 import numpy as np
-from numba import njit
+from airtouch.simulation.compiled import jit
 
 #: Charge left and open-circuit voltage of one cell: typical LiPo discharge curve.
 CHARGE = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
 OPEN_CIRCUIT_V = np.array([3.20, 3.45, 3.58, 3.68, 3.77, 3.87, 4.00, 4.08, 4.18])
 
 
-@njit(cache=True)
+@jit
 def open_circuit(charge):
     """Open-circuit voltage of one cell at a charge of 0..1, V."""
     if charge <= CHARGE[0]:
@@ -20,7 +20,7 @@ def open_circuit(charge):
     return OPEN_CIRCUIT_V[-1]
 
 
-@njit(cache=True)
+@jit
 def drain(plant, charge, power, h):
     """One step of h seconds at `power` watts: (charge left, terminal voltage).
 
@@ -33,7 +33,7 @@ def drain(plant, charge, power, h):
     return max(charge - h * power / volts / plant.battery_capacity, 0.0), volts
 
 
-@njit(cache=True)
+@jit
 def supply(plant, battery_volts):
     """Voltage that the motors see: nominal at strength 0, the battery's at strength 1."""
     return plant.nominal_voltage + plant.battery_strength * (battery_volts - plant.nominal_voltage)

@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from airtouch.simulation.compiled import jit
 from airtouch.simulation import signals as at
 from airtouch.simulation.rotation import rotate_back
 
@@ -12,9 +11,11 @@ DAMPING = 0.5  #: of the bounce, critical is 1
 FRICTION_S = 0.02  #: sliding dies out with this time constant, under full weight
 
 
-@njit(cache=True)
+@jit
 def legs(plant, state, s, leg, force):
     """Add force and torque (6,) of legs of length `leg` m; returns how deep the deepest stands, m."""
+    if s[at.HEIGHT] >= leg:
+        return 0.0
     deepest = 0.0
     weight = 0.25 * plant.mass * plant.gravity
     stiffness = weight / SINK_M

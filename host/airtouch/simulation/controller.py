@@ -8,7 +8,7 @@ as there. Roll and pitch here are right-handed about x and y (pitch is nose down
 
 import math
 
-from numba import njit
+from airtouch.simulation.compiled import jit
 
 RATE, ANGLE, SPEED, PLACE = 0, 3, 6, 9  #: places of the loops in the memory
 INTEGRAL, PREVIOUS, DESIRED, THRUST, SIZE = 0, 12, 24, 27, 28  #: blocks of the memory
@@ -16,20 +16,20 @@ MODE, X, Y, Z, VX, VY, YAW, MOTORS, SETPOINT_SIZE = range(9)  #: places in a set
 POSITION_STEPS = 5  #: physics steps a run of the position controller
 
 
-@njit(cache=True)
+@jit
 def limit(value, bound):
     """value held within -bound..bound."""
     return min(max(value, -bound), bound)
 
 
-@njit(cache=True)
+@jit
 def pid(memory, at, error, kp, ki, h, integral_limit):
     """Proportional and integral part of loop `at`; its integral is kept in memory."""
     memory[INTEGRAL + at] = limit(memory[INTEGRAL + at] + error * h, integral_limit)
     return kp * error + ki * memory[INTEGRAL + at]
 
 
-@njit(cache=True)
+@jit
 def reset(memory, yaw_deg):
     """Forget everything; hold the present heading."""
     for i in range(SIZE):
@@ -37,7 +37,7 @@ def reset(memory, yaw_deg):
     memory[DESIRED + 2] = yaw_deg
 
 
-@njit(cache=True)
+@jit
 def position_loop(plant, memory, setpoint, place, velocity, yaw):
     """100 Hz: desired roll, pitch (degrees) and thrust (PWM) into memory.
 
@@ -67,7 +67,7 @@ def position_loop(plant, memory, setpoint, place, velocity, yaw):
     memory[THRUST] = min(max(thrust, plant.thrust_min), 65535.0)
 
 
-@njit(cache=True)
+@jit
 def attitude_loop(plant, memory, roll, pitch, yaw, rates, pwm):
     """500 Hz: from angles (rad) and rates (3,) (rad/s) to the PWM (4,) of the motors."""
     h = plant.step
@@ -94,7 +94,7 @@ def attitude_loop(plant, memory, roll, pitch, yaw, rates, pwm):
     pwm[3] = base + half_x - half_y + out_z
 
 
-@njit(cache=True)
+@jit
 def _rate(plant, memory, at, want, rate, kp, ki, kd, h, integral_limit):
     error = want - rate
     out = pid(memory, RATE + at, error, kp, ki, h, integral_limit)
@@ -104,7 +104,7 @@ def _rate(plant, memory, at, want, rate, kp, ki, kd, h, integral_limit):
     return limit(out, 32767.0)
 
 
-@njit(cache=True)
+@jit
 def cap(pwm):
     """Cap as the firmware does: attitude goes before thrust; whole numbers 0..65535."""
     highest = max(max(pwm[0], pwm[1]), max(pwm[2], pwm[3]))

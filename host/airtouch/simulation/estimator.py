@@ -8,7 +8,7 @@ range after a drop of more than 0.30 m) is in the range that it is given.
 
 import math
 
-from numba import njit
+from airtouch.simulation.compiled import jit
 
 ROLL, PITCH, YAW, V, P, SIZE = 0, 1, 2, 3, 6, 9  #: places: angles (rad), velocity, position (3 each)
 FLOW_TO_VELOCITY = 0.04  #: per flow sample of 10 ms
@@ -17,7 +17,7 @@ RANGE_TO_HEIGHT = 0.25  #: per range reading of 25 ms
 RANGE_TO_CLIMB = 1.2  #: 1/s per reading
 
 
-@njit(cache=True)
+@jit
 def predict(est, rates, acc, gravity, h):
     """Advance the estimate by h with rates (rad/s) and specific force (m/s^2), body axes.
 
@@ -43,7 +43,7 @@ def predict(est, rates, acc, gravity, h):
     return east, north, up
 
 
-@njit(cache=True)
+@jit
 def correct_flow(est, vx, vy):
     """Optical flow: velocity over ground (m/s, world axes)."""
     ex, ey = vx - est[V], vy - est[V + 1]
@@ -54,7 +54,7 @@ def correct_flow(est, vx, vy):
     est[ROLL] -= FLOW_TO_TILT * (cy * ey - sy * ex)
 
 
-@njit(cache=True)
+@jit
 def correct_range(est, height):
     """Down range, turned into a height over the floor (m)."""
     error = height - est[P + 2]

@@ -7,9 +7,10 @@ with the same numbers as in one call.
 import math
 
 import numpy as np
-from numba import float64, from_dtype, int64, njit, types, uint64
+from numba import float64, from_dtype, int64, types, uint64
 
 from airtouch.simulation import contact, controller, estimator, rigid_body, sensors, world
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import MEMORY
 from airtouch.simulation.plant import DTYPE
 from airtouch.simulation.random_stream import STREAM, normal
@@ -19,9 +20,9 @@ SLOTS = 16  #: effects with a wrench that may be on at once
 #: scalars, at the start of the vector
 (STEP, GROUND, CHARGE, VOLTS, DOWN, TOP, NEXT_RANGE, NEXT_RANGES, FLYING, CHANGED) = range(10)
 _SIZES = (10, 13, 4, 6, 13, SLOTS * MEMORY, controller.SIZE, estimator.SIZE, 4, 4, 4, 4, RING * 6, RING * 4,
-          5, 5, 6, 6, 3, 3, 4)
+          5, 5, 6, 6, 3, 3, 4, 130)
 (STATE, SPEED, FORCE, SLOPE, EFFECTS, PID, ESTIMATE, PWM, FLICKER, GAIN, PHASE, SENSED, COMMANDED,
- ACC_FILTER, GYRO_FILTER, ACC_MEMORY, GYRO_MEMORY, ACC_RMS, DRIFT, RANGES, SIZE) = (
+ ACC_FILTER, GYRO_FILTER, ACC_MEMORY, GYRO_MEMORY, ACC_RMS, DRIFT, RANGES, SCRATCH, SIZE) = (
     sum(_SIZES[:i + 1]) for i in range(len(_SIZES)))
 
 
@@ -29,12 +30,13 @@ _BEGIN = types.void(from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64
                     float64[::1], STREAM, float64[::1])
 
 
-@njit(_BEGIN, cache=True)
+@jit(_BEGIN)
 def begin(plant_array, corners, first, surface, box, setpoint, stream, kept):
     """Stand the vehicle on what is below the first set-point (8,): fills kept (SIZE,)."""
     plant = plant_array[0]
     h = plant.step
-    kept[:] = 0.0
+    for i in range(SIZE):
+        kept[i] = 0.0
     state, est, pid = kept[STATE:SPEED], kept[ESTIMATE:PWM], kept[PID:ESTIMATE]
     leg = plant.range_below_rotors + plant.leg_below_range
     acc_filter, gyro_filter = kept[ACC_FILTER:GYRO_FILTER], kept[GYRO_FILTER:ACC_MEMORY]
@@ -61,5 +63,5 @@ def begin(plant_array, corners, first, surface, box, setpoint, stream, kept):
         sensors.settle(acc_filter, kept[at:at + 2], plant.gravity if i == 2 else 0.0)
     kept[GROUND], kept[TOP], kept[CHARGE] = ground, ground, plant.battery_charge
     kept[VOLTS], kept[DOWN], kept[CHANGED] = plant.nominal_voltage, 0.01, -1e3
-    rigid_body.derivative(plant, state, state[6:10], np.zeros(4), 0.0, 0.0, kept[FORCE:SLOPE],
+    rigid_body.derivative(plant, state, kept[SPEED:FORCE], 0.0, 0.0, kept[FORCE:SLOPE],
                           kept[SLOPE:EFFECTS])

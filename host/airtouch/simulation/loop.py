@@ -8,7 +8,7 @@ every effect adds its force and torque at the middle of the step, the body moves
 import math
 
 import numpy as np
-from numba import float64, from_dtype, int64, njit, types, uint64
+from numba import float64, from_dtype, int64, types, uint64
 
 from airtouch.simulation import (
     battery,
@@ -23,6 +23,7 @@ from airtouch.simulation import (
     world,
 )
 from airtouch.simulation import signals as at
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import MEMORY, WrenchFunction
 from airtouch.simulation.kept import SLOTS
 from airtouch.simulation.plant import DTYPE
@@ -44,7 +45,7 @@ _LOOP = types.Tuple((int64, int64))(
     uint64[:, ::1], uint64[:, ::1], float64[::1], float64[:, ::1])
 
 
-@njit(_LOOP, cache=True, nogil=True)
+@jit(_LOOP, nogil=True)
 def fly(plant_array, corners, first, surface, box, room, setpoints, effects, used, parameters,
         effect_streams, streams, memory, table):
     """Fly as many rows as `table` (rows, 33) has, the columns of the flight log.
@@ -72,12 +73,12 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     acc_memory = memory[kept.ACC_MEMORY:kept.GYRO_MEMORY].reshape((3, 2))
     gyro_memory = memory[kept.GYRO_MEMORY:kept.ACC_RMS].reshape((3, 2))
     acc_rms, drift = memory[kept.ACC_RMS:kept.DRIFT], memory[kept.DRIFT:kept.RANGES]
-    ranges = memory[kept.RANGES:kept.SIZE]
-    target, middle, middle_speed, work = np.zeros(4), np.zeros(13), np.zeros(4), np.zeros((6, 13))
-    s, patch = np.zeros(at.COUNT), np.zeros(7)
-    motor_n, imu_n, other_n = np.zeros(4), np.zeros(6), np.zeros(4)
-    acc, gyro, seen_acc, seen_gyro = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-    world_force, seen_velocity = np.zeros(3), np.zeros(3)
+    ranges, scratch = memory[kept.RANGES:kept.SCRATCH], memory[kept.SCRATCH:kept.SIZE]
+    target, middle, middle_speed = scratch[0:4], scratch[4:17], scratch[17:21]
+    motor_n, imu_n, other_n = scratch[21:25], scratch[25:31], scratch[31:35]
+    acc, gyro, seen_acc, seen_gyro = scratch[35:38], scratch[38:41], scratch[41:44], scratch[44:47]
+    world_force, seen_velocity, patch = scratch[47:50], scratch[50:53], scratch[53:60]
+    s = scratch[60:60 + at.COUNT]
     drift_decay = math.exp(-LOG_STEPS * h / plant.flow_noise_time)
     drift_fresh = math.sqrt(1.0 - drift_decay * drift_decay)
     ground, charge, battery_volts = memory[kept.GROUND], memory[kept.CHARGE], memory[kept.VOLTS]
@@ -87,11 +88,11 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     decay = math.exp(-h / plant.motor_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
-    attitude, slope = state[6:10], work[0]
+    attitude, slope = state[6:10], memory[kept.SLOPE:kept.EFFECTS]
+    constant = rigid_body.constants(plant, h)
     motor_stream, imu_stream, other_stream = streams[0], streams[1], streams[2]
     rows = table.shape[0]
     begun = int(memory[kept.STEP])
-    slope[:] = memory[kept.SLOPE:kept.EFFECTS]
 
     for n in range(rows * LOG_STEPS):
         k = begun + n
@@ -130,7 +131,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             ring[k & (RING - 1), 3 + i] = sensors.lowpass(gyro_filter, gyro_memory[i], gyro[i])
         if k == 0:
             for j in range(RING):
-                ring[j] = ring[0]
+                for i in range(6):
+                    ring[j, i] = ring[0, i]
         late = plant.sensor_delay / h
         for i in range(3):
             seen_acc[i] = sensors.delayed(ring, k, late, i)
@@ -225,7 +227,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         for i in range(4):
             command[k & (RING - 1), i] = pwm[i]
             if k == 0:
-                command[:, i] = pwm[i]
+                for j in range(RING):
+                    command[j, i] = pwm[i]
         normals(motor_stream, motor_n)
         power = 0.0
         for i in range(4):
@@ -234,7 +237,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             flicker[i] = decay * flicker[i] + fresh * motor_n[i]
             plant.gain[i] = base_gain[i] * (1.0 + plant.motor_noise * flicker[i])
             power += power_per_speed3 * speed[i] * speed[i] * speed[i]
-            phase[i] = (phase[i] + h * speed[i]) % 6.283185307179586
+            if plant.vibration > 0.0:
+                phase[i] = (phase[i] + h * speed[i]) % 6.283185307179586
         charge, battery_volts = battery.drain(plant, charge, power, h)
 
         # --- effects, at the middle of the step
@@ -251,7 +255,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             effects[i](parameters[i], s, effect_memory[i], effect_streams[i], force)
         deepest = contact.legs(plant, middle, s, leg, force)
 
-        rigid_body.step(plant, state, speed, target, h, force, work)
+        rigid_body.advance(plant, constant, state, speed, target, h, force, slope)
         total = 0.0
         for i in range(13):
             total += state[i]
@@ -267,5 +271,4 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     memory[kept.DOWN], memory[kept.TOP], memory[kept.CHANGED] = down, last_down_top, changed
     memory[kept.NEXT_RANGE], memory[kept.NEXT_RANGES] = next_range, next_ranges
     memory[kept.FLYING] = 1.0 if flying else 0.0
-    memory[kept.SLOPE:kept.EFFECTS] = slope
     return OK, rows

@@ -2,10 +2,10 @@
 
 import math
 
-from numba import njit
+from airtouch.simulation.compiled import jit
 
 
-@njit(cache=True)
+@jit
 def voltage_factor(plant, volts):
     """Thrust at `volts` over thrust at the nominal voltage, at one PWM."""
     ratio = volts / plant.nominal_voltage
@@ -14,7 +14,7 @@ def voltage_factor(plant, volts):
     return ratio ** plant.voltage_exponent
 
 
-@njit(cache=True)
+@jit
 def target_speed(plant, pwm, factor):
     """Steady rotor speed in rad/s at a PWM of 0..65535; 0 where the motor is off."""
     if pwm <= 0.0:
@@ -24,7 +24,7 @@ def target_speed(plant, pwm, factor):
     return math.sqrt(max(thrust, 0.0) / plant.thrust_per_speed2)
 
 
-@njit(cache=True)
+@jit
 def compensated(plant, pwm, factor):
     """PWM that gives at a voltage factor the thrust that `pwm` gives at the nominal voltage."""
     if pwm <= 0.0:

@@ -10,7 +10,9 @@ import math
 import zlib
 
 import numpy as np
-from numba import float64, njit, types, uint64
+from numba import float64, types, uint64
+
+from airtouch.simulation.compiled import jit
 
 STREAM = uint64[::1]  #: type of a stream's state, one 64-bit counter
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -41,7 +43,7 @@ def stream(seed: int, flight: int, name: str) -> np.ndarray:
     return key.generate_state(1, np.uint64)
 
 
-@njit(float64(STREAM), cache=True)
+@jit(float64(STREAM))
 def uniform(state):
     """One number in (0, 1]."""
     state[0] += _GOLDEN
@@ -52,7 +54,7 @@ def uniform(state):
     return (float(z >> _S11) + 1.0) * _TO_UNIT
 
 
-@njit(float64(STREAM), cache=True)
+@jit(float64(STREAM))
 def normal(state):
     """One number of the standard normal distribution (ziggurat of 128 strips)."""
     while True:
@@ -76,7 +78,7 @@ def normal(state):
             return sign * x
 
 
-@njit(types.void(STREAM, float64[::1]), cache=True)
+@jit(types.void(STREAM, float64[::1]))
 def normals(state, out):
     """Fill `out` with standard normal numbers."""
     for i in range(len(out)):

@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from numba import njit
+from airtouch.simulation.compiled import jit
 
 
-@njit(cache=True)
+@jit
 def rotate(q, x, y, z):
     """The body vector (x, y, z) in world axes."""
     w, a, b, c = q[0], q[1], q[2], q[3]
@@ -14,7 +14,7 @@ def rotate(q, x, y, z):
     return (x + w * tx + b * tz - c * ty, y + w * ty + c * tx - a * tz, z + w * tz + a * ty - b * tx)
 
 
-@njit(cache=True)
+@jit
 def rotate_back(q, x, y, z):
     """The world vector (x, y, z) in body axes."""
     w, a, b, c = q[0], -q[1], -q[2], -q[3]
@@ -22,7 +22,7 @@ def rotate_back(q, x, y, z):
     return (x + w * tx + b * tz - c * ty, y + w * ty + c * tx - a * tz, z + w * tz + a * ty - b * tx)
 
 
-@njit(cache=True)
+@jit
 def euler(q):
     """Roll, pitch (nose down positive) and yaw in rad: turns about z, then y, then x."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -32,7 +32,7 @@ def euler(q):
     return roll, pitch, yaw
 
 
-@njit(cache=True)
+@jit
 def from_euler(roll, pitch, yaw, q):
     """Write the quaternion of roll, pitch and yaw (rad) into q."""
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
@@ -44,7 +44,7 @@ def from_euler(roll, pitch, yaw, q):
     q[3] = cr * cp * sy - sr * sp * cy
 
 
-@njit(cache=True)
+@jit
 def matrix(q, out, at):
     """Write the 3x3 matrix body to world, row by row, into out[at:at + 9]."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -59,12 +59,13 @@ def matrix(q, out, at):
     out[at + 8] = 1 - 2 * (x * x + y * y)
 
 
-@njit(cache=True)
+@jit
 def normalise(q):
     """Scale q to length one in place."""
     length = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    scale = 1.0 / length
     for i in range(4):
-        q[i] /= length
+        q[i] *= scale
 
 
 def as_matrix(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import math
 
-from numba import njit
+from airtouch.simulation.compiled import jit
 
 MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
 RANGE_PERIOD_S = 0.025
@@ -12,7 +12,7 @@ RING = 64  #: rows of a delay line, a power of two: delays of up to 63 steps
 CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
 
 
-@njit(cache=True)
+@jit
 def lowpass_coefficients(cutoff, h, out):
     """Second-order Butterworth (b0, b1, b2, a1, a2) into out (5,); a cutoff of 0 passes all."""
     if cutoff <= 0.0 or cutoff >= 0.49 / h:
@@ -27,7 +27,7 @@ def lowpass_coefficients(cutoff, h, out):
     out[4] = (1.0 - math.sqrt(2.0) * f + f * f) / c
 
 
-@njit(cache=True)
+@jit
 def lowpass(b, memory, x):
     """One sample through the filter; memory (2,)."""
     d = x - memory[0] * b[3] - memory[1] * b[4]
@@ -37,7 +37,7 @@ def lowpass(b, memory, x):
     return y
 
 
-@njit(cache=True)
+@jit
 def settle(b, memory, level):
     """Set the memory as if the input had always been `level`."""
     d = level / (1.0 + b[3] + b[4])
@@ -45,7 +45,7 @@ def settle(b, memory, level):
     memory[1] = d
 
 
-@njit(cache=True)
+@jit
 def noise_gain(b):
     """rms of the filter's output for white noise of rms 1."""
     d1, d2, total = 0.0, 0.0, 0.0
@@ -57,10 +57,10 @@ def noise_gain(b):
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@jit
 def delayed(ring, at, steps, column):
     """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (RING, columns)."""
-    whole = int(math.floor(steps))
+    whole = int(steps)
     part = steps - whole
     now = ring[(at - whole) & (RING - 1), column]
     if part == 0.0:
@@ -68,7 +68,7 @@ def delayed(ring, at, steps, column):
     return now + part * (ring[(at - whole - 1) & (RING - 1), column] - now)
 
 
-@njit(cache=True)
+@jit
 def wall_distance(x, y, direction, room):
     """Distance in m from (x, y) along `direction` (rad) to the wall of room (x0, x1, y0, y1)."""
     c, s = math.cos(direction), math.sin(direction)

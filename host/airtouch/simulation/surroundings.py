@@ -1,13 +1,14 @@
 """The signals that effects see, from the vehicle's state and the world around it."""
 
-from numba import njit
+from airtouch.simulation.compiled import jit
+import math
 
 from airtouch.simulation import signals as at
 from airtouch.simulation import world
 from airtouch.simulation.rotation import matrix, rotate_back
 
 
-@njit(cache=True)
+@jit
 def fill(plant, state, slope, speed, corners, first, surface, box, h, t, hover, s, patch):
     """The signals that effects see, for a state (13,), its slope and rotor speeds (4,)."""
     s[at.TIME], s[at.STEP], s[at.MASS], s[at.GRAVITY] = t, h, plant.mass, plant.gravity
@@ -22,14 +23,20 @@ def fill(plant, state, slope, speed, corners, first, surface, box, h, t, hover, 
     r = at.ROTATION
     matrix(q, s, r)
     lowest = 1e9
+    x, y = abs(plant.rotor_x[0]) + abs(plant.com[0]), abs(plant.rotor_y[0]) + abs(plant.com[1])
+    reach = math.sqrt(x * x + y * y)
+    tilt = reach * math.sqrt(s[r + 6] * s[r + 6] + s[r + 7] * s[r + 7])
+    alike = world.alike(corners, first, surface, box, state[0], state[1], state[2] - tilt, state[2] + tilt,
+                        reach + plant.rotor_radius, patch)
     for i in range(4):
         x, y = plant.rotor_x[i] - plant.com[0], plant.rotor_y[i] - plant.com[1]
         s[at.ROTOR_X + i], s[at.ROTOR_Y + i] = x, y
         s[at.ROTOR_SPEED + i] = speed[i]
         s[at.THRUST + i] = plant.thrust_per_speed2 * speed[i] * speed[i] * plant.gain[i]
         z = state[2] + s[r + 6] * x + s[r + 7] * y
-        world.below(corners, first, surface, box, state[0] + s[r] * x + s[r + 1] * y,
-                    state[1] + s[r + 3] * x + s[r + 4] * y, z, plant.rotor_radius, patch)
+        if not alike:
+            world.below(corners, first, surface, box, state[0] + s[r] * x + s[r + 1] * y,
+                        state[1] + s[r + 3] * x + s[r + 4] * y, z, plant.rotor_radius, patch)
         s[at.LOWER_HEIGHT + i] = z - patch[world.LOWER_TOP]
         s[at.UPPER_HEIGHT + i] = z - patch[world.UPPER_TOP]
         s[at.COVER + i] = patch[world.COVER]

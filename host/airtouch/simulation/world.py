@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
-
+from airtouch.simulation.compiled import jit
 from airtouch.errors import AirTouchError
 
 #: material -> (ground-effect factor, roughness). A hard smooth surface is 1; soft and porous
@@ -61,7 +60,7 @@ def build(platforms: Sequence[Platform], floor: str = "cement") -> World:
     return World(corners, first.astype(np.int64), surface, box)
 
 
-@njit(cache=True)
+@jit
 def inside_by(corners, start, stop, x, y):
     """How far (x, y) is inside a polygon, m; negative outside."""
     nearest = 1e30
@@ -81,7 +80,7 @@ def inside_by(corners, start, stop, x, y):
     return math.sqrt(nearest) if inside else -math.sqrt(nearest)
 
 
-@njit(cache=True)
+@jit
 def below(corners, first, surface, box, x, y, z, radius, out):
     """What lies under a disc of `radius` at (x, y, z): two surfaces and a share, into out (7,).
 
@@ -115,7 +114,32 @@ def below(corners, first, surface, box, x, y, z, radius, out):
         out[COVER] = 0.5 + (math.asin(share) + share * math.sqrt(1.0 - share * share)) / math.pi
 
 
-@njit(cache=True)
+@jit
+def alike(corners, first, surface, box, x, y, low, high, reach, out):
+    """Whether all discs within `reach` of (x, y), between heights low and high, have one whole surface below.
+
+    If so, what `below` gives for each of them is in out (7,).
+    """
+    n = len(first) - 1
+    top = n
+    for k in range(n):
+        if surface[k, 0] > high + ABOVE_M:
+            break
+        if (x < box[k, 0] - reach or x > box[k, 2] + reach
+                or y < box[k, 1] - reach or y > box[k, 3] + reach):
+            continue
+        depth = inside_by(corners, first[k], first[k + 1], x, y)
+        if depth > -reach:
+            if depth < reach or surface[k, 0] > low + ABOVE_M:
+                return False
+            top = k
+    out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = surface[top, 0], surface[top, 1], surface[top, 2]
+    out[UPPER_TOP], out[UPPER_FACTOR], out[UPPER_ROUGHNESS] = surface[top, 0], surface[top, 1], surface[top, 2]
+    out[COVER] = 0.0
+    return True
+
+
+@jit
 def top_at(corners, first, surface, box, x, y):
     """Height of the highest surface at the point (x, y), m."""
     for k in range(len(first) - 2, -1, -1):

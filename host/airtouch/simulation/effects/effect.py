@@ -10,6 +10,7 @@ import numpy as np
 from numba import float64, types, uint64
 
 from airtouch.errors import AirTouchError
+from airtouch.simulation.compiled import jit
 
 warnings.filterwarnings("ignore", "First-class function type feature is experimental")
 
@@ -27,8 +28,9 @@ def wrench(function: Callable) -> Any:
     on. stream: its random numbers, for `random_stream.normal(stream)`. out (6,): add force
     (N) and torque (N m) about the centre of mass, body axes. Called once a step.
     """
-    cached = function.__module__.startswith("airtouch.")
-    return numba.njit([SIGNATURE], cache=cached)(function)
+    if function.__module__.startswith("airtouch."):
+        return jit([SIGNATURE])(function)
+    return numba.njit([SIGNATURE])(function)  # may make arrays
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
 import math
 
-from numba import njit
-
 from airtouch.simulation import signals as at
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 from airtouch.simulation.random_stream import normal
 
@@ -12,7 +11,7 @@ STRENGTH, FOUNTAIN, FADE, TURBULENCE, TURBULENCE_TIME = range(5)
 LEAST_HEIGHT_RADII = 0.75  #: the formula diverges below it
 
 
-@njit(cache=True)
+@jit
 def thrust_ratio(height, radius, spacing, fountain):
     """Thrust near a surface over thrust far from it, minus one, for a rotor of a quadrotor.
 
@@ -29,7 +28,7 @@ def thrust_ratio(height, radius, spacing, fountain):
     return 1.0 / (1.0 - min(loss, 0.9)) - 1.0
 
 
-@njit(cache=True)
+@jit
 def faded(ratio, height, fade):
     """The ratio where the lift dies out over `fade` m beyond the formula's own decay (0: it does not)."""
     return ratio * math.exp(-(height / fade) ** 2) if fade > 0.0 else ratio

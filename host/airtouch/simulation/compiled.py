@@ -1,0 +1,12 @@
+"""How the simulator's functions are compiled.
+
+They make no arrays of their own: what they need is handed in. So the compiler may leave out the counting
+of references to arrays, atomic operations which took half of a flight's time. Dividing by zero gives inf,
+which ends a flight as "not finite".
+"""
+
+from functools import partial
+
+from numba import njit
+
+jit = partial(njit, cache=True, error_model="numpy", _nrt=False)
