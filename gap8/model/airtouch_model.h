@@ -11,6 +11,6 @@
 #define AIRTOUCH_MODEL_ROWS 100
 #define AIRTOUCH_MODEL_COLUMNS 3
 #define AIRTOUCH_MODEL_OUTPUTS 2
-#define AIRTOUCH_MODEL_ARENA_BYTES 7056  // what networkInt8ArenaBytes says
+#define AIRTOUCH_MODEL_ARENA_BYTES 4560  // what networkInt8ArenaBytes says
 
 extern const networkInt8_t airtouchNetwork;

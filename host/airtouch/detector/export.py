@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.detector.c_source import fields, float_literal, golden_header, golden_source, layer_arrays
-from airtouch.detector.model_file import NORMALISATION, Model
+from airtouch.detector.model_file import Model
 from airtouch.detector.network import WEIGHTED
 from airtouch.detector.stream import export as stream_export
 from airtouch.detector.stream.model import StreamModel
@@ -88,7 +88,7 @@ def _model_header(model: Model) -> str:
     network = model.int8
     rows, columns, channels = network.input_shape
     return f"""// The trained network: {parameter_bytes(network)} bytes of constants.
-// Input: {rows} x {columns * channels} fused features, normalised ({NORMALISATION}), then quantised:
+// Input: {rows} x {columns * channels} fused features, normalised ({model.normalisation}), then quantised:
 // networkInt8Quantise. Output: {network.outputs} logits; P(over a platform) is the softmax of the last.
 #pragma once
 

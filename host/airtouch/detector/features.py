@@ -8,6 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from airtouch import kernels, reference
 from airtouch import vehicle as vehicles
 from airtouch.detector.channels import level_acceleration, nine_channels, thrust_axis
+from airtouch.detector.normalisation import FixedScale
 from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.edge_pipeline import EdgeEvents, EdgePipelineConfig
@@ -59,14 +60,15 @@ def flight_features(log: FlightLog, vehicle: Vehicle | None = None,
                     events.cfar_power, events.threshold, events.alert, events.armed)
 
 
-def feature_windows(fused: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """z-scored windows (k, rows, c) float32 of fused features (n, c), and the sample at which each ends, (k,).
+def feature_windows(fused: np.ndarray, rows: int,
+                    scale: FixedScale | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Normalised windows (k, rows, c) float32 of fused features (n, c), and the sample at which each ends, (k,).
 
-    Windows that hold a value that is not finite are left out.
+    z-scored by themselves, or on the fixed scale given. Windows that hold a value that is not finite are left out.
     """
     if len(fused) < rows:
         return np.zeros((0, rows, fused.shape[1]), np.float32), np.zeros(0, int)
-    raw = np.moveaxis(sliding_window_view(fused, rows, axis=0), 2, 1)
+    raw = np.moveaxis(sliding_window_view(scale.apply(fused) if scale else fused, rows, axis=0), 2, 1)
     usable = np.isfinite(raw).all(axis=(1, 2))
     ends = np.arange(rows - 1, len(fused))[usable]
-    return reference.z_score_window(raw[usable]).astype(np.float32), ends
+    return np.ascontiguousarray(raw[usable]) if scale else reference.z_score_window(raw[usable]).astype(np.float32), ends

@@ -23,6 +23,7 @@ from airtouch.detector.model_file import Model
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
+from airtouch.kernels.network import probability as window_probability
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.int8_network import multiplications
@@ -38,13 +39,23 @@ def run(log: FlightLog, model: Model | None = None) -> Trace:
     """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
     model = model or load(None)
     features = flight_features(log, parameters=decoding(model)[0])
-    return _trace(log, model, features, probability_of_flight(model, features.fused))
+    return _trace(log, model, features, probability_of(model, features.fused))
+
+
+def probability_of(model: Model, fused: np.ndarray) -> np.ndarray:
+    """P(over a platform), (n,), of a flight's fused features (n, 3); NaN where there is none."""
+    if model.scale is None:
+        return probability_of_flight(model, fused)
+    windows, ends = feature_windows(fused, DEFAULT.feature_window, model.scale)
+    probability = np.full(len(fused), np.nan)
+    probability[ends] = window_probability(model, windows)
+    return probability
 
 
 def run_float(log: FlightLog, model: Model) -> Trace:
     """As `run`, with the float network as trained: what quantisation is measured against."""
     features = flight_features(log, parameters=decoding(model)[0])
-    windows, ends = feature_windows(features.fused, DEFAULT.feature_window)
+    windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
     logits = infer_float(model.float_layers, windows).astype(np.float64)
     probability = np.full(len(log), np.nan)
     probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
@@ -83,7 +94,7 @@ def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = Tru
     seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for log in flights:
         features = flight_features(log)
-        seen.append((probability_of_flight(model, features.fused), features.armed, features.alert))
+        seen.append((probability_of(model, features.fused), features.armed, features.alert))
 
     @cache
     def unfiltered(entry: float, leave: float, dwell: int, i: int) -> list[Detection]:

@@ -3,12 +3,12 @@
 import hashlib
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from airtouch import __version__, logs
-from airtouch.detector import network, pruning, quantisation
+from airtouch.detector import network, normalisation, pruning, quantisation
 from airtouch.detector.features import Features, feature_windows, flight_features
 from airtouch.detector.losses import DEFAULT_LAMBDA, edge_loss
 from airtouch.detector.model_file import Model
@@ -59,45 +59,63 @@ def train_paper(
     sparsity: float = SPARSITY,
     block: int = pruning.BLOCK,
     df_lambda: float = DEFAULT_LAMBDA,
+    conv_sparsity: float = 0.0,
+    fixed_scale: bool = False,
     progress: Progress | None = None,
     command: str = "airtouch.detector.train.train_paper",
 ) -> Model:
     """Train, prune and quantise; the same arguments give the same bits on one machine.
 
     flights: with down range, for the true edges. sparsity: share of zeros in the first dense
-    layer, in blocks of `block` inputs (4, or 1 for single weights). df_lambda: weight of the
-    disturbance-force loss. Training stops early on flights held out by seed.
+    layer, in blocks of `block` inputs (4, or 1 for single weights); conv_sparsity: in the second
+    convolution. df_lambda: weight of the disturbance-force loss. fixed_scale: inputs on a fixed scale
+    instead of z-scored windows, so that the network can run as a stream. Training stops early on
+    flights held out by seed.
     Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
     """
-    _check(epochs, sparsity, block, df_lambda)
+    _check(epochs, sparsity, block, df_lambda, conv_sparsity)
     use_tensorflow(seed)
     told = progress or (lambda *_: None)
-    windows = training_windows(flights, told)
+    features = features_of(flights, told)
+    scale = None
+    if fixed_scale:
+        scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features)])
+    windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features))])
     held = held_out(len(flights), seed)
     kept = ~np.isin(windows.flight, held)
     if not kept.any() or len(np.unique(windows.over[kept])) < 2:
         raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
                             "give more flights")
     weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block,
-                               df_lambda, told)
+                               df_lambda, told, conv_sparsity)
     int8, tflite = quantisation.quantise(weights, windows.x[kept])
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
         "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block,
-        "lambda": df_lambda,
+        "lambda": df_lambda, "conv_sparsity": conv_sparsity,
         "flights": [os.path.basename(log.source) for log in flights],
         "held_out": [os.path.basename(flights[i].source) for i in held], "data_sha256": data_hash(windows),
-    })
+    }, scale)
     judged = accuracy(model, windows.select(~kept))
-    return Model(weights, int8, tflite, {**model.metadata, "held_out_accuracy": judged})
+    return replace(model, metadata={**model.metadata, "held_out_accuracy": judged})
+
+
+def features_of(flights: Sequence[FlightLog], progress: Progress) -> list[Features]:
+    """The features of every flight."""
+    found = []
+    for index, log in enumerate(flights):
+        found.append(flight_features(log))
+        progress("features", index + 1, len(flights), os.path.basename(log.source))
+    return found
 
 
 def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Windows:
-    """Every full window of every flight that ends in the air."""
-    parts = []
-    for index, log in enumerate(flights):
-        parts.append(windows_of(log, flight_features(log), index))
-        progress("features", index + 1, len(flights), os.path.basename(log.source))
+    """Every full window of every flight that ends in the air, z-scored by itself."""
+    return join([windows_of(log, f, i) for i, (log, f) in enumerate(zip(flights, features_of(flights, progress)))])
+
+
+def join(parts: Sequence[Windows]) -> Windows:
+    """All windows of several flights. Raises AirTouchError without any."""
     if not sum(len(part.x) for part in parts):
         raise AirTouchError("training: no flight holds a full window in the air; "
                             "3 s of flight at 100 Hz are needed")
@@ -105,9 +123,10 @@ def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Window
                      for name in ("x", "over", "alert", "flight")))
 
 
-def windows_of(log: FlightLog, features: Features, index: int = 0) -> Windows:
-    """The training windows of one flight."""
-    x, ends = feature_windows(features.fused, DEFAULT.feature_window)
+def windows_of(log: FlightLog, features: Features, index: int = 0,
+               scale: normalisation.FixedScale | None = None) -> Windows:
+    """The training windows of one flight, z-scored by themselves or on a fixed scale."""
+    x, ends = feature_windows(features.fused, DEFAULT.feature_window, scale)
     flying = logs.airborne(log)[ends]
     x, ends = x[flying], ends[flying]
     over = over_platform(logs.true_edges(log), len(log))
@@ -158,14 +177,14 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
 
 
 def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-                progress: Progress) -> tuple[network.Weights, int]:
+                progress: Progress, conv_sparsity: float = 0.0) -> tuple[network.Weights, int]:
     """The trained weights, and after how many epochs."""
-    model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress)
+    model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
     return network.weights_of_keras(model), len(losses)
 
 
 def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-              progress: Progress):  # noqa: ANN201 - (keras.Model, list[float])
+              progress: Progress, conv_sparsity: float = 0.0):  # noqa: ANN201 - (keras.Model, list[float])
     """The trained Keras model and the loss on the held-out windows after each epoch (on the training
     windows where none are held out). Windows may be of any length where sparsity is 0."""
     import keras
@@ -174,9 +193,11 @@ def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block
     batches = max(len(train.x) // BATCH, 1)
     pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
     constraints, callbacks = {}, []
-    if sparsity > 0:
-        constraint, schedule = pruning.pruning(sparsity, batches * pruned_epochs, block)
-        constraints, callbacks = {pruning.PRUNED: constraint}, [schedule]
+    shares = {pruning.PRUNED: sparsity, pruning.PRUNED_CONV: conv_sparsity}
+    shares = {name: share for name, share in shares.items() if share > 0}
+    if shares:
+        constraints, schedule = pruning.pruning(shares, batches * pruned_epochs, block)
+        callbacks = [schedule]
     model = network.build_keras(constraints, train.x.shape[1])
     rate = _rate_table(batches * epochs)
     model.compile(keras.optimizers.Adam(rate), loss=edge_loss(df_lambda, class_weights(train.over)),
@@ -233,11 +254,12 @@ def use_tensorflow(seed: int) -> None:
     tf.config.experimental.enable_op_determinism()
 
 
-def _check(epochs: int, sparsity: float, block: int, df_lambda: float) -> None:
+def _check(epochs: int, sparsity: float, block: int, df_lambda: float, conv_sparsity: float) -> None:
     if epochs < 1:
         raise AirTouchError(f"training: epochs must be at least 1, not {epochs}")
-    if not 0.0 <= sparsity < 1.0:
-        raise AirTouchError(f"training: sparsity must lie in 0..1, below 1, not {sparsity}")
+    for share in (sparsity, conv_sparsity):
+        if not 0.0 <= share < 1.0:
+            raise AirTouchError(f"training: sparsity must lie in 0..1, below 1, not {share}")
     if block not in (1, pruning.BLOCK):
         raise AirTouchError(f"training: blocks of 1 or {pruning.BLOCK} weights, not {block}")
     if not (np.isfinite(df_lambda) and df_lambda >= 0):
