@@ -18,6 +18,9 @@ COMMANDS = {
     "ablate": ("ablate", "Find what each part of the detectors is worth."),
     "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
     "simulate": ("simulate", "Fly a scenario in the simulator and write flight logs."),
+    "collect": ("collect", "Fly a mission with a Crazyflie and log it."),
+    "monitor": ("monitor", "Watch a Crazyflie live: signals, probability, edges."),
+    "replay": ("replay", "Show a recorded flight as it would look live."),
     "dataset": ("dataset", "Fetch the authors' public flights."),
     "demo": ("demo", "Run the whole pipeline and write an HTML report."),
 }

@@ -94,12 +94,12 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
 
 
 @contextmanager
-def stopping():
+def stopping(quiet: bool = False):
     """An event that Ctrl-C and the usual signals set instead of ending the process."""
     stop = threading.Event()
 
     def asked(*_) -> None:
-        if not stop.is_set():
+        if not stop.is_set() and not quiet:
             click.echo("landing; the log is kept", err=True)
         stop.set()
 

@@ -18,6 +18,7 @@ from airtouch.errors import AirTouchError
 CONNECT_S = 20.0
 ATTEMPT_S = 4.0  #: a first packet that is lost over UDP is never asked for again
 BLOCK_S = 3.0
+TAKEN_S = 0.1  #: that an app gets to put a parameter right
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
 LOG_PORT, SETTINGS_CHANNEL = 5, 1
@@ -182,6 +183,7 @@ class Drone:
                 time.sleep(0.02)
             self._cf.param.set_value(name, wanted)
             echoed.wait(patience_s)
+            time.sleep(TAKEN_S)
             self._cf.param.request_param_update(name)  # what it says it was given is not what it keeps
             count = len(told)
             while len(told) <= count and time.monotonic() < deadline:

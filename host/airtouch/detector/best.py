@@ -43,7 +43,7 @@ def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
     """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
     model = model or load(None)
     events = flight_events(log, model)
-    return _trace(log, model, events.logits, events.edge, events.airborne)
+    return trace_of(log, model, events.logits, events.edge, events.airborne)
 
 
 def run_float(log: FlightLog, model: StreamModel) -> Trace:
@@ -52,10 +52,10 @@ def run_float(log: FlightLog, model: StreamModel) -> Trace:
     steps = float_logits(model.weights, model.recipe, x)
     edge = np.zeros(len(log), dtype=np.uint8)
     edge[::STRIDE] = kernels.edge_decoder(steps, airborne[::STRIDE], model.decoder)
-    return _trace(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
+    return trace_of(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
 
 
-def _trace(log: FlightLog, model: StreamModel, logits: np.ndarray, edge: np.ndarray, airborne: np.ndarray) -> Trace:
+def trace_of(log: FlightLog, model: StreamModel, logits: np.ndarray, edge: np.ndarray, airborne: np.ndarray) -> Trace:
     """Edges with the highest probability of their crossing that led to them."""
     over, *crossing = (1.0 / (1.0 + np.exp(-logits.astype(np.float64)))).T
     recent = (model.decoder.hold_steps + model.decoder.look_back) * STRIDE

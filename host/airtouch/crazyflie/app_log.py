@@ -1,0 +1,53 @@
+"""What the app on the drone says of itself: the LOG group `airtouch`, as one block."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from airtouch.crazyflie.blocks import Block, available
+
+GROUP = "airtouch"
+#: most wanted first; 23 bytes
+WANTED = Block("airtouch", 50, tuple((f"{GROUP}.{name}", kind) for name, kind in (
+    ("probability", "FP16"), ("edges", "uint16_t"), ("edge", "uint8_t"), ("edgeSample", "uint32_t"), ("samples", "uint32_t"),
+    ("health", "uint16_t"), ("load", "uint16_t"), ("timeouts", "uint16_t"), ("lost", "uint16_t"), ("dropped", "uint16_t"),
+    ("detector", "uint8_t"), ("link", "uint8_t"))))
+KINDS = {1: "entry", 2: "exit"}
+DETECTORS = {0: "FR-CFAR on the STM32", 1: "best on the STM32", 2: "best on the GAP8", 3: "paper on the GAP8"}
+#: appHealth_t of firmware/app
+HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GAP8 fills its window",
+          8: "the GAP8 has another model", 16: "a setting was out of range", 32: "no AI-deck: another detector runs",
+          64: "the CPX queue was full", 128: "a step began late", 512: "a log variable is missing"}
+STALLED_S = 0.5
+
+
+@dataclass(frozen=True)
+class AppState:
+    """One packet of the app: P(over a platform), edges so far, the last one's kind and age (s), what is wrong."""
+
+    probability: float
+    edges: int
+    kind: str
+    age_s: float
+    detector: str
+    load_us: float
+    faults: tuple[str, ...]
+
+
+def block(known: Collection[str]) -> Block | None:
+    """The app's block as far as this firmware has it; None without the app."""
+    found = available(WANTED, known)
+    return found if any(name == f"{GROUP}.probability" for name in found.names) else None
+
+
+def state(values: Mapping[str, float]) -> AppState:
+    """A packet in words."""
+    def value(name: str, missing: float = 0.0) -> float:
+        return float(values.get(f"{GROUP}.{name}", missing))
+
+    health = int(value("health"))
+    faults = [text for bit, text in HEALTH.items() if health & bit]
+    if health & 2 and value("timeouts"):
+        faults[faults.index(HEALTH[2])] += f" ({int(value('timeouts'))} timeouts)"
+    age = max(value("samples") - value("edgeSample"), 0.0) * 0.01 if f"{GROUP}.edgeSample" in values else 0.0
+    return AppState(value("probability", float("nan")), int(value("edges")), KINDS.get(int(value("edge")), "edge"), age,
+                    DETECTORS.get(int(value("detector", -1)), "the app's detector"), value("load"), tuple(faults))

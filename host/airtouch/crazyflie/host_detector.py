@@ -1,0 +1,79 @@
+"""The `best` detector on the host, fed as samples come: from a drone without the app, or from a file."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from airtouch.detector import best
+from airtouch.detector.channels import level_acceleration
+from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.stream.recipe import STRIDE
+from airtouch.detector.trace import Detection, Trace
+from airtouch.kernels.stream_session import StreamSession
+from airtouch.logs.flight_log import GYRO, PWM, FlightLog
+
+MOST_FILLED = 100  #: samples of a gap that are given to the detector as missing
+
+
+class HostDetector:
+    """The C that flies, sample by sample. `next` takes rows, `trace` gives what `best.run` gives of all of them."""
+
+    def __init__(self, model: StreamModel | None = None) -> None:
+        self.model = model or best.load(None)
+        self.lag_s = best.lag_s(self.model)
+        self._session = StreamSession(self.model.int8, self.model.recipe.motion, self.model.decoder)
+        self._logits: list[np.ndarray] = []
+        self._edge: list[np.ndarray] = []
+        self._airborne: list[np.ndarray] = []
+        self.taken = 0  #: rows so far
+
+    def next(self, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[Detection]]:
+        """(P(over a platform) (n,), the edges reported at these rows). Raises AirTouchError for missing columns."""
+        log = FlightLog(dict(columns), {"source": "live"})
+        events = self._session.next(level_acceleration(log), log.stack(GYRO), log.stack(PWM))
+        for kept, new in ((self._logits, events.logits), (self._edge, events.edge), (self._airborne, events.airborne)):
+            kept.append(new)
+        recent = (self.model.decoder.hold_steps + self.model.decoder.look_back) * STRIDE
+        found = []
+        for i in np.flatnonzero(events.edge):
+            past = np.concatenate(self._logits[-recent:])[-(recent + len(log)):]
+            upto = len(past) - len(log) + int(i)
+            crossing = past[max(upto - recent, 0):upto + 1, int(events.edge[i])].max()
+            found.append(Detection(self.taken + int(i), best.KINDS[int(events.edge[i])], _sigmoid(float(crossing))))
+        self.taken += len(log)
+        over = _sigmoid(events.logits[:, 0].astype(np.float64))
+        return np.where(events.airborne, over, 0.0), found
+
+    def trace(self, log: FlightLog) -> Trace:
+        """The trace of every row so far; `log` holds the same rows."""
+        return best.trace_of(log, self.model, np.concatenate(self._logits), np.concatenate(self._edge),
+                             np.concatenate(self._airborne))
+
+
+def with_gaps(times_ms: np.ndarray, columns: Mapping[str, np.ndarray], before_ms: int | None,
+              period_ms: int = 10) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Rows with the lost ones between them as NaN, so that the detector's clock stays true.
+
+    before_ms: time of the row before, None at the start. At most MOST_FILLED rows for one gap; rows that
+    are not later than the one before them are left out.
+    """
+    before = times_ms[0] - period_ms if before_ms is None else before_ms
+    newest = np.maximum.accumulate(np.r_[before, times_ms])[:-1]
+    kept = times_ms > newest
+    times = times_ms[kept]
+    steps = np.diff(np.r_[before, times])
+    missing = np.clip((steps + period_ms // 2) // period_ms - 1, 0, MOST_FILLED).astype(int)
+    at = np.cumsum(missing + 1) - 1
+    total = int(at[-1]) + 1 if len(at) else 0
+    filled = {name: np.full(total, np.nan) for name in columns}
+    for name, values in columns.items():
+        filled[name][at] = np.asarray(values, dtype=np.float64)[kept]
+    clock = np.full(total, -1, dtype=np.int64)
+    clock[at] = times
+    for i in np.flatnonzero(clock < 0)[::-1]:
+        clock[i] = clock[i + 1] - period_ms
+    return clock, filled
+
+
+def _sigmoid(x):
+    return 1.0 / (1.0 + np.exp(-x))

@@ -1,0 +1,127 @@
+"""`monitor`: a drone's packets onto the board, edges from its app or from the detector on the host."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from threading import Event
+
+import numpy as np
+
+from airtouch.crazyflie import app_log, blocks
+from airtouch.crazyflie.board import Board, Felt, Link
+from airtouch.crazyflie.drone import Drone, Sample, drain
+from airtouch.crazyflie.host_detector import HostDetector, with_gaps
+from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.ticks import Restarted
+from airtouch.errors import AirTouchError
+
+TURN_S = 0.05
+PING_S = 0.5
+RATE_S = 2.0  #: over which the rate is counted
+REOPEN_S = 5.0
+
+
+def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostDetector | None]:
+    """Start the blocks. Returns (slow block, host's detector or None where the app on the drone is shown).
+
+    Raises AirTouchError for what the drone lacks.
+    """
+    known = drone.variables
+    blocks.check(blocks.MOTION, known)
+    slow = blocks.available(blocks.STATE, known)
+    slow = slow if slow.variables else None
+    app = app_log.block(known)
+    for block in filter(None, (blocks.MOTION, slow, app)):
+        drone.start(block)
+    return slow, HostDetector() if host_detector or app is None else None
+
+
+@dataclass
+class Monitor:
+    """Takes packets, keeps the board. felt: called with every edge."""
+
+    board: Board
+    intake: Intake
+    detector: HostDetector | None
+    felt: Callable[[Felt], None] = lambda _: None
+    app: app_log.AppState | None = None
+    _before_ms: int | None = None
+    _edges: int | None = None
+    _arrivals: deque = field(default_factory=deque)
+    _drops: deque = field(default_factory=deque)
+
+    def take(self, samples: list[Sample]) -> None:
+        """New packets. Raises Restarted when the drone's clock started anew."""
+        for sample in samples:
+            if sample.block == app_log.WANTED.name:
+                self._take_app(sample)
+        times, columns = self.intake.take([s for s in samples if s.block != app_log.WANTED.name])
+        if not len(times):
+            return
+        order = np.argsort(times, kind="stable")
+        clock, filled = with_gaps(times[order], {n: v[order] for n, v in columns.items()}, self._before_ms)
+        if not len(clock):
+            return
+        self._before_ms = int(clock[-1])
+        self._arrivals += [(time.monotonic(), len(times))]
+        seconds = (clock - self.intake.first_ms) / 1000.0
+        found = []
+        if self.detector:
+            probability, found = self.detector.next(filled)
+            begin = self.detector.taken - len(clock)
+        else:
+            probability = np.full(len(clock), self.app.probability if self.app else np.nan)
+        self.board.add(seconds, filled, probability)
+        for edge in found:
+            self.felt(self.board.feel(edge.kind, float(seconds[edge.sample - begin]), edge.probability))
+
+    def _take_app(self, sample: Sample) -> None:
+        self.app = app_log.state(sample.values)
+        if self.detector is None:
+            self.board.detector = self.app.detector
+            if self._edges is not None and self.app.edges != self._edges and self.intake.first_ms is not None:
+                at = (self.intake.ticks.unwrap(sample.stamp) - self.intake.first_ms) / 1000.0 - self.app.age_s
+                self.felt(self.board.feel(self.app.kind, at, self.app.probability))
+            self._edges = self.app.edges
+        faults = "; ".join(self.app.faults)
+        self.board.status = f"app {self.app.load_us:.0f} us" + (f"; {faults}" if faults else "")
+
+    def refresh(self, round_trip_s: float) -> None:
+        """Bring the link's figures up to date."""
+        now = time.monotonic()
+        while self._arrivals and now - self._arrivals[0][0] > RATE_S:
+            self._arrivals.popleft()
+        span = now - self._arrivals[0][0] if self._arrivals else 0.0
+        i = self.intake
+        total = i.received + i.lost
+        silent = now - i.last_arrival_s if i.last_arrival_s is not None else 0.0
+        self.board.link = Link(sum(n for _, n in self._arrivals) / span if span > 0.2 else float("nan"),
+                               i.lost / total if total else 0.0, i.lateness_s, round_trip_s, silent)
+
+
+def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event, show: Callable[[Board], None],
+          say: Callable[[str], None]) -> None:
+    """Until the duration is over or `stop` is set; a broken link is opened again for as long."""
+    until = time.monotonic() + duration_s if duration_s else float("inf")
+    pinged = 0.0
+    while time.monotonic() < until and not stop.is_set():
+        if drone.lost.is_set():
+            say("the link broke; connecting anew")
+            try:
+                drone.reopen(min(REOPEN_S, max(until - time.monotonic(), 0.1)))
+            except AirTouchError:
+                continue
+        try:
+            monitor.take(drain(drone.samples))
+        except Restarted:
+            say("the drone restarted")
+            monitor.intake = Intake(monitor.intake.slow)
+            monitor._before_ms = None
+            continue
+        if time.monotonic() - pinged > PING_S:
+            drone.ping()
+            pinged = time.monotonic()
+        monitor.refresh(drone.round_trip_s)
+        show(monitor.board)
+        time.sleep(TURN_S)

@@ -1,0 +1,55 @@
+"""`replay`: a recorded flight through the detector and the board that a live one goes through."""
+
+import time
+from collections.abc import Callable
+from threading import Event
+
+import numpy as np
+
+from airtouch.crazyflie.board import Board, Felt
+from airtouch.crazyflie.host_detector import HostDetector
+from airtouch.detector import best, evaluate
+from airtouch.detector.dataset import FlightFile
+from airtouch.detector.score import SAMPLE_PERIOD_S, score_flight
+from airtouch.logs import airborne
+from airtouch.logs.flight_log import FlightLog
+
+CHUNK = 5  #: rows a turn, 50 ms
+
+
+def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
+    """x_m, y_m of a log that has none, at constant speed straight ahead while in the air; nothing without a speed."""
+    if log.has("x_m", "y_m") or speed_mps is None:
+        return {}
+    along = np.cumsum(airborne(log)) * SAMPLE_PERIOD_S * speed_mps
+    return {"x_m": along, "y_m": np.zeros(len(log))}
+
+
+def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 0.0, speed_mps: float | None = None,
+        stop: Event, show: Callable[[Board], None] = lambda _: None, felt: Callable[[Felt], None] = lambda _: None) -> int:
+    """Feed the log in steps of 50 ms, at `speed` times real time, 0 for as fast as it goes. Returns the rows fed."""
+    columns = {**log.columns, **position(log, speed_mps)}
+    began = time.monotonic()
+    for first in range(0, len(log), CHUNK):
+        if stop.is_set():
+            return first
+        rows = {name: values[first:first + CHUNK] for name, values in columns.items()}
+        count = len(next(iter(rows.values())))
+        probability, found = detector.next(rows)
+        board.add((first + np.arange(count)) * SAMPLE_PERIOD_S, rows, probability)
+        for edge in found:
+            felt(board.feel(edge.kind, edge.sample * SAMPLE_PERIOD_S, edge.probability))
+        show(board)
+        if speed > 0.0:
+            ahead = (first + count) * SAMPLE_PERIOD_S / speed - (time.monotonic() - began)
+            if ahead > 0.0:
+                stop.wait(ahead)
+    return len(log)
+
+
+def result(file: FlightFile, log: FlightLog, detector: HostDetector) -> evaluate.Result:
+    """What `evaluate` says of the flight, from what the detector said step by step."""
+    trace = detector.trace(log)
+    score = score_flight(file.path.name, file.condition, evaluate.truth(log), airborne(log), trace.probability,
+                         trace.edges, best.lag_s(detector.model))
+    return evaluate.Result(log, trace, score)
