@@ -23,7 +23,7 @@ from airtouch.detector.model_file import Model
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
-from airtouch.kernels.network import probability as window_probability
+from airtouch.kernels.rolling import probability_of_stream
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.int8_network import multiplications
@@ -46,10 +46,15 @@ def probability_of(model: Model, fused: np.ndarray) -> np.ndarray:
     """P(over a platform), (n,), of a flight's fused features (n, 3); NaN where there is none."""
     if model.scale is None:
         return probability_of_flight(model, fused)
-    windows, ends = feature_windows(fused, DEFAULT.feature_window, model.scale)
-    probability = np.full(len(fused), np.nan)
-    probability[ends] = window_probability(model, windows)
-    return probability
+    return probability_of_stream(model, fused, stride(model))
+
+
+def stride(model: Model) -> int:
+    """Samples to one answer where the model runs as a stream."""
+    value = model.metadata.get("stride", 1)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+        raise AirTouchError(f"the model's stride must be a whole number from 1, not {value!r}; train it again")
+    return value
 
 
 def run_float(log: FlightLog, model: Model) -> Trace:

@@ -71,14 +71,32 @@ def multiplications(network: Int8Network) -> int:
     no position is computed that the pool after a convolution drops."""
     total = 0
     for layer, after in zip(network.layers, (*network.layers[1:], None)):
-        if layer.kind == "max_pool":
-            continue
-        weights = 4 * len(sparse_blocks(layer.weights)[0]) if runs_sparse(layer) else layer.weights.size
         rows, columns, _ = layer.output_shape
         if after is not None and after.kind == "max_pool":
             rows, columns = (n - n % k for n, k in zip((rows, columns), after.kernel))
-        total += rows * columns * weights
+        total += rows * columns * _weights_used(layer)
     return total
+
+
+def stream_multiplications(network: Int8Network, stride: int) -> float:
+    """Multiplications a sample where the network rolls over a stream, mean over `stride` samples.
+
+    A layer's row is computed on each sample, or on as few as the pools before it and the stride let it.
+    """
+    total, period = 0.0, 1
+    for layer in network.layers:
+        if layer.kind == "max_pool":
+            period = min(period * layer.kernel[0], stride)
+        columns = layer.output_shape[1] if layer.kind == "conv" else 1
+        total += columns * _weights_used(layer) / period
+    return total
+
+
+def _weights_used(layer: Int8Layer) -> int:
+    """Weights that are multiplied with one position of the input."""
+    if layer.kind == "max_pool":
+        return 0
+    return 4 * len(sparse_blocks(layer.weights)[0]) if runs_sparse(layer) else layer.weights.size
 
 
 def quantised_multiplier(real: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <stdint.h>
+
+enum { FIXED_SCALE_MAX_COLUMNS = 8 };
+
+// How the fused features of a sample become inputs that do not depend on other samples:
+// x = clip((log2(feature) - mean) * inverseDeviation), column by column.
+typedef struct {
+  int32_t columns;
+  float mean[FIXED_SCALE_MAX_COLUMNS];
+  float inverseDeviation[FIXED_SCALE_MAX_COLUMNS];
+} fixedScale_t;
+
+#define FIXED_SCALE_SMALLEST 9.094947017729282e-13f  // 2^-40: a smaller feature counts as this
+#define FIXED_SCALE_LIMIT 4.0f                       // deviations at which inputs are clamped
+
+/**
+ * @brief The inputs of one sample from its features (both `columns` floats).
+ *
+ * The logarithm is a series within 3e-7 of log2, made of IEEE single operations alone, so
+ * that every machine gives the same bits (build without contraction). One division a
+ * column. NaN counts as FIXED_SCALE_SMALLEST; whoever calls resets the stream there.
+ */
+void fixedScaleApply(const fixedScale_t *scale, const float *features, float *x);
