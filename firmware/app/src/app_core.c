@@ -38,8 +38,8 @@ static void setThresholds(appCore_t *core) {
 static void beginPipeline(appCore_t *core) {
   edgePipelineConfig_t config;
   edgePipelineDefaults(&config, &airtouchStreamMotion.vehicle);
-  config.lowHz = core->params.bandLow;
-  config.highHz = core->params.bandHigh;
+  config.lowHz = core->params.bandMid - 0.5f * core->params.bandWidth;
+  config.highHz = core->params.bandMid + 0.5f * core->params.bandWidth;
   config.pFa = core->params.pFa;
   config.dwellSamples = APP_PAPER_DWELL_SAMPLES;
   config.alertHold = APP_PAPER_ALERT_HOLD;
@@ -100,7 +100,7 @@ uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   core->params = *params;
   if (params->detector != old.detector || params->enable != old.enable) {
     begin(core);
-  } else if (params->bandLow != old.bandLow || params->bandHigh != old.bandHigh || params->pFa != old.pFa) {
+  } else if (params->bandMid != old.bandMid || params->bandWidth != old.bandWidth || params->pFa != old.pFa) {
     beginPipeline(core);
     beginLink(core);
   }

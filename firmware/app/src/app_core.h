@@ -80,8 +80,8 @@ typedef struct {
 void appParamsDefaults(appParams_t *params);
 
 /**
- * Puts settings that are out of range right: each to its nearest limit, both bands or both
- * probabilities to their defaults where they exclude each other, what is not finite to its default.
+ * Puts settings that are out of range right: each to its nearest limit, what is not finite to its default.
+ * The band and probabilityOut are limited by their partners, so the order of two changes does not matter.
  * @return how many were changed
  */
 uint16_t appParamsClamp(appParams_t *params);

@@ -8,8 +8,8 @@ void appParamsDefaults(appParams_t *params) {
       .enable = 1,
       .detector = APP_BEST_GAP8,
       .filter = APP_FILTER_AS_TRAINED,
-      .bandLow = AIRTOUCH_BAND_LOW_HZ,
-      .bandHigh = AIRTOUCH_BAND_HIGH_HZ,
+      .bandMid = 0.5f * (AIRTOUCH_BAND_LOW_HZ + AIRTOUCH_BAND_HIGH_HZ),
+      .bandWidth = AIRTOUCH_BAND_HIGH_HZ - AIRTOUCH_BAND_LOW_HZ,
       .pFa = AIRTOUCH_P_FA,
       .probabilityIn = APP_PAPER_PROBABILITY_IN,
       .probabilityOut = APP_PAPER_PROBABILITY_OUT,
@@ -27,26 +27,10 @@ static uint16_t clampByte(uint8_t *value, uint8_t high) {
 }
 
 static uint16_t clampSetting(float *value, float low, float high, float usual) {
-  const float right = isfinite(*value) ? clampFloat(*value, low, high) : usual;
+  const float right = clampFloat(isfinite(*value) ? *value : usual, low, high);
   const uint16_t changed = right != *value;
   *value = right;
   return changed;
-}
-
-/** Two settings of which the first must be the smaller one. */
-static uint16_t order(float *low, float *high, bool fit, float usualLow, float usualHigh) {
-  if (fit) {
-    return 0;
-  }
-  const uint16_t changed = (uint16_t)((*low != usualLow) + (*high != usualHigh));
-  *low = usualLow;
-  *high = usualHigh;
-  return changed;
-}
-
-static bool bandFits(float low, float high) {
-  const uint16_t bins = bandPowerBins(AIRTOUCH_SAMPLE_RATE_HZ, AIRTOUCH_BAND_WINDOW, low, high, NULL);
-  return bins > 0 && bins <= EDGE_PIPELINE_MAX_BINS;
 }
 
 uint16_t appParamsClamp(appParams_t *params) {
@@ -55,17 +39,13 @@ uint16_t appParamsClamp(appParams_t *params) {
   uint16_t changed = clampByte(&params->enable, 1);
   changed = (uint16_t)(changed + clampByte(&params->detector, APP_PAPER_GAP8));
   changed = (uint16_t)(changed + clampByte(&params->filter, APP_FILTER_AS_TRAINED));
-  changed = (uint16_t)(changed + clampSetting(&params->bandLow, 1.0f, 48.0f, usual.bandLow));
-  changed = (uint16_t)(changed + clampSetting(&params->bandHigh, 1.0f, 48.0f, usual.bandHigh));
+  // 5 bins of 0.5 Hz are all that the band's storage has room for, at least one must lie within.
+  changed = (uint16_t)(changed + clampSetting(&params->bandWidth, 0.6f, 2.0f, usual.bandWidth));
+  changed = (uint16_t)(changed + clampSetting(&params->bandMid, 2.0f, 48.0f, usual.bandMid));
   changed = (uint16_t)(changed + clampSetting(&params->pFa, 1e-12f, 0.5f, usual.pFa));
-  changed = (uint16_t)(changed + clampSetting(&params->probabilityIn, 0.01f, 0.99f, usual.probabilityIn));
-  changed = (uint16_t)(changed + clampSetting(&params->probabilityOut, 0.01f, 0.99f, usual.probabilityOut));
+  changed = (uint16_t)(changed + clampSetting(&params->probabilityIn, 0.02f, 0.99f, usual.probabilityIn));
+  const float below = params->probabilityIn - 0.01f;
+  changed = (uint16_t)(changed + clampSetting(&params->probabilityOut, 0.01f, below, usual.probabilityOut));
   changed = (uint16_t)(changed + clampSetting(&params->scoreIn, -8.0f, 12.0f, usual.scoreIn));
-  changed = (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, usual.scoreOut));
-  changed = (uint16_t)(changed + order(&params->bandLow, &params->bandHigh, bandFits(params->bandLow, params->bandHigh),
-                                       usual.bandLow, usual.bandHigh));
-  changed = (uint16_t)(changed + order(&params->probabilityOut, &params->probabilityIn,
-                                       params->probabilityOut < params->probabilityIn, usual.probabilityOut,
-                                       usual.probabilityIn));
-  return changed;
+  return (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, usual.scoreOut));
 }

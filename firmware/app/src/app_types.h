@@ -21,8 +21,8 @@ typedef struct {
   uint8_t enable;        ///< 0: nothing is computed, nothing is sent
   uint8_t detector;      ///< appDetector_t
   uint8_t filter;        ///< 1: an edge counts only shortly after an FR-CFAR alert
-  float bandLow;         ///< Hz, FC-FE
-  float bandHigh;        ///< Hz
+  float bandMid;         ///< Hz, FC-FE: middle of the band
+  float bandWidth;       ///< Hz, both edges included
   float pFa;             ///< FR-CFAR: probability of false alarm
   float probabilityIn;   ///< `paper`: over a platform from here up
   float probabilityOut;  ///< `paper`: off it from here down

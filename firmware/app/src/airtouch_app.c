@@ -1,0 +1,247 @@
+// The app in the firmware: a 100 Hz task around app_core.h. It reads log variables and writes its own; it never
+// calls into the stabiliser, never waits for a packet, and allocates nothing.
+#include <string.h>
+
+#include "FreeRTOS.h"
+#include "queue.h"
+#include "task.h"
+
+#include "app.h"
+#include "autoconf.h"
+#include "cpx.h"
+#include "cpx_internal_router.h"
+#include "log.h"
+#include "param.h"
+#include "usec_time.h"
+
+#define DEBUG_MODULE "AIRTOUCH"
+#include "debug.h"
+
+#include "app_core.h"
+#include "app_sensors.h"
+
+#define PERIOD M2T(10)
+#define STALLED M2T(50)
+#define GIVE_UP M2T(100)  // so late that the missed steps are left out
+#define INBOX 4
+
+typedef struct {
+  uint8_t length;
+  uint8_t bytes[EDGE_LINK_MAX_BYTES];
+} appPacket_t;
+
+static appCore_t core;
+static appParams_t wanted;  // the PARAM group; compared with what is in force before each step
+static volatile TickType_t lastStep;
+
+static uint8_t inboxStorage[INBOX * sizeof(appPacket_t)];
+static StaticQueue_t inboxMemory;
+static QueueHandle_t inbox;
+
+/** Runs in the CPX task: copies the packet and returns. */
+static void takePacket(const CPXPacket_t *received) {
+  static appPacket_t packet;  // of the one CPX task
+  if (received->dataLength > EDGE_LINK_MAX_BYTES) {
+    return;
+  }
+  packet.length = (uint8_t)received->dataLength;
+  memcpy(packet.bytes, received->data, packet.length);
+  xQueueSend(inbox, &packet, 0);  // full: the GAP8's next answer repeats what this one said
+}
+
+static bool hasGap8(void) {
+#ifdef CONFIG_ENABLE_CPX
+  const paramVarId_t deck = paramGetVarId("deck", "bcAI");
+  return PARAM_VARID_IS_VALID(deck) && paramGetUint(deck) != 0;
+#else
+  return false;
+#endif
+}
+
+static void receivePackets(void) {
+  static appPacket_t packet;
+  while (xQueueReceive(inbox, &packet, 0) == pdTRUE) {
+    appCoreReceive(&core, packet.bytes, packet.length);
+  }
+}
+
+static void sendPackets(void) {
+#ifdef CONFIG_ENABLE_CPX
+  static CPXPacket_t packet;
+  cpxInitRoute(CPX_T_STM32, CPX_T_GAP8, CPX_F_APP, &packet.route);
+  for (int i = 0; i < APP_PACKETS; i++) {
+    packet.dataLength = appCoreOutgoing(&core, packet.data);
+    if (packet.dataLength == 0) {
+      return;
+    }
+    appCoreSent(&core, cpxSendPacketBlockingTimeout(&packet, 0));
+  }
+#endif
+}
+
+/** Takes changed parameters over; those out of range are written back as they were put right. */
+static void takeParams(void) {
+  const appParams_t asked = wanted;
+  if (memcmp(&asked, &core.params, sizeof asked) == 0) {
+    return;
+  }
+  appParams_t inForce = asked;
+  if (appCoreSetParams(&core, &inForce) == 0) {
+    return;
+  }
+  DEBUG_PRINT("Parameter out of range, put right\n");
+  taskENTER_CRITICAL();
+  if (memcmp(&wanted, &asked, sizeof asked) == 0) {
+    wanted = inForce;
+  }
+  taskEXIT_CRITICAL();
+}
+
+static void step(bool late) {
+  static appSample_t sample;
+  const uint64_t start = usecTimestamp();
+  takeParams();
+  receivePackets();
+  appSensorsRead(&sample);
+  if (appCoreStep(&core, &sample)) {
+    DEBUG_PRINT("Edge %u\n", core.log.edge);
+  }
+  sendPackets();
+  appCoreTime(&core, (uint32_t)(usecTimestamp() - start), late);
+}
+
+static void start(void) {
+  static const char *const names[] = {"FR-CFAR", "best", "best on the GAP8", "paper on the GAP8"};
+  const bool gap8 = hasGap8();
+  inbox = xQueueCreateStatic(INBOX, sizeof(appPacket_t), inboxStorage, &inboxMemory);
+#ifdef CONFIG_ENABLE_CPX
+  cpxRegisterAppMessageHandler(takePacket);
+#else
+  (void)takePacket;
+#endif
+  appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());
+  wanted = core.params;
+  if (!appSensorsInit()) {
+    appCoreNoSensor(&core);
+    DEBUG_PRINT("A log variable is missing: it reads as NaN\n");
+  }
+  DEBUG_PRINT("%s AI-deck; detector: %s\n", gap8 ? "With" : "No", names[core.log.detector]);
+}
+
+void appMain(void) {
+  start();
+  TickType_t due = xTaskGetTickCount();
+  while (1) {
+    vTaskDelayUntil(&due, PERIOD);
+    const TickType_t now = xTaskGetTickCount();
+    const TickType_t behind = now - due;
+    if (behind > GIVE_UP) {
+      due = now;
+    }
+    step(behind >= PERIOD);
+    lastStep = xTaskGetTickCount();
+  }
+}
+
+/** The health flags as of now: a step that does not come is noticed by who asks. */
+static uint16_t healthNow(uint32_t timestamp, void *data) {
+  (void)timestamp;
+  (void)data;
+  const bool stalled = xTaskGetTickCount() - lastStep > STALLED;
+  return (uint16_t)(core.log.health | (stalled ? APP_STALLED : 0));
+}
+
+static logByFunction_t healthLogger = {.acquireUInt16 = healthNow};
+
+/**
+ * What AirTouch feels: edges below the drone, and how well it runs.
+ */
+LOG_GROUP_START(airtouch)
+/** @brief Fused feature of the accelerations, (m/s^2)^3 */
+LOG_ADD(LOG_FLOAT, fAcc, &core.log.feature[0])
+/** @brief Fused feature of the angular rates, (rad/s)^3 */
+LOG_ADD(LOG_FLOAT, fGyro, &core.log.feature[1])
+/** @brief Fused feature of the motors, PWM^3 */
+LOG_ADD(LOG_FLOAT, fMotor, &core.log.feature[2])
+/** @brief Disturbance force f_w, level axes [N] */
+LOG_ADD(LOG_FLOAT, fwx, &core.log.force[0])
+LOG_ADD(LOG_FLOAT, fwy, &core.log.force[1])
+LOG_ADD(LOG_FLOAT, fwz, &core.log.force[2])
+/** @brief FR-CFAR: the cell under test [N^2] */
+LOG_ADD(LOG_FLOAT, cell, &core.log.cfarPower)
+/** @brief FR-CFAR: its threshold [N^2], NaN until known */
+LOG_ADD(LOG_FLOAT, thresh, &core.log.threshold)
+/** @brief FR-CFAR: the cell exceeds its threshold */
+LOG_ADD(LOG_UINT8, alert, &core.log.alert)
+/** @brief P(over a platform), NaN while unknown */
+LOG_ADD(LOG_FLOAT, prob, &core.log.probability)
+/** @brief `best`: logits of over, entry, exit */
+LOG_ADD(LOG_FLOAT, lOver, &core.log.logit[0])
+LOG_ADD(LOG_FLOAT, lEntry, &core.log.logit[1])
+LOG_ADD(LOG_FLOAT, lExit, &core.log.logit[2])
+/** @brief Edges reported so far */
+LOG_ADD(LOG_UINT16, edges, &core.log.edges)
+/** @brief The last edge: 0 none, 1 entry, 2 exit, 3 of unknown kind */
+LOG_ADD(LOG_UINT8, edge, &core.log.edge)
+/** @brief The step at which it was reported */
+LOG_ADD(LOG_UINT32, edgeStep, &core.log.edgeSample)
+/** @brief Over a platform, as the last edge says */
+LOG_ADD(LOG_UINT8, over, &core.log.over)
+/** @brief Steps of 10 ms so far; stands still where the app does */
+LOG_ADD(LOG_UINT32, steps, &core.log.samples)
+/** @brief 0 is good; bits: app_core.h, appHealth_t */
+LOG_ADD_BY_FUNCTION(LOG_UINT16, health, &healthLogger)
+/** @brief Time of the last step, and of the longest [us] */
+LOG_ADD(LOG_UINT16, load, &core.log.load)
+LOG_ADD(LOG_UINT16, loadMax, &core.log.loadMax)
+/** @brief Steps that began late */
+LOG_ADD(LOG_UINT16, late, &core.log.late)
+/** @brief The detector in force: 0 FR-CFAR, 1 best, 2 best on the GAP8, 3 paper on the GAP8 */
+LOG_ADD(LOG_UINT8, detector, &core.log.detector)
+/** @brief Link to the GAP8: 0 starting, 1 filling, 2 up, 3 down, 4 refused */
+LOG_ADD(LOG_UINT8, link, &core.log.link)
+/** @brief Samples that the last answer of the GAP8 lagged */
+LOG_ADD(LOG_UINT16, lag, &core.log.lag)
+/** @brief Outputs of the network so far */
+LOG_ADD(LOG_UINT32, answers, &core.log.answers)
+/** @brief Packets that the CPX queue did not take */
+LOG_ADD(LOG_UINT32, dropped, &core.log.dropped)
+/** @brief Samples that never reached the GAP8 */
+LOG_ADD(LOG_UINT32, lost, &core.log.lost)
+/** @brief Times that the GAP8 did not answer in time */
+LOG_ADD(LOG_UINT32, timeouts, &core.log.timeouts)
+/** @brief Resets of the GAP8 that were noticed */
+LOG_ADD(LOG_UINT32, resets, &core.log.gap8Resets)
+/** @brief The GAP8's time since its start, of its last heartbeat [ms] */
+LOG_ADD(LOG_UINT32, gap8Up, &core.log.gap8Uptime)
+/** @brief Values that were not finite and were replaced */
+LOG_ADD(LOG_UINT32, nonFin, &core.log.nonFinite)
+/** @brief Parameters that were out of range and were put right */
+LOG_ADD(LOG_UINT16, badParam, &core.log.paramErrors)
+LOG_GROUP_STOP(airtouch)
+
+/**
+ * Settings of AirTouch. What is out of range is put right within 10 ms, and counted in airtouch.badParam.
+ */
+PARAM_GROUP_START(airtouch)
+/** @brief 0: nothing is computed, nothing is sent */
+PARAM_ADD(PARAM_UINT8, enable, &wanted.enable)
+/** @brief 0 FR-CFAR, 1 best, 2 best on the GAP8, 3 paper on the GAP8 */
+PARAM_ADD(PARAM_UINT8, detector, &wanted.detector)
+/** @brief Edges need an FR-CFAR alert: 0 never, 1 always, 2 as the detector was trained */
+PARAM_ADD(PARAM_UINT8, filter, &wanted.filter)
+/** @brief FC-FE: middle of the band, 2 to 48 [Hz] */
+PARAM_ADD(PARAM_FLOAT, bandMid, &wanted.bandMid)
+/** @brief FC-FE: width of the band, 0.6 to 2 [Hz] */
+PARAM_ADD(PARAM_FLOAT, bandWidth, &wanted.bandWidth)
+/** @brief FR-CFAR: probability of false alarm, 1e-12 to 0.5 */
+PARAM_ADD(PARAM_FLOAT, pFa, &wanted.pFa)
+/** @brief paper: over a platform from this probability up */
+PARAM_ADD(PARAM_FLOAT, probIn, &wanted.probabilityIn)
+/** @brief paper: off it from this probability down */
+PARAM_ADD(PARAM_FLOAT, probOut, &wanted.probabilityOut)
+/** @brief best: an entry fires above this logit */
+PARAM_ADD(PARAM_FLOAT, scoreIn, &wanted.scoreIn)
+/** @brief best: an exit fires above this logit */
+PARAM_ADD(PARAM_FLOAT, scoreOut, &wanted.scoreOut)
+PARAM_GROUP_STOP(airtouch)
