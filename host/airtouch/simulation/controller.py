@@ -13,6 +13,7 @@ from airtouch.simulation.compiled import jit
 RATE, ANGLE, SPEED, PLACE = 0, 3, 6, 9  #: places of the loops in the memory
 INTEGRAL, PREVIOUS, DESIRED, THRUST, SIZE = 0, 12, 24, 27, 28  #: blocks of the memory
 MODE, X, Y, Z, VX, VY, YAW, MOTORS, SETPOINT_SIZE = range(9)  #: places in a set-point row
+FLY, HOLD, TILT, TILT_THRUST = 0.0, 1.0, 2.0, 3.0  #: values of MODE, see position_loop
 POSITION_STEPS = 5  #: physics steps a run of the position controller
 
 
@@ -41,10 +42,29 @@ def reset(memory, yaw_deg):
 def position_loop(plant, memory, setpoint, place, velocity, yaw):
     """100 Hz: desired roll, pitch (degrees) and thrust (PWM) into memory.
 
-    setpoint: one row (MODE 1: hold x, y; 0: fly vx, vy, world axes). place, velocity (3,):
+    setpoint: one row. MODE HOLD: hold x, y; FLY: fly vx, vy, world axes; TILT: vx, vy are roll
+    and pitch in degrees; TILT_THRUST: so, and z is the thrust, PWM. place, velocity (3,):
     estimates, world axes. yaw in rad.
     """
     h = POSITION_STEPS * plant.step
+    memory[DESIRED + 2] = math.degrees(setpoint[YAW])
+    if setpoint[MODE] < 1.5:
+        _tilt(plant, memory, setpoint, place, velocity, yaw, h)
+    else:
+        memory[DESIRED], memory[DESIRED + 1] = setpoint[VX], setpoint[VY]
+    if setpoint[MODE] > 2.5:
+        memory[THRUST] = setpoint[Z]
+        return
+    k = plant.height_gain
+    climb = limit(pid(memory, PLACE + 2, setpoint[Z] - place[2], 2.0 * k, 0.5 * k, h, 5000.0), 1.1)
+    lift = limit(pid(memory, SPEED + 2, climb - velocity[2], 25.0 * k, 15.0 * k, h, 5000.0), 32.767)
+    thrust = lift * plant.thrust_scale + plant.thrust_base
+    memory[THRUST] = min(max(thrust, plant.thrust_min), 65535.0)
+
+
+@jit
+def _tilt(plant, memory, setpoint, place, velocity, yaw, h):
+    """Desired roll and pitch that hold a place or fly a velocity."""
     c, s = math.cos(yaw), math.sin(yaw)
     k = plant.position_gain
     if setpoint[MODE] > 0.5:
@@ -59,12 +79,6 @@ def position_loop(plant, memory, setpoint, place, velocity, yaw):
     roll = -pid(memory, SPEED + 1, want_y - left, 25.0 * k, 1.0 * k, h, 5000.0)
     memory[DESIRED] = limit(roll, plant.tilt_limit)
     memory[DESIRED + 1] = limit(pitch, plant.tilt_limit)
-    memory[DESIRED + 2] = math.degrees(setpoint[YAW])
-    k = plant.height_gain
-    climb = limit(pid(memory, PLACE + 2, setpoint[Z] - place[2], 2.0 * k, 0.5 * k, h, 5000.0), 1.1)
-    lift = limit(pid(memory, SPEED + 2, climb - velocity[2], 25.0 * k, 15.0 * k, h, 5000.0), 32.767)
-    thrust = lift * plant.thrust_scale + plant.thrust_base
-    memory[THRUST] = min(max(thrust, plant.thrust_min), 65535.0)
 
 
 @jit
