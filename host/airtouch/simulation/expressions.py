@@ -1,6 +1,7 @@
 """Values of a scenario: numbers, ranges to draw from, and small sums over named values."""
 
 import ast
+import functools
 import math
 import operator
 from collections.abc import Mapping
@@ -43,13 +44,18 @@ def draw(node: Any, values: Mapping[str, Any], rng: np.random.Generator, where: 
 def evaluate(text: str, values: Mapping[str, Any], where: str) -> float:
     """The number that arithmetic over named values gives."""
     try:
-        return float(_evaluate(ast.parse(text.strip(), mode="eval").body, values))
+        return float(_evaluate(_tree(text.strip()), values))
     except KeyError as error:
         name = error.args[0]
         raise AirTouchError(f"{where}: {text.strip()!r} uses {name!r}, "
                             "which [values] does not have") from None
     except (SyntaxError, TypeError, ValueError, ZeroDivisionError):
         raise AirTouchError(f"{where}: {text.strip()!r} is not a sum of numbers and named values") from None
+
+
+@functools.lru_cache(maxsize=1000)
+def _tree(text: str) -> ast.AST:
+    return ast.parse(text, mode="eval").body
 
 
 def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> float:

@@ -11,13 +11,13 @@ from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.simulation import controller, loop
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
-from airtouch.simulation.radio import received
+from airtouch.simulation.radio import received, rounded
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
 from airtouch.simulation.stepper import Stepper, prepare
 from airtouch.vehicle import Vehicle
 
 __all__ = ["Chosen", "Diverged", "choose", "fly", "fly_plan", "prepare"]
-DECIMALS = 6  #: of logged values, in their SI units
+PER_UNIT = 1e6  #: logged values are whole millionths of their SI units
 Chosen = Mapping[str, Mapping[str, float]] | Sequence[Any]
 
 
@@ -62,7 +62,7 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     """Fly a drawn flight with these effects."""
     stepper = Stepper(plan, vehicle, seed, flight, active)
     plant = stepper.plant
-    table = np.full((len(plan.setpoints), loop.COLUMNS), np.nan)
+    table = np.empty((len(plan.setpoints), loop.COLUMNS))
     radio = (float(plant[0]["time_jitter"]), float(plant[0]["packet_loss"]), float(plant[0]["loss_burst"]))
     stepper.begin(plan.setpoints[0])
     ending, rows = stepper.fly(plan.setpoints, table)
@@ -72,7 +72,8 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     if np.ptp(table[:, loop.PLACE + 2]) < 0.5 * climb:
         return Diverged(name, seed, flight, "it did not take off", len(table) / 100.0)
     rng = np.random.default_rng([seed, flight, 7])
-    table = np.round(received(table, *radio, rng), DECIMALS)
+    table = received(table, *radio, rng)
+    rounded(table, PER_UNIT)
     meta = {
         "source": f"{name}_{seed}_{flight:06d}", "format": "simulated", "sample_period_s": 0.01,
         "acc_frame": "body",

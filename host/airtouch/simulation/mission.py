@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import controller as c
-from airtouch.simulation.world import World, top_at
+from airtouch.simulation.world import World, first_below, top_at
 
 RATE_HZ = 100
 MAX_SPEED_MPS = 1.0  #: the firmware's own limit (PID_POS_VEL_X_MAX)
@@ -131,11 +131,12 @@ def _check_path(pen: _Pen, first: int, place: str) -> None:
     rows = np.concatenate(pen.rows)[first::5]
     if rows[0, c.MOTORS] == 0.0:
         raise AirTouchError(f"{place}: it has not taken off")
-    for row in rows:
-        top = pen.top((row[c.X], row[c.Y]))
-        if row[c.Z] < top:
-            raise AirTouchError(f"{place}: at ({row[c.X]:.2f}, {row[c.Y]:.2f}) m it would fly "
-                                f"{row[c.Z]:.2f} m high through a surface {top:.2f} m high")
+    w = pen.world
+    struck = first_below(w.corners, w.first, w.surface, w.box, rows[:, c.X:c.Z + 1])
+    if struck >= 0:
+        x, y, z = rows[struck, c.X:c.Z + 1]
+        raise AirTouchError(f"{place}: at ({x:.2f}, {y:.2f}) m it would fly "
+                            f"{z:.2f} m high through a surface {pen.top((x, y)):.2f} m high")
 
 
 def _pair(value: Any, place: str, key: str) -> tuple[float, float]:

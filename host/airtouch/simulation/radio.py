@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from airtouch.simulation.compiled import jit
+
 
 def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
              rng: np.random.Generator) -> np.ndarray:
@@ -18,9 +20,22 @@ def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
     if loss <= 0.0:
         return table
     recover = 1.0 / burst
-    fail = min(recover * loss / (1.0 - loss), 1.0)
-    kept, lost = np.ones(n, dtype=bool), False
-    for i in range(1, n):
+    kept = np.ones(n, dtype=bool)
+    _lose(draws, recover, min(recover * loss / (1.0 - loss), 1.0), kept)
+    return table[kept]
+
+
+@jit
+def _lose(draws, recover, fail, kept):
+    lost = False
+    for i in range(1, len(draws)):
         lost = draws[i] >= recover if lost else draws[i] < fail
         kept[i] = not lost
-    return table[kept]
+
+
+@jit
+def rounded(table, per_unit):
+    """Round a table (n, m) to whole multiples of 1 / per_unit in place."""
+    for i in range(table.shape[0]):
+        for j in range(table.shape[1]):
+            table[i, j] = np.rint(table[i, j] * per_unit) / per_unit

@@ -8,7 +8,7 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import kept, loop
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import PARAMETERS, wrench
+from airtouch.simulation.effects.effect import PARAMETERS, handle, wrench
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
 from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan
@@ -54,7 +54,7 @@ class Stepper:
         self.plant, acting = prepare(vehicle, active)
         self.world, self.room = plan.world, plan.room
         self.used = len(acting)
-        self.functions = tuple(a.effect.wrench for a in acting) + (_nothing,) * (loop.SLOTS - len(acting))
+        self.functions = tuple(handle(a.effect.wrench) for a in acting) + (handle(_nothing),) * (loop.SLOTS - len(acting))
         self.parameters = np.zeros((loop.SLOTS, PARAMETERS))
         self.effect_streams = np.zeros((loop.SLOTS, 1), np.uint64)
         seen: dict[str, int] = {}

@@ -147,3 +147,12 @@ def top_at(corners, first, surface, box, x, y):
             if inside_by(corners, first[k], first[k + 1], x, y) >= 0.0:
                 return surface[k, 0]
     return surface[len(first) - 1, 0]
+
+
+@jit
+def first_below(corners, first, surface, box, places):
+    """The first of places (n, 3) that is below the surface at its x and y; -1 where none is."""
+    for i in range(len(places)):
+        if places[i, 2] < top_at(corners, first, surface, box, places[i, 0], places[i, 1]):
+            return i
+    return -1

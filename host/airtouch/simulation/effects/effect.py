@@ -1,5 +1,6 @@
 """What an effect is: parameters with units and bounds, and how it enters the equations."""
 
+import functools
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba import float64, types, uint64
+from numba.experimental.function_type import _get_wrapper_address
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.compiled import jit
@@ -31,6 +33,25 @@ def wrench(function: Callable) -> Any:
     if function.__module__.startswith("airtouch."):
         return jit([SIGNATURE])(function)
     return numba.njit([SIGNATURE])(function)  # may make arrays
+
+
+class _Address:
+    """A compiled function by its address: numba else looks each one up by name at every call."""
+
+    _numba_type_ = WrenchFunction
+
+    def __init__(self, function: Any) -> None:
+        self.function = function  # whose machine code must stay
+        self.address = _get_wrapper_address(function, SIGNATURE)
+
+    def __wrapper_address__(self) -> int:
+        return self.address
+
+
+@functools.cache
+def handle(function: Any) -> Any:
+    """What compiled code takes for a `wrench`."""
+    return _Address(function)
 
 
 @dataclass(frozen=True)
