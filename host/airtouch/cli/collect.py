@@ -56,9 +56,9 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     from airtouch.crazyflie.checks import parse_setting
 
     if recover:
-        found = recorder.recover(out)
-        click.echo("\n".join(f"recovered: {path}" for path in found) or f"{out}: nothing to recover")
-        return
+        found, unreadable = recorder.recover(out)
+        click.echo("\n".join([f"recovered: {path}" for path in found] + unreadable) or f"{out}: nothing to recover")
+        sys.exit(2 if unreadable else 0)
     if not uri or not mission_name:
         raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
     if flights < 1 or link_timeout <= 0:

@@ -84,8 +84,11 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
         raise AirTouchError(f"{out}: cannot be written to; choose another --out")
     if free < LEAST_FREE_BYTES:
         raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, {LEAST_FREE_BYTES / 2**20:.0f} are needed")
-    for path in recorder.recover(out):
+    found, unreadable = recorder.recover(out)
+    for path in found:
         say(f"{path}: recovered from a flight whose process was killed")
+    for line in unreadable:
+        say(f"{line}: an unfinished flight that cannot be recovered; repair it or remove it")
 
 
 def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readiness:

@@ -114,12 +114,12 @@ class Recorder:
         os.close(self._file)
 
 
-def recover(folder: Path) -> list[Path]:
-    """Finish what killed flights left in a folder: sorted, gaps counted. Returns the files.
+def recover(folder: Path) -> tuple[list[Path], list[str]]:
+    """Finish what killed flights left in a folder: sorted, gaps counted. Returns (files, what could not be read).
 
-    Files that another process still writes are passed over. Raises AirTouchError for one that cannot be read.
+    Files that another process still writes are passed over; what cannot be read stays as it is.
     """
-    finished = []
+    finished, unreadable = [], []
     for part in sorted(folder.glob(f"*{SUFFIX}{PART}")):
         with part.open("rb") as file:
             try:
@@ -127,15 +127,17 @@ def recover(folder: Path) -> list[Path]:
             except OSError:
                 continue
         path = part.with_name(part.name.removesuffix(PART))
-        log = logs.read(part)
-        times = np.round(log["t_s"] * 1000.0).astype(np.int64)
-        kept = in_order(times)
-        missing = gaps(times[kept])
-        whole = FlightLog({name: values[kept] for name, values in log.columns.items()}, dict(log.meta))
-        whole.meta |= {"ended": "the process was killed", "lost_samples": sum(g.lost for g in missing),
-                       "longest_gap_s": max((g.seconds for g in missing), default=0.0)}
-        if len(whole):
+        try:
+            log = logs.read(part)
+            kept = in_order(np.round(log["t_s"] * 1000.0).astype(np.int64))
+            whole = FlightLog({name: values[kept] for name, values in log.columns.items()}, dict(log.meta))
+            missing = gaps(np.round(whole["t_s"] * 1000.0))
+            whole.meta |= {"ended": "the process was killed", "lost_samples": sum(g.lost for g in missing),
+                           "longest_gap_s": max((g.seconds for g in missing), default=0.0)}
             logs.write(whole, path)
-            finished.append(path)
+        except AirTouchError as error:
+            unreadable.append(str(error))
+            continue
+        finished.append(path)
         part.unlink()
-    return finished
+    return finished, unreadable

@@ -1,0 +1,69 @@
+"""Missions: the legs retrace the simulator's set-points."""
+
+import math
+
+import numpy as np
+import pytest
+
+from airtouch.crazyflie import mission
+from airtouch.errors import AirTouchError
+from airtouch.simulation import controller as c
+from airtouch.simulation import scenario
+
+
+def retraced(legs):
+    """Positions at 100 Hz of legs flown straight at constant speed, the landing's height left out."""
+    at, rows = np.zeros(3), []
+    for leg in legs:
+        n = max(int(round(100 * leg.seconds)), 1)
+        to = np.array([leg.x_m, leg.y_m, leg.z_m])
+        rows.append(at + np.arange(1, n + 1)[:, None] / n * (to - at))
+        at = to
+    return np.concatenate(rows)
+
+
+@pytest.mark.parametrize("name", [*mission.names(), "zigzag", "l-shape", "paper-mixed", "circle"])
+def test_legs_are_the_path_that_the_simulator_flies(name):
+    path = mission._folder() / f"{name}.toml"
+    scene = scenario.load(path) if path.is_file() else scenario.load(name)
+    rows = scenario.draw_flight(scene, 3, 2).setpoints
+    legs = mission.load(name, 3, 2).legs
+    flown = retraced(legs)
+    assert abs(len(flown) - len(rows)) <= 2
+    upto = int(100 * sum(leg.seconds for leg in legs if leg.kind not in ("land", "wait") or leg is legs[0])) - 2
+    difference = flown[:upto] - rows[:upto, c.X:c.Z + 1] + rows[0, c.X:c.Z + 1]
+    assert np.abs(difference).max() < 0.02
+
+
+def test_the_mission_is_seen_from_the_start():
+    text = """
+[mission]
+start_m = [2.0, 1.0]
+yaw_deg = 90.0
+step = [{ do = "wait", time_s = 1.0 }, { do = "take-off", height_m = 0.5 }, { do = "hover", time_s = 1.0 },
+        { do = "go", to_m = [2.0, 3.0], speed_mps = 0.5 }]
+"""
+    scene = scenario.parse(text, "turned")
+    legs = mission.legs_of(scenario.draw_flight(scene, 0, 0).setpoints)
+    assert [leg.kind for leg in legs] == ["wait", "take-off", "hover", "go", "land"]  # a landing is added
+    assert (legs[3].x_m, legs[3].y_m, legs[3].seconds) == (pytest.approx(2.0), pytest.approx(0.0), pytest.approx(4.0))
+    assert legs[4].z_m == 0.0 and legs[4].seconds >= 0.5 / 0.3
+
+
+def test_ready_missions_cross_edges_low_enough_to_be_felt():
+    for name in mission.names():
+        flown = mission.load(name)
+        assert flown.speed_mps and 0.1 <= flown.speed_mps <= 0.4
+        assert flown.values["clearance"] <= 0.05 and flown.values["top"] > 0.3
+        assert flown.legs[-1].kind == "wait" and flown.legs[-2].kind == "land"
+        assert math.isclose(flown.room_m[4], flown.values["top"] + flown.values["clearance"])
+
+
+def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
+    with pytest.raises(AirTouchError, match="ready ones: edge, sweep, zig-zag"):
+        mission.load("nowhere")
+    with pytest.raises(AirTouchError, match="no such scenario file"):
+        mission.load(tmp_path / "none.toml")
+    (tmp_path / "m.toml").write_text('[mission]\nstep = [{ do = "wait", time_s = 1.0 }]\n')
+    with pytest.raises(AirTouchError, match="never takes off"):
+        mission.load(tmp_path / "m.toml")

@@ -1,0 +1,63 @@
+"""The stepwise detector and `evaluate` say the same of a flight, whatever the pieces."""
+
+import threading
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli import airtouch
+from airtouch.crazyflie import replay
+from airtouch.crazyflie.board import Board
+from airtouch.crazyflie.host_detector import HostDetector
+from airtouch.detector import best, dataset, evaluate
+from airtouch.simulation import batch
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    path = tmp_path_factory.mktemp("replay") / "f.csv.gz"
+    logs.write(batch.simulate("paper-4cm")[0], path)
+    return path
+
+
+def assert_equal(path, speed):
+    (file,) = dataset.collect([path], speed)
+    log = evaluate.read_flight(file)
+    whole = evaluate.evaluate_flight(file, log, best, best.load(None))
+    detector, board, felt = HostDetector(), Board("f", "best"), []
+    assert replay.run(log, board, detector, stop=threading.Event(), felt=felt.append) == len(log)
+    stepwise = replay.result(file, log, detector)
+    np.testing.assert_array_equal(stepwise.trace.probability, whole.trace.probability)
+    assert stepwise.trace.edges == whole.trace.edges and len(felt) == len(board.felt) == len(whole.trace.edges)
+    assert [f.kind for f in felt] == [e.kind for e in whole.trace.edges]
+    np.testing.assert_allclose([f.probability for f in felt], [e.probability for e in whole.trace.edges])
+    np.testing.assert_allclose([f.at_s for f in felt], [e.sample / 100 for e in whole.trace.edges])
+    assert str(stepwise.score.as_dict()) == str(whole.score.as_dict())
+    return whole
+
+
+def test_on_a_simulated_flight(flight):
+    assert assert_equal(flight, 0.3).trace.edges
+
+
+def test_on_a_recorded_flight(flights):
+    assert assert_equal(sorted((flights / "airtouch").glob("*h79*"))[0], None).trace.edges
+
+
+def test_the_command_prints_what_evaluate_prints(flight):
+    shown = CliRunner().invoke(airtouch, ["replay", str(flight), "--flown-at", "0.3"])
+    scored = CliRunner().invoke(airtouch, ["evaluate", str(flight), "--speed", "0.3"])
+    assert shown.exit_code == scored.exit_code == 0
+    row = next(line for line in scored.output.splitlines() if "│ best" in line)
+    assert row in shown.output and "felt at" in shown.output
+
+
+def test_pieces_of_one_row_give_the_same(flight):
+    log, one, all_at_once = logs.read(flight), HostDetector(), HostDetector()
+    for i in range(0, 900):
+        one.next({name: values[i:i + 1] for name, values in log.columns.items()})
+    all_at_once.next({name: values[:900] for name, values in log.columns.items()})
+    cut = log.slice(0, 900)
+    assert one.trace(cut).edges == all_at_once.trace(cut).edges

@@ -1,0 +1,43 @@
+"""The drone's clock against counting by hand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from airtouch.crazyflie.ticks import WRAP_MS, Restarted, Ticks, gaps, in_order
+
+
+@given(st.integers(0, WRAP_MS - 1), st.lists(st.integers(1, 5_000_000), min_size=1, max_size=30))
+def test_wraps_vanish(start, steps):
+    true = start + np.cumsum([0, *steps])
+    ticks = Ticks()
+    assert [ticks.unwrap(int(t) % WRAP_MS) for t in true] == list(true)
+
+
+@given(st.integers(0, WRAP_MS - 1), st.permutations(range(10)))
+def test_late_packets_keep_their_own_time(start, order):
+    ticks = Ticks()
+    ticks.unwrap(start)
+    assert [ticks.unwrap((start + 10 * i) % WRAP_MS) for i in order] == [start + 10 * i for i in order]
+
+
+def test_a_clock_that_starts_anew_is_told():
+    ticks = Ticks()
+    ticks.unwrap(60_000)
+    with pytest.raises(Restarted):
+        ticks.unwrap(500)
+
+
+@given(st.sets(st.integers(0, 300), min_size=2), st.integers(-3, 3))
+def test_gaps_are_the_samples_that_are_not_there(kept, jitter):
+    slots = np.array(sorted(kept))
+    times = 10 * slots + np.where(slots % 2, jitter, 0)
+    found = gaps(times)
+    assert sum(g.lost for g in found) == slots[-1] - slots[0] + 1 - len(slots)
+    for gap in found:
+        assert slots[gap.sample] - slots[gap.sample - 1] - 1 == gap.lost
+
+
+def test_doubled_and_late_samples_are_put_in_order():
+    assert list(in_order(np.array([30, 10, 20, 10, 40]))) == [1, 2, 0, 4]

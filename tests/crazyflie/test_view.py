@@ -1,0 +1,62 @@
+"""Sparklines, maps and boards for a terminal."""
+
+import io
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from airtouch.crazyflie.board import SIGNALS, Board, Link, edge_line
+from airtouch.crazyflie.sparkline import BLOCKS, sparkline, text_map
+
+NUMBERS = st.lists(st.floats(allow_nan=True, allow_infinity=True, width=32), max_size=80)
+
+
+@given(NUMBERS, st.integers(0, 60))
+def test_any_signal_fits_its_width(values, width):
+    line = sparkline(values, width, -1.0, 1.0)
+    assert len(line) == width and set(line) <= set(BLOCKS + " ")
+
+
+def test_a_ramp_climbs_and_holes_are_blank():
+    assert sparkline(np.arange(8), 8) == BLOCKS
+    assert sparkline([0.0, np.nan, 1.0], 3) == f"{BLOCKS[0]} {BLOCKS[-1]}"
+    assert sparkline([5.0] * 10, 4) == BLOCKS[0] * 4
+    assert sparkline([], 4) == "    " and sparkline([0.0, 9.0], 4, 0.0, 1.0) == "  " + BLOCKS[0] + BLOCKS[-1]
+
+
+@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), max_size=50), st.integers(20, 60), st.integers(3, 20))
+def test_any_track_fits_the_map(track, width, height):
+    lines = text_map(np.array(track).reshape(-1, 2), [(0.0, 0.0, "entry")], width, height)
+    assert len(lines) == height
+
+
+def test_edges_lie_where_they_were_felt():
+    track = np.column_stack([np.linspace(0, 4, 100), np.zeros(100)])
+    row = next(line for line in text_map(track, [(1.0, 0.0, "entry"), (3.0, 0.0, "exit")], 41, 5) if "[" in line)
+    assert row.index("[") == 10 and row.index("]") == 30 and row.index("o") == 40 and row[0] == "."
+
+
+def columns(n):
+    c = {f"gyro_{a}_radps": np.zeros(n) for a in "xyz"} | {f"m{i}_pwm": np.full(n, 4e4) for i in range(1, 5)}
+    return c | {"acc_z_mps2": np.full(n, 9.81), "zrange_m": np.full(n, 0.8), "vbat_V": np.full(n, 3.9),
+                "x_m": np.linspace(0, 1, n), "y_m": np.zeros(n)}
+
+
+def test_a_board_places_edges_one_lag_back_and_draws_itself():
+    board = Board("test", "best", lag_s=0.5, link=Link(100.0, 0.01, 0.004, 0.002))
+    board.add(np.arange(100) / 100, columns(100), np.linspace(0, 1, 100))
+    felt = board.feel("entry", 0.9, 0.97)
+    assert abs(felt.x_m - 0.4) < 0.06
+    out = io.StringIO()
+    Console(file=out, width=160).print(board.render())
+    text = out.getvalue()
+    assert all(name in text for name in SIGNALS) and "entry" in text and "1.0 % lost" in text and "[" in text
+    assert "P 0.97" in edge_line(felt) and "1.0 s" in board.line() and "1 edges" in board.line()
+    board.link.silent_s = 3.0
+    assert "SILENT for 3.0 s" in board.line()
+
+
+def test_an_empty_board_draws_too():
+    Console(file=io.StringIO(), width=100).print(Board("test", "best").render())
