@@ -88,9 +88,12 @@ def _answered(link: object) -> bool:
 
 
 def main() -> None:
-    """Wait for the word or for the end."""
+    """Wait for the word or for the end; what landing needs is loaded before."""
+    from airtouch.crazyflie.drone import cflib_or_error
+
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
+    cflib_or_error()
     if sys.stdin.readline().strip() != "landed":
         uri, height, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
         done = land(uri, height, seconds)
