@@ -1,0 +1,132 @@
+"""Linear model of the attitude and height loops: what noise makes of the motor commands.
+
+Two families of controller: `firmware`, the cascaded PID of crazyflie-firmware with its
+documented gains, and `cascade`, any proportional cascade (rate, angle, velocity) whose
+gains are found from flights. Commands are in newtons per motor.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.flight import PERIOD_S
+
+DEGREES = 180.0 / np.pi
+FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequency (500 Hz controller)
+AXES = ("thrust", "roll", "pitch")
+OUTER_S = 0.01  #: period of the firmware's position loop and of its flow readings
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Gains of one axis. roll, pitch: rate -> command (gain, N per rad/s), angle -> rate (angle, 1/s),
+
+    velocity -> angle (velocity, rad per m/s). thrust: climb -> command (gain, N per m/s),
+    height -> climb (angle, 1/s). Integrals are shares of their gain per second, derivative
+    in s. period_s: of the controller; lowpass_hz: of its gyro, 0 for none.
+    """
+
+    gain: float
+    angle: float
+    velocity: float = 0.0
+    derivative: float = 0.0
+    integral: float = 0.0
+    angle_integral: float = 0.0
+    velocity_integral: float = 0.0
+    period_s: float = PERIOD_S
+    lowpass_hz: float = 0.0
+    on_error: bool = False  #: derivative acts on the error, angle loop included
+
+
+def newtons_per_pwm(row: Any) -> float:
+    """Slope of a motor's thrust over its command in hover, N."""
+    c0, c1, c2 = (float(c) for c in row["thrust_curve"])
+    each = float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"])))
+    return float(np.sqrt(max(c1 * c1 + 4.0 * c2 * (each - c0), 1e-30)))
+
+
+def firmware(row: Any, axis: str) -> Controller:
+    """crazyflie-firmware's gains (simulation.controller), whose commands are PWM."""
+    slope = newtons_per_pwm(row)
+    if axis == "thrust":
+        gain = 25.0 * float(row["thrust_scale"]) * slope
+        return Controller(gain, 2.0, integral=15.0 / 25.0, angle_integral=0.25)
+    gain = 0.5 * 250.0 * DEGREES * float(row["rate_scale"]) * slope
+    return Controller(gain, 6.0, 25.0 / DEGREES, 2.5 / 250.0, 500.0 / 250.0, 0.5, 1.0 / 25.0,
+                      float(row["step"]), float(row["gyro_lowpass"]), float(row["derivative_on_error"]) > 0.5)
+
+
+def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
+
+    Sources, roll and pitch: white rate, white angle, velocity falling with the frequency,
+    torque; thrust: white climb, climb falling with the frequency, its square, force.
+    row: plant row of `simulation.flight.prepare`, effects in it.
+    """
+    folds = FOLDS if c.period_s < 0.5 * PERIOD_S else FOLDS[:1]
+    total = 0.0
+    for k in folds:
+        made = _sources(c, row, axis, np.abs(f + k / PERIOD_S))
+        if k:
+            made[1:] = 0.0
+        total = total + made
+    return total
+
+
+def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    s = 2j * np.pi * np.maximum(f, 0.05)
+    hold = np.sinc(f * c.period_s) * np.exp(-0.5 * s * c.period_s)
+    motor = np.exp(-s * float(row["actuator_delay"])) * hold * 0.5 * (
+        1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
+    late = _delayed(s, float(row["sensor_delay"]), float(row["step"]) if c.lowpass_hz else 0.0)
+    lift = 4.0 * float(np.mean(row["gain"]))
+    if axis == "thrust":
+        k = float(row["height_gain"])
+        climb = k * c.gain * (1.0 + c.integral / s)
+        height = climb * c.angle * k * (1.0 + c.angle_integral / s)
+        plant = lift / float(row["mass"]) * motor / s
+        whole = (climb + height / s) * late
+        size = np.abs(1.0 / (1.0 + plant * whole)) ** 2
+        climbs = np.abs(climb + height / s) ** 2
+        return size * np.array([np.abs(climb) ** 2, climbs / np.maximum(f, 0.3) ** 2,
+                                climbs / np.maximum(f, 0.3) ** 4, np.abs(whole / s) ** 2])
+    i = AXES.index(axis) - 1
+    arm = float(np.mean(np.abs(row["rotor_y" if i == 0 else "rotor_x"])))
+    plant = lift * arm / float(row["inertia"][i]) * motor / s
+    k = c.gain * float(row["rate_gain"])
+    change = c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
+    rate = k * (1.0 + c.integral / s + change)
+    angle = k * (1.0 + c.integral / s + (change if c.on_error else 0.0)) * c.angle * float(row["attitude_gain"])
+    angle = angle * (1.0 + c.angle_integral / s)
+    velocity = angle * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
+    filtered = late / _butterworth(s, c.lowpass_hz)
+    whole = (rate + angle / s) * filtered + velocity * float(row["gravity"]) / s ** 2 * late
+    size = 1.0 / (1.0 + plant * whole)
+    share = kicked = np.ones_like(s)
+    if c.on_error:
+        kick = c.derivative * (1.0 - np.exp(-s * OUTER_S))
+        share = 1.0 + c.integral / s + change
+        kicked = 1.0 + c.integral / s + kick / c.period_s
+    outer = np.abs(kicked / share - plant * whole * size) ** 2
+    low = np.maximum(f, 0.3)
+    seen = [] if c.lowpass_hz else [np.abs(angle * size) ** 2]
+    return np.array([np.abs((rate + angle / s) * filtered * size) ** 2, *seen,
+                     outer * np.abs(velocity / low) ** 2, outer * np.abs(velocity / low ** 2) ** 2,
+                     outer * np.abs(angle / low ** 2) ** 2, np.abs(whole / s * size) ** 2])
+
+
+def _delayed(s: np.ndarray, delay: float, step: float) -> np.ndarray:
+    """A delay; between two steps the simulator (and this) draws a straight line."""
+    if step <= 0.0:
+        return np.exp(-s * delay)
+    whole = np.floor(delay / step + 1e-9)
+    part = max(delay / step - whole, 0.0)
+    return np.exp(-s * whole * step) * (1.0 - part + part * np.exp(-s * step))
+
+
+def _butterworth(s: np.ndarray, cutoff: float) -> np.ndarray | float:
+    if cutoff <= 0.0:
+        return 1.0
+    x = s / (2.0 * np.pi * cutoff)
+    return 1.0 + np.sqrt(2.0) * x + x * x
