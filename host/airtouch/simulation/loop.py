@@ -28,12 +28,14 @@ from airtouch.simulation.effects.effect import MEMORY, WrenchFunction
 from airtouch.simulation.kept import SLOTS
 from airtouch.simulation.plant import DTYPE
 from airtouch.simulation.random_stream import normals
-from airtouch.simulation.rotation import euler
+from airtouch.simulation.rotation import euler, sine_and_cosine
 from airtouch.simulation.sensors import RING
 
 LOG_STEPS = 5  #: physics steps a logged row
 OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended
 ENDINGS = ("ok", "a value is not finite", "it turned over", "it struck a surface", "it flew away")
+TURN = 2.0 * math.pi
+LATER = math.cos(0.7), math.sin(0.7)  #: vibration along z is 0.7 rad ahead
 FOCUS_M = 0.08  #: the flow sensor's least distance; closer, its picture scales no further
 FLOOR_DEPTH_M = 0.015  #: legs this far inside a surface: it struck it
 (T, ACC, GYRO, PWM, DOWN, RANGES, VBAT, PLACE, SPEED, ANGLES, RPM, ACC_WORLD, COLUMNS) = (
@@ -116,9 +118,10 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         if plant.vibration > 0.0:
             for i in range(4):
                 size = 0.5 * plant.vibration * (speed[i] / hover) ** 2
-                shake_x += size * math.sin(phase[i])
-                shake_y += size * math.cos(phase[i])
-                shake_z += size * math.sin(phase[i] + 0.7)
+                sine, cosine = sine_and_cosine(phase[i])
+                shake_x += size * sine
+                shake_y += size * cosine
+                shake_z += size * (LATER[0] * sine + LATER[1] * cosine)
         for i in range(3):
             shake = shake_x if i == 0 else (shake_y if i == 1 else shake_z)
             value = acc[i] + plant.acc_bias[i] + acc_rms[i] * imu_n[i]
@@ -238,7 +241,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             plant.gain[i] = base_gain[i] * (1.0 + plant.motor_noise * flicker[i])
             power += power_per_speed3 * speed[i] * speed[i] * speed[i]
             if plant.vibration > 0.0:
-                phase[i] = (phase[i] + h * speed[i]) % 6.283185307179586
+                turns = (phase[i] + h * speed[i]) / TURN
+                phase[i] = TURN * (turns - math.floor(turns))
         charge, battery_volts = battery.drain(plant, charge, power, h)
 
         # --- effects, at the middle of the step
