@@ -21,6 +21,8 @@ COMMANDS = {
     "collect": ("collect", "Fly a mission with a Crazyflie and log it."),
     "monitor": ("monitor", "Watch a Crazyflie live: signals, probability, edges."),
     "replay": ("replay", "Show a recorded flight as it would look live."),
+    "flash": ("flash", "Check a firmware image and flash it."),
+    "sitl": ("sitl", "Fly without a drone: a virtual Crazyflie that cflib connects to."),
     "dataset": ("dataset", "Fetch the authors' public flights."),
     "demo": ("demo", "Run the whole pipeline and write an HTML report."),
 }

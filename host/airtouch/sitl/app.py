@@ -1,0 +1,88 @@
+"""The AirTouch app on board: the C core of the STM32 app, that of the GAP8 app, and the wire between them.
+
+The names and types of the LOG and PARAM group are those of firmware/app/src/airtouch_app.c.
+"""
+
+from collections.abc import Sequence
+
+from airtouch.kernels.app_core import AppCore, Gap8Core
+from airtouch.sitl.param_service import Parameter
+
+GROUP = "airtouch"
+HEARTBEAT_S = 0.5
+BOOT_S = 1.5  #: the GAP8, after it lost power
+#: log variable -> (type, field of appLog_t, element)
+LOGS: dict[str, tuple[str, str, int]] = {
+    "fAcc": ("float", "feature", 0), "fGyro": ("float", "feature", 1), "fMotor": ("float", "feature", 2),
+    "fwx": ("float", "force", 0), "fwy": ("float", "force", 1), "fwz": ("float", "force", 2),
+    "cell": ("float", "cfarPower", -1), "thresh": ("float", "threshold", -1), "alert": ("uint8_t", "alert", -1),
+    "prob": ("float", "probability", -1), "lOver": ("float", "logit", 0), "lEntry": ("float", "logit", 1),
+    "lExit": ("float", "logit", 2), "edges": ("uint16_t", "edges", -1), "edge": ("uint8_t", "edge", -1),
+    "edgeStep": ("uint32_t", "edgeSample", -1), "over": ("uint8_t", "over", -1),
+    "steps": ("uint32_t", "samples", -1), "health": ("uint16_t", "health", -1), "load": ("uint16_t", "load", -1),
+    "loadMax": ("uint16_t", "loadMax", -1), "late": ("uint16_t", "late", -1),
+    "detector": ("uint8_t", "detector", -1), "link": ("uint8_t", "link", -1), "lag": ("uint16_t", "lag", -1),
+    "answers": ("uint32_t", "answers", -1), "dropped": ("uint32_t", "dropped", -1),
+    "lost": ("uint32_t", "lost", -1), "timeouts": ("uint32_t", "timeouts", -1),
+    "resets": ("uint32_t", "gap8Resets", -1), "gap8Up": ("uint32_t", "gap8Uptime", -1),
+    "nonFin": ("uint32_t", "nonFinite", -1), "badParam": ("uint16_t", "paramErrors", -1),
+}
+#: parameter -> field of appParams_t
+PARAMS = {
+    "enable": "enable", "detector": "detector", "filter": "filter", "bandMid": "bandMid", "bandWidth": "bandWidth",
+    "pFa": "pFa", "probIn": "probabilityIn", "probOut": "probabilityOut", "scoreIn": "scoreIn",
+    "scoreOut": "scoreOut",
+}
+BYTES = ("enable", "detector", "filter")  #: parameters of type uint8_t, the others are float
+
+
+class App:
+    """`step` takes one sample of 100 Hz; `read` gives a log variable after it."""
+
+    def __init__(self, have_gap8: bool) -> None:
+        self._core = AppCore(have_gap8=have_gap8)
+        self._gap8 = Gap8Core() if have_gap8 else None
+        self._booted_s = self._beat_s = 0.0
+        self.gap8_silent = False
+
+    def parameters(self) -> list[Parameter]:
+        """The PARAM group with the values in force."""
+        values = self._core.params()
+        return [Parameter(f"{GROUP}.{name}", "uint8_t" if name in BYTES else "float", values[field])
+                for name, field in PARAMS.items()]
+
+    def set(self, name: str, value: float) -> float:
+        """Change a parameter; the value in force, which is another one where it was out of range."""
+        self._core.set_params(**{PARAMS[name]: value})
+        return self._core.params()[PARAMS[name]]
+
+    def values(self) -> dict[str, float]:
+        """All parameters in force: a change of one may put another right."""
+        in_force = self._core.params()
+        return {f"{GROUP}.{name}": in_force[field] for name, field in PARAMS.items()}
+
+    def read(self, name: str) -> float:
+        """The log variable of that name."""
+        _, field, element = LOGS[name]
+        value = getattr(self._core.log, field)
+        return value if element < 0 else value[element]
+
+    def reset_gap8(self, now_s: float) -> None:
+        """The GAP8 loses power and starts anew."""
+        if self._gap8:
+            self._gap8.reset()
+            self._booted_s = self._beat_s = now_s + BOOT_S
+
+    def step(self, now_s: float, acc_world: Sequence[float], gyro: Sequence[float], pwm: Sequence[float],
+             vbat_v: float, attitude: Sequence[float]) -> str:
+        """One sample: m/s^2 with gravity, rad/s, PWM, quaternion x, y, z, w. The kind of an edge, or "none"."""
+        edge = self._core.step(acc_world, gyro, pwm, vbat_v=vbat_v, attitude=attitude)
+        answering = self._gap8 is not None and not self.gap8_silent and now_s >= self._booted_s
+        for sent in self._core.packets():
+            reply = self._gap8.take(sent) if answering else b""
+            if reply:
+                self._core.receive(reply)
+        if answering and now_s >= self._beat_s:
+            self._beat_s = now_s + HEARTBEAT_S
+            self._core.receive(self._gap8.heartbeat(int(1000 * (now_s - self._booted_s))))
+        return edge

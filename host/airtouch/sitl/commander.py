@@ -1,0 +1,145 @@
+"""Whose set-points count: high-level planner, low-level packets, and the watchdog (commander.c, supervisor.c).
+
+A set-point here is one row of the simulator (simulation.controller): mode, place, velocity,
+yaw and motors. Packets that give rates (yaw rate, climb) are integrated row by row.
+"""
+
+import math
+import struct
+
+import numpy as np
+
+from airtouch.simulation import controller as c
+from airtouch.sitl.planner import Planner
+
+PERIOD_S = 0.01
+LEVEL_OUT_S, SHUT_DOWN_S = 0.5, 2.0  #: without a new set-point
+MOST_CLIMB_M = 0.5  #: height set-points of climb rates stay this near to the drone
+MOST_TILT_DEG = 30.0
+LEAST_THRUST, MOST_THRUST = 1000, 60000
+(STOP, OLD_VELOCITY, OLD_Z_DISTANCE, CPPM, ALT_HOLD, OLD_HOVER, FULL_STATE, POSITION, VELOCITY, Z_DISTANCE, HOVER,
+ MANUAL) = range(12)
+FOUR = struct.Struct("<ffff")
+
+
+class Commander:
+    """`setpoint(t, ...)` gives the row to fly at t, one call a row of 10 ms."""
+
+    def __init__(self) -> None:
+        self.planner = Planner()
+        self.low_level = False  #: set-point packets are in charge
+        self.levelled = self.timed_out = False
+        self.alt_hold = self.pos_hold = False
+        self._kind, self._values, self._since = STOP, (0.0,) * 4, 0.0
+        self._yaw = self._height = 0.0
+        self._thrust_locked = True
+
+    def reset(self) -> None:
+        """Motors off; as after start."""
+        self.planner.stop()
+        self.low_level = self.levelled = self.timed_out = False
+        self._thrust_locked = True
+
+    def relax(self) -> None:
+        """Low-level set-points have ended: the high-level commander may take over."""
+        self.low_level = False
+
+    def take_rpyt(self, data: bytes, t: float, estimate: np.ndarray) -> None:
+        """A packet of the old commander port: roll, pitch, yaw rate, thrust."""
+        if len(data) < 14:
+            return
+        roll, pitch, yaw, thrust = struct.unpack_from("<fffH", data)
+        if not self.low_level:
+            self._thrust_locked = True
+        if thrust == 0:
+            self._thrust_locked = False
+        if self.pos_hold and self.alt_hold:
+            self._low_level(VELOCITY, (pitch / 30.0, roll / 30.0, (thrust - 32767.0) / 32767.0, -yaw), t, estimate)
+        elif self.alt_hold:
+            self._low_level(ALT_HOLD, (roll, pitch, -yaw, (thrust - 32767.0) / 32767.0), t, estimate)
+        else:
+            push = 0 if self._thrust_locked or thrust < LEAST_THRUST else min(thrust, MOST_THRUST)
+            self._low_level(MANUAL, (roll, pitch, -yaw, float(push)), t, estimate)
+
+    def take_generic(self, data: bytes, t: float, estimate: np.ndarray) -> None:
+        """A packet of the generic commander port; what the simulator cannot fly is ignored."""
+        kind = data[0] if data else None
+        if kind == STOP:
+            self._low_level(STOP, (0.0,) * 4, t, estimate)
+        elif kind == MANUAL and len(data) >= 16:
+            roll, pitch, yaw_rate, thrust = struct.unpack_from("<fffH", data, 1)
+            self._low_level(MANUAL, (roll, pitch, yaw_rate, float(thrust)), t, estimate)
+        elif kind == FULL_STATE and len(data) >= 13:
+            x, y, z, vx, vy, vz = (v / 1000.0 for v in struct.unpack_from("<hhhhhh", data, 1))
+            self._low_level(POSITION, (x, y, z, math.degrees(estimate[2])), t, estimate)
+        elif kind in (OLD_VELOCITY, OLD_Z_DISTANCE, OLD_HOVER, ALT_HOLD, POSITION, VELOCITY, Z_DISTANCE,
+                      HOVER) and len(data) >= 17:
+            values = FOUR.unpack_from(data, 1)
+            if kind in (OLD_VELOCITY, OLD_Z_DISTANCE, OLD_HOVER):  # their yaw rate has the other sign
+                at = 3 if kind == OLD_VELOCITY else 2
+                values = tuple(-v if i == at else v for i, v in enumerate(values))
+                kind = {OLD_VELOCITY: VELOCITY, OLD_Z_DISTANCE: Z_DISTANCE, OLD_HOVER: HOVER}[kind]
+            self._low_level(kind, values, t, estimate)
+
+    def _low_level(self, kind: int, values: tuple, t: float, estimate: np.ndarray) -> None:
+        if not all(math.isfinite(v) and abs(v) < 1e6 for v in values):
+            return
+        if not self.low_level or self.timed_out:
+            self._yaw, self._height = estimate[2], estimate[8]
+        self.low_level, self.timed_out = True, False
+        self.planner.stop()
+        self._kind, self._values, self._since = kind, values, t
+
+    def setpoint(self, t: float, estimate: np.ndarray) -> np.ndarray:
+        """The row (8,) to fly at t. estimate (9,): roll, pitch, yaw, velocity, position."""
+        row = np.zeros(c.SETPOINT_SIZE)
+        row[c.X], row[c.Y], row[c.YAW] = estimate[6], estimate[7], estimate[2]
+        self.levelled = False
+        if self.low_level:
+            self._low_level_row(row, t, estimate)
+            return row
+        goal = self.planner.goal(t)
+        if goal is None:
+            self.planner.tell(estimate[6:9], estimate[3:6], estimate[2])
+            return row
+        row[c.MODE], row[c.X:c.Z + 1], row[c.VX], row[c.VY] = 1.0, goal.position, goal.velocity[0], goal.velocity[1]
+        row[c.YAW], row[c.MOTORS] = goal.yaw, 1.0
+        return row
+
+    def _low_level_row(self, row: np.ndarray, t: float, estimate: np.ndarray) -> None:
+        kind, (a, b, d, e) = self._kind, self._values
+        if t - self._since > SHUT_DOWN_S and kind != STOP:
+            self.timed_out = True
+        if kind == STOP or self.timed_out:
+            return
+        row[c.MOTORS] = 1.0
+        yaw_rate = 0.0 if kind == POSITION else e if kind == VELOCITY else d
+        if t - self._since > LEVEL_OUT_S:
+            self.levelled = True
+            yaw_rate = 0.0
+        self._yaw += math.radians(yaw_rate) * PERIOD_S
+        climb = d if kind == VELOCITY else e if kind == ALT_HOLD else None
+        if kind == POSITION:
+            self._yaw, self._height = math.radians(e), d
+        elif kind in (HOVER, Z_DISTANCE):
+            self._height = e
+        elif climb is not None:
+            low, high = estimate[8] - MOST_CLIMB_M, estimate[8] + MOST_CLIMB_M
+            self._height = min(max(self._height + climb * PERIOD_S, low), high)
+        row[c.YAW], row[c.Z] = self._yaw, self._height
+        if self.levelled:
+            row[c.MODE], row[c.VX], row[c.VY] = c.TILT, 0.0, 0.0
+            if kind == MANUAL:
+                row[c.MODE], row[c.Z] = c.TILT_THRUST, e
+        elif kind == POSITION:
+            row[c.MODE], row[c.X], row[c.Y] = c.HOLD, a, b
+        elif kind in (VELOCITY, HOVER):
+            turn = estimate[2] if kind == HOVER else 0.0
+            row[c.VX], row[c.VY] = math.cos(turn) * a - math.sin(turn) * b, math.sin(turn) * a + math.cos(turn) * b
+        else:
+            row[c.MODE] = c.TILT_THRUST if kind == MANUAL else c.TILT
+            row[c.VX] = min(max(a, -MOST_TILT_DEG), MOST_TILT_DEG)
+            row[c.VY] = min(max(-b, -MOST_TILT_DEG), MOST_TILT_DEG)  # the firmware's pitch is nose up
+            if kind == MANUAL:
+                row[c.Z] = min(max(e, 0.0), 65535.0)
+                row[c.MOTORS] = float(e > 0.0)

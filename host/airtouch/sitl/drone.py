@@ -1,0 +1,158 @@
+"""The virtual drone: simulator, commander, supervisor and app, one row of 10 ms at a time."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.simulation import controller, kept, loop
+from airtouch.simulation.scenario import FlightPlan
+from airtouch.simulation.stepper import Stepper
+from airtouch.simulation.effects import Active
+from airtouch.sitl.app import App
+from airtouch.sitl.commander import PERIOD_S, Commander
+from airtouch.sitl.planner import DISABLED, FLYING, LANDING
+from airtouch.vehicle import Vehicle
+
+TICK_MS = 10
+IS_FLYING_S = 2.0  #: after the motors' last turn the firmware still calls it flying
+LOW_V, LOW_AFTER_S = 3.2, 5.0  #: the firmware's low-battery state
+NEARLY_EMPTY = 0.05  #: of the battery's charge
+BATTERY, LOW_POWER = 0, 3  #: pm.state
+PRE_FLIGHT, CRASHED, LOCKED = "ready", "crashed", "locked"
+
+
+class Drone:
+    """`step` flies 10 ms; everything that log variables show is an attribute.
+
+    row (33,): the simulator's row; estimate (9,): roll, pitch, yaw, velocity, position.
+    """
+
+    def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
+                 ai_deck: bool) -> None:
+        self._stepper = Stepper(plan, vehicle, seed, flight, active)
+        self._start = plan.setpoints[0].copy()
+        self._start[controller.MOTORS] = 0.0
+        self._table = np.zeros((1, loop.COLUMNS))
+        self._setpoint = np.zeros((1, controller.SETPOINT_SIZE))
+        self.commander, self.app = Commander(), App(ai_deck)
+        self.ticks = 0
+        self.row = self._table[0]
+        self.setpoint = self._setpoint[0]
+        self.state, self.emergency = PRE_FLIGHT, False
+        self.messages: list[str] = []  #: for the console
+        self.took_off_s: float | None = None
+        self._thrust_s, self._low_s = -math.inf, 0.0
+        self._begin(self._start)
+        self.step()
+
+    @property
+    def now_s(self) -> float:
+        """Time since start."""
+        return self.ticks * PERIOD_S
+
+    @property
+    def now_ms(self) -> int:
+        """The clock of log packets."""
+        return self.ticks * TICK_MS
+
+    @property
+    def estimate(self) -> np.ndarray:
+        """roll, pitch, yaw (rad), velocity (m/s), position (m over the floor)."""
+        return self._stepper.memory[kept.ESTIMATE:kept.ESTIMATE + 9]
+
+    @property
+    def is_flying(self) -> bool:
+        """As the firmware says: the motors turn, or did so until shortly."""
+        return self.now_s - self._thrust_s < IS_FLYING_S
+
+    @property
+    def motors_on(self) -> bool:
+        """Whether they turn now."""
+        return self.setpoint[controller.MOTORS] > 0.5
+
+    @property
+    def low_battery(self) -> bool:
+        """The firmware's state "low power"."""
+        return self._low_s > LOW_AFTER_S
+
+    def quaternion(self) -> tuple[float, float, float, float]:
+        """The estimated attitude: x, y, z, w."""
+        (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a / 2), math.cos(a / 2)) for a in self.estimate[:3])
+        return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
+                cr * cp * cy + sr * sp * sy)
+
+    def info(self) -> int:
+        """supervisor.info."""
+        planner, ready = self.commander.planner, self.state == PRE_FLIGHT and not self.emergency
+        bits = [ready, ready, True, ready, self.is_flying and ready, self.state == CRASHED, self.state == LOCKED,
+                self.state == CRASHED, planner.state in (FLYING, LANDING), planner.finished(self.now_s),
+                planner.state == DISABLED]
+        return sum(bool(bit) << i for i, bit in enumerate(bits))
+
+    def stop(self) -> None:
+        """Emergency stop: motors off until it is started anew."""
+        self.emergency = True
+
+    def recover(self) -> bool:
+        """Put upright after a crash, where it lies. Whether it may fly again."""
+        if self.state == CRASHED:
+            self.commander.reset()
+            self.state = PRE_FLIGHT
+        return self.state == PRE_FLIGHT
+
+    def restart(self) -> None:
+        """As when its button is pressed: forget set-points, locks and crashes; the flight goes on in place."""
+        self.commander.reset()
+        self.state, self.emergency = PRE_FLIGHT, False
+
+    def drain(self) -> None:
+        """From now on the battery is nearly empty."""
+        self._stepper.plant[0]["battery_strength"] = 1.0
+        self._stepper.memory[kept.CHARGE] = min(NEARLY_EMPTY, self._stepper.memory[kept.CHARGE])
+
+    def step(self) -> str:
+        """Fly 10 ms. Returns the kind of the edge that the app reports, "none" mostly."""
+        self._setpoint[0] = self.commander.setpoint(self.now_s, self.estimate)
+        if self.commander.timed_out and self.state == PRE_FLIGHT and self.is_flying:
+            self.state = LOCKED
+            self.messages.append("SUP: Locked, reboot required")
+        if self.state != PRE_FLIGHT or self.emergency:
+            self.commander.planner.stop()
+            self.setpoint[controller.MOTORS] = 0.0
+        ending, _ = self._stepper.fly(self._setpoint, self._table)
+        if ending != loop.OK:
+            self._end(ending)
+        self.row[loop.T] = self.now_s
+        self.ticks += 1
+        if self.motors_on:
+            self._thrust_s = self.now_s
+            if self.took_off_s is None:
+                self.took_off_s = self.now_s
+        self._low_s = self._low_s + PERIOD_S if self.row[loop.VBAT] < LOW_V else 0.0
+        row = self.row
+        edge = self.app.step(self.now_s, row[loop.ACC_WORLD:loop.ACC_WORLD + 3], row[loop.GYRO:loop.GYRO + 3],
+                             row[loop.PWM:loop.PWM + 4], float(row[loop.VBAT]), self.quaternion())
+        if edge != "none":
+            self.messages.append(f"AIRTOUCH: Edge {int(self.app.read('edge'))}")
+        return edge
+
+    def _begin(self, setpoint: np.ndarray) -> None:
+        charge, fresh = self._stepper.memory[kept.CHARGE], self.ticks == 0
+        self._stepper.begin(setpoint)
+        if not fresh:
+            self._stepper.memory[kept.CHARGE] = charge
+
+    def _end(self, ending: int) -> None:
+        """What the simulator cannot fly on: the drone lies where it came down."""
+        place = self._start.copy()
+        if ending in (loop.STRUCK, loop.UPSET) and np.isfinite(self.row).all():
+            place[controller.X], place[controller.Y] = self.row[loop.PLACE:loop.PLACE + 2]
+            place[controller.YAW] = self.row[loop.ANGLES + 2]
+        if ending != loop.STRUCK or self.motors_on:
+            self.state = CRASHED
+            self.messages.append("SUP: Crashed, recovery required")
+        self.commander.reset()
+        self._begin(place)
+        self._setpoint[0] = place
+        self._stepper.fly(self._setpoint, self._table)

@@ -1,0 +1,132 @@
+"""The firmware's side of the link: each packet to its service, and what is sent unasked."""
+
+import struct
+
+from airtouch.sitl import memory_service, variables
+from airtouch.sitl import packet as crtp
+from airtouch.sitl.app import GROUP
+from airtouch.sitl.drone import Drone
+from airtouch.sitl.log_service import LogService
+from airtouch.sitl.packet import Packet
+from airtouch.sitl.param_service import ParamService
+
+PROTOCOL = 12
+VERSION, DEVICE = b"2026.08 virtual", b"CF21"
+GREETING = b"Bitcraze Crazyflie"
+BITFIELD, ARM, RECOVER, EMERGENCY, WATCHDOG = 0x0C, 1, 2, 3, 4
+RESPONSE = 0x80
+WATCHDOG_S = 1.0  #: the emergency-stop watchdog, once it has been fed
+
+
+class Firmware:
+    """`take` answers packets, `tick` flies 10 ms and gives what the drone sends of itself."""
+
+    def __init__(self, drone: Drone, ai_deck: bool = True) -> None:
+        self.drone = drone
+        table = variables.log_variables(drone)
+        items = variables.log_items(table)
+        self.log = LogService(items, variables.reader(table, items, drone))
+        self.param = ParamService(variables.parameters(drone, ai_deck), self._changed)
+        self._fed_s: float | None = None
+        self.say("SYS: Virtual Crazyflie, nothing here can break")
+
+    def say(self, text: str) -> None:
+        """Print on the console."""
+        self.drone.messages.append(text)
+
+    def tick(self) -> list[Packet]:
+        """Fly 10 ms: console and log packets."""
+        if self._fed_s is not None and self.drone.now_s - self._fed_s > WATCHDOG_S:
+            self.drone.stop()
+        self.drone.step()
+        packets = []
+        while self.drone.messages:
+            text = self.drone.messages.pop(0).encode() + b"\n"
+            packets += [Packet(crtp.CONSOLE, 0, text[i:i + crtp.MOST_DATA])
+                        for i in range(0, len(text), crtp.MOST_DATA)]
+        return packets + self.log.due(self.drone.now_ms)
+
+    def take(self, packet: Packet) -> list[Packet]:
+        """Answers to any packet; unknown ports and what is too short are ignored."""
+        port, channel, data = packet
+        drone = self.drone
+        if port == crtp.LOG:
+            return self.log.take(packet, drone.now_ms)
+        if port == crtp.PARAM:
+            return self.param.take(packet)
+        if port == crtp.MEMORY:
+            return memory_service.take(packet)
+        if port == crtp.COMMANDER and channel == 0:
+            drone.commander.take_rpyt(data, drone.now_s, drone.estimate)
+        elif port == crtp.GENERIC and channel == 0:
+            drone.commander.take_generic(data, drone.now_s, drone.estimate)
+        elif port == crtp.GENERIC and channel == 1 and data[:1] == b"\0":
+            drone.commander.relax()
+        elif port == crtp.HIGH_LEVEL:
+            code = drone.commander.planner.command(data, drone.now_s)
+            return [Packet(port, channel, (data[:3] + b"\0" * 3)[:3] + bytes([code]))]
+        elif port == crtp.SUPERVISOR:
+            return self._supervisor(channel, data)
+        elif port == crtp.PLATFORM:
+            return self._platform(channel, data)
+        elif port == crtp.LINK:
+            return self._link(channel, data)
+        return []
+
+    def _link(self, channel: int, data: bytes) -> list[Packet]:
+        if channel == 0:
+            return [Packet(crtp.LINK, 0, data)]
+        if channel == 1:
+            return [Packet(crtp.LINK, 1, GREETING.ljust(crtp.MOST_DATA, b"\0"))]
+        return [Packet(crtp.LINK, 3, b"")] if channel == 3 else []
+
+    def _platform(self, channel: int, data: bytes) -> list[Packet]:
+        if not data:
+            return []
+        if channel == 1:
+            answers = {0: struct.pack("<I", PROTOCOL), 1: VERSION, 2: DEVICE}
+            return [Packet(crtp.PLATFORM, 1, data[:1] + answers[data[0]])] if data[0] in answers else []
+        if channel == 0 and data[0] in (ARM, RECOVER):
+            return [Packet(crtp.PLATFORM, 0, data[:1] + self._request(data[0]))]
+        return []
+
+    def _supervisor(self, channel: int, data: bytes) -> list[Packet]:
+        if not data:
+            return []
+        command, answer = data[0], None
+        if channel == 0 and command == BITFIELD:
+            answer = struct.pack("<H", self.drone.info())
+        elif channel == 0 and 1 <= command <= 11:
+            answer = bytes([self.drone.info() >> (command - 1) & 1])
+        elif channel == 1 and command in (ARM, RECOVER):
+            answer = self._request(command)
+        elif channel == 1 and command == EMERGENCY:
+            self.drone.stop()
+        elif channel == 1 and command == WATCHDOG:
+            self._fed_s = self.drone.now_s
+        return [] if answer is None else [Packet(crtp.SUPERVISOR, channel, bytes([command | RESPONSE]) + answer)]
+
+    def _request(self, command: int) -> bytes:
+        """Arming is automatic here, so it succeeds where the drone can fly."""
+        ready = self.drone.recover() if command == RECOVER else bool(self.drone.info() & 1)
+        return bytes([ready, ready])
+
+    def _changed(self, name: str, value: float) -> dict[str, float]:
+        group, _, parameter = name.partition(".")
+        drone, planner = self.drone, self.drone.commander.planner
+        if group == GROUP:
+            drone.app.set(parameter, value)
+            return drone.app.values()
+        if name == "stabilizer.stop" and value:
+            drone.stop()
+        elif name == "hlCommander.vtoff":
+            planner.takeoff_mps = value if value > 0.0 else planner.takeoff_mps
+        elif name == "hlCommander.vland":
+            planner.landing_mps = value if value > 0.0 else planner.landing_mps
+        elif name == "hlCommander.groupmask":
+            planner.group = int(value)
+        elif name == "flightmode.althold":
+            drone.commander.alt_hold = bool(value)
+        elif name == "flightmode.poshold":
+            drone.commander.pos_hold = bool(value)
+        return {}

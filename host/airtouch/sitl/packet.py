@@ -1,0 +1,27 @@
+"""CRTP packets: one header byte (port and channel) and up to 30 bytes."""
+
+from typing import NamedTuple
+
+CONSOLE, PARAM, COMMANDER, MEMORY, LOG, LOCALIZATION, GENERIC, HIGH_LEVEL, SUPERVISOR = 0, 2, 3, 4, 5, 6, 7, 8, 9
+PLATFORM, LINK = 13, 15
+MOST_DATA = 30
+NULL = b"\xff"  #: the packet that a scan sends
+
+
+class Packet(NamedTuple):
+    """A packet. data: what the firmware calls p.data, without the header."""
+
+    port: int
+    channel: int
+    data: bytes
+
+    def to_bytes(self) -> bytes:
+        """As one UDP datagram."""
+        return bytes([self.port << 4 | 0x0C | self.channel]) + self.data[:MOST_DATA]
+
+
+def parse(datagram: bytes) -> Packet | None:
+    """The packet of a datagram; None for an empty or over-long one."""
+    if not 1 <= len(datagram) <= MOST_DATA + 1:
+        return None
+    return Packet(datagram[0] >> 4, datagram[0] & 3, bytes(datagram[1:]))

@@ -1,0 +1,37 @@
+"""The simulator's rows of a session as one flight log."""
+
+from pathlib import Path
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import COLUMNS, FlightLog
+
+DECIMALS = 6
+
+
+class Recorder:
+    """`add` each row (33,), `write` at the end. Raises AirTouchError at once for a file that is there already."""
+
+    def __init__(self, path: Path, scenario: str, vehicle: str, seed: int, flight: int, force: bool) -> None:
+        if path.exists() and not force:
+            raise AirTouchError(f"{path}: exists already; use --force to replace it")
+        if not path.parent.is_dir():
+            raise AirTouchError(f"{path}: no such folder")
+        self._path, self._force = path, force
+        self._rows: list[np.ndarray] = []
+        self._meta = {"format": "simulated", "sample_period_s": 0.01, "acc_frame": "body", "vehicle": vehicle,
+                      "scenario": scenario, "seed": seed, "flight": flight, "warnings": []}
+
+    def add(self, row: np.ndarray) -> None:
+        """One row of 10 ms."""
+        self._rows.append(row.copy())
+
+    def write(self) -> None:
+        """Write the file, whole or not at all; nothing where nothing was flown."""
+        if not self._rows:
+            return
+        table = np.round(np.array(self._rows), DECIMALS)
+        log = FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, {"source": self._path.name, **self._meta})
+        logs.write(log, self._path, force=self._force)

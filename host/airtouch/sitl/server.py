@@ -1,0 +1,179 @@
+"""The virtual Crazyflie on a UDP port: real time (or faster), faults, one client at a time."""
+
+import contextlib
+import math
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
+from airtouch.simulation import scenario as scenarios
+from airtouch.simulation.flight import Chosen, choose
+from airtouch.sitl import packet as crtp
+from airtouch.sitl.commander import PERIOD_S
+from airtouch.sitl.drone import Drone
+from airtouch.sitl.faults import Fault, Line, parse
+from airtouch.sitl.firmware import Firmware
+from airtouch.sitl.recorder import Recorder
+from airtouch.vehicle import Vehicle
+
+HOST, PORT = "127.0.0.1", 19850  #: where cflib looks for virtual drones
+MOST_BEHIND_S = 0.5  #: a machine that is slower than this loses time, not samples
+LINK_TIMEOUT_S = 1.0  #: the firmware forgets its log blocks when the link is down for so long
+
+
+class Server:
+    """`run` serves until `stop`. `uri` is what clients connect to.
+
+    scenario, vehicle: names, files or objects; effects, without: as `airtouch simulate`. The drone
+    starts where the scenario's mission does. speed: drone seconds a second. faults: texts or
+    `Fault`s. record: flight-log file that is written at the end.
+    Raises AirTouchError for what cannot be flown and for a port that is taken.
+    """
+
+    def __init__(self, scenario: scenarios.Scenario | str | Path = "paper-9cm", *, port: int = PORT,
+                 host: str = HOST, speed: float = 1.0, faults: Sequence[Fault | str] = (),
+                 vehicle: Vehicle | str | Path | None = None, effects: Chosen = (), without: Sequence[str] = (),
+                 seed: int = 0, flight: int = 0, ai_deck: bool = True, record: Path | None = None,
+                 force: bool = False) -> None:
+        if not 0.0 < speed <= 100.0:
+            raise AirTouchError("speed must be above 0 and at most 100")
+        scene = scenario if isinstance(scenario, scenarios.Scenario) else scenarios.load(scenario)
+        craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or "crazyflie-2.1-flow")
+        self.faults = [fault if isinstance(fault, Fault) else parse(fault) for fault in faults]
+        self.plan = scenarios.draw_flight(scene, seed, flight)
+        active = choose(self.plan, effects, without)
+        self.drone = Drone(self.plan, craft, seed, flight, active, ai_deck)
+        self.firmware = Firmware(self.drone, ai_deck)
+        self.recorder = Recorder(record, scene.name, craft.name, seed, flight, force) if record else None
+        self.speed, self.client = speed, None
+        rng = np.random.default_rng([seed, flight, 11])
+        self._up, self._down = Line(self.faults, rng), Line(self.faults, rng)
+        self._todo = [f for f in self.faults if f.kind not in ("loss", "late")]
+        self._cut_until_s = -math.inf
+        self._stop = threading.Event()
+        self._socket = _bind(host, port)
+        self.port = self._socket.getsockname()[1]
+        self.uri = f"udp://{host}:{self.port}"
+        self.slept_s = 0.0  #: drone time that was left out because the machine was too slow
+
+    def stop(self) -> None:
+        """End `run`, from any thread."""
+        self._stop.set()
+
+    def run(self, told: Callable[[str], None] = lambda _: None) -> None:
+        """Serve until `stop`; told(text) gets the console's lines."""
+        start = time.monotonic() - self.drone.now_s / self.speed
+        try:
+            while not self._stop.is_set():
+                now = time.monotonic()
+                due = start + (self.drone.ticks + 1) * PERIOD_S / self.speed
+                if now < due:
+                    if select.select([self._socket], [], [], due - now)[0]:
+                        self._receive()
+                    self._exchange((time.monotonic() - start) * self.speed)
+                    continue
+                behind = (now - due) * self.speed - MOST_BEHIND_S
+                if behind > 0.0:
+                    start += behind / self.speed
+                    self.slept_s += behind
+                self._receive()
+                self._tick(told)
+        finally:
+            self._socket.close()
+            if self.recorder:
+                self.recorder.write()
+
+    def _tick(self, told: Callable[[str], None]) -> None:
+        drone = self.drone
+        self._exchange(drone.now_s)
+        self._begin_faults(drone.now_s)
+        for line in drone.messages:
+            told(line)
+        for packet in self.firmware.tick():
+            if self.client:
+                self._down.put(packet, self.client, drone.now_s)
+        if self.recorder:
+            self.recorder.add(drone.row)
+        self._exchange(drone.now_s)
+
+    def _begin_faults(self, now_s: float) -> None:
+        drone = self.drone
+        for fault in list(self._todo):
+            since = drone.took_off_s
+            if fault.at_s > -math.inf and (since is None or now_s < since + fault.at_s):
+                continue
+            self._todo.remove(fault)
+            if fault.kind == "disconnect":
+                self._cut_until_s = now_s + fault.amount
+                self._up.clear()
+                self._down.clear()
+                if fault.amount > LINK_TIMEOUT_S:
+                    self.firmware.log.reset()
+            elif fault.kind == "gap8-reset":
+                drone.app.reset_gap8(now_s)
+            elif fault.kind == "gap8-silent":
+                drone.app.gap8_silent = True
+            else:
+                drone.drain()
+
+    def _receive(self) -> None:
+        """Everything that has come in goes onto the line."""
+        while True:
+            try:
+                datagram, peer = self._socket.recvfrom(2048)
+            except BlockingIOError:
+                return
+            except OSError:  # a client that is gone
+                continue
+            packet = crtp.parse(datagram)
+            if packet is not None and self.drone.now_s >= self._cut_until_s:
+                self._up.put(packet, peer, self.drone.now_s)
+
+    def _exchange(self, now_s: float) -> None:
+        """Take what has arrived, answer it, send what is due."""
+        for packet, peer in self._up.ready(now_s):
+            if packet.to_bytes() != crtp.NULL and peer != self.client:
+                self.client = peer
+                if self.drone.state != "ready" or self.drone.emergency:
+                    self.drone.restart()
+            for answer in self.firmware.take(packet):
+                self._down.put(answer, peer, now_s)
+        for packet, peer in self._down.ready(now_s):
+            if now_s < self._cut_until_s:
+                continue
+            with contextlib.suppress(OSError):
+                self._socket.sendto(packet.to_bytes(), peer)
+
+
+def _bind(host: str, port: int) -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    made.setblocking(False)
+    try:
+        made.bind((host, port))
+    except (OSError, OverflowError) as error:
+        made.close()
+        raise AirTouchError(f"port {port} of {host}: {error}; choose another with --port") from None
+    return made
+
+
+@contextlib.contextmanager
+def serve(scenario: scenarios.Scenario | str | Path = "paper-9cm", **settings) -> Iterator[Server]:
+    """A virtual Crazyflie in a thread of its own: `with serve(port=0) as virtual: connect(virtual.uri)`.
+
+    Arguments as `Server`.
+    """
+    server = Server(scenario, **settings)
+    thread = threading.Thread(target=server.run, name="virtual-crazyflie", daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.stop()
+        thread.join()
