@@ -57,6 +57,7 @@ class Cell:
     blocks: int = 0
     flights: int = 0
     after: float | None = None  #: the same cell with the named effects in the model
+    floor_high: float | None = None  #: upper end of the floor's interval
 
 
 @dataclass(frozen=True)

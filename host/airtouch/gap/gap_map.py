@@ -1,0 +1,189 @@
+"""Where the gap lies: a map of channel x band x phase x regime, each cell beside its floor.
+
+A cell is the rms of measured minus modelled, in the channel's unit. Its floor is what
+flights declared nominal differ by among themselves (without such flights: how much the
+flights at hand differ in this phase), and never less than the noise of the declared
+sensors. Intervals are 90 %: bootstrap over flights (over blocks where there are few
+flights), and never narrower than the time-bandwidth product of the cell allows.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap import random_effects
+from airtouch.gap.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
+from airtouch.gap.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
+from airtouch.gap.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
+from airtouch.gap.fit import Data, Study
+from airtouch.gap.flight import GROUND, Flight
+from airtouch.gap.result import Cell
+from airtouch.gap.spectra import frequencies
+from airtouch.logs.segments import KINDS
+
+MOST_BANDS = 2  #: of one channel and phase among the largest cells
+BASELINE, SPREAD = "baseline flights", "sensor noise and how these flights differ among themselves"
+
+CHANNEL_WORDS = {
+    "force_x": "forward force", "force_y": "sideways force", "force_z": "lift",
+    "torque_x": "roll torque", "torque_y": "pitch torque", "torque_z": "yaw torque",
+    "rate_x": "roll rate", "rate_y": "pitch rate", "rate_z": "yaw rate",
+    "command_thrust": "thrust command", "command_roll": "roll command",
+    "command_pitch": "pitch command", "command_yaw": "yaw command",
+}
+PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover", "cruise": "in cruise",
+               "over platform": "over the platform", "landing": "at landing"}
+
+
+@dataclass(frozen=True)
+class GapMap:
+    """Every cell with data, and where the floor is from: BASELINE or SPREAD."""
+
+    cells: tuple[Cell, ...]
+    floor_from: str
+    flights: tuple[str, ...]
+
+
+def gap_map(study: Study, flights: Iterable[Flight], baseline: Sequence[Flight] = (),
+            terms: Sequence[Term] = ()) -> GapMap:
+    """The map of flights under a study; `after` of each cell is with the terms' effects in the model.
+
+    baseline: flights declared nominal, whose differences are the floor. One flight is held
+    at a time besides those that the caller keeps.
+    """
+    before, after, names, no_gyro = [], [], [], True
+    for f in flights:
+        left = residual(f, study.vehicle, study.calibration, study.controller)
+        before.append(sums(f, left, study.vehicle))
+        no_gyro &= f.rates is None
+        names.append(f.name)
+        if terms:
+            after.append(_after(study, f, terms))
+    nominal = [sums(f, residual(f, study.vehicle, study.calibration, study.controller), study.vehicle)
+               for f in baseline]
+    joined, sensor = join(before), sensor_rms(study.vehicle)
+    floors = floors_of(join(nominal), len(nominal), sensor) if nominal else spreads_of(joined, sensor)
+    later = join(after) if terms else None
+    cells = []
+    for k, kind in enumerate(KINDS):
+        table = table_of(joined, k, seed=k)
+        if table is None:
+            continue
+        then = table_of(later, k, seed=k) if later else None
+        level, top = floors.get(k) or (floors[GROUND] if k == GROUND else floors[AIR])
+        cells += _cells(kind, table, then, level, top, bool(nominal), no_gyro)
+    return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(names))
+
+
+def significant(cell: Cell) -> bool:
+    """Whether the cell's interval lies above the upper end of its floor's."""
+    return sure_ratio(cell) > 1.0
+
+
+def largest(cells: Iterable[Cell], count: int = 12) -> list[Cell]:
+    """The significant cells that surely stand out most from their floor, largest first.
+
+    Of a channel, band and phase the regime is named in which the gap is significantly
+    larger than in the phase as a whole, if there is one; at most MOST_BANDS bands of one
+    channel and phase.
+    """
+    best: dict[tuple, Cell] = {}
+    whole = {(c.channel, c.band_hz, c.phase): c for c in cells if c.regime == "all"}
+    for c in cells:
+        key = (c.channel, c.band_hz, c.phase)
+        if not significant(c) or key not in whole:
+            continue
+        if c.regime != "all" and not (c.low > (whole[key].high or np.inf) and sure_ratio(c) > sure_ratio(whole[key])):
+            continue
+        if key not in best or sure_ratio(c) > sure_ratio(best[key]):
+            best[key] = c
+    chosen: list[Cell] = []
+    for c in sorted(best.values(), key=sure_ratio, reverse=True):
+        if sum((o.channel, o.phase) == (c.channel, c.phase) for o in chosen) < MOST_BANDS:
+            chosen.append(c)
+    return chosen[:count]
+
+
+def ratio(cell: Cell) -> float:
+    """Gap over floor."""
+    return cell.gap / max(cell.floor, 1e-12)
+
+
+def sure_ratio(cell: Cell) -> float:
+    """Lower end of the gap over the upper end of the floor."""
+    return (cell.low or 0.0) / max(cell.floor_high or cell.floor, 1e-12)
+
+
+def overall(cells: Iterable[Cell], key: str = "gap") -> float:
+    """Root mean square of gap (or `after`) over floor, all channels, bands and phases in the air alike."""
+    found = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != "ground"
+             and getattr(c, key) is not None and c.floor > 0.0]
+    return float(np.sqrt(np.mean(np.square(found)))) if found else float("nan")
+
+
+def in_words(cell: Cell) -> str:
+    """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
+    regime = "" if cell.regime == "all" else f" ({cell.regime})"
+    return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
+            f"{CHANNEL_WORDS[cell.channel]}: {cell.gap:.2g} {cell.unit}, {ratio(cell):.2g} times the floor")
+
+
+def _after(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
+    """Sums with effects in the model; the power of random ones is taken off, and what is too much counts."""
+    active = [t.active() for t in terms if t.kind == MEAN]
+    left = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
+                study.vehicle)
+    random = [t for t in terms if t.kind == SPECTRUM]
+    if not random or not len(left.phase):
+        return left
+    data = Data(study, [flight])
+    sensor = sensor_rms(study.vehicle) ** 2
+    power = left.power.copy()
+    for place, regime in ((left.phase == GROUND, "ground"), (left.phase != GROUND, "air")):
+        share = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
+        added = sum(np.einsum("bf,fc->bc", share, p.mean(axis=0)) if len(p) else 0.0
+                    for p in (random_effects.power(data, t)[0][regime] for t in random))
+        weight = left.weight[place][:, :, None, None]
+        rest = np.minimum(sensor * weight, left.power[place])
+        power[place] = rest + np.abs(left.power[place] - rest - weight * added)
+    return replace(left, power=power)
+
+
+def _cells(kind: str, table: Table, then: Table | None, level: np.ndarray, top: np.ndarray,
+           baseline: bool, no_gyro: bool) -> list[Cell]:
+    cells = []
+    shown = _shown(kind, baseline, no_gyro)
+    for r, regime in enumerate(REGIMES):
+        if table.seconds[r] < LEAST_SECONDS:
+            continue
+        for b, band in enumerate(BANDS_HZ):
+            for c, channel in enumerate(CHANNELS):
+                if not shown[b, c] or not np.isfinite(table.rms[r, b, c]):
+                    continue
+                cells.append(Cell(
+                    channel.name, band, kind, float(table.rms[r, b, c]), float(level[r, b, c]), channel.unit,
+                    float(table.low[r, b, c]), float(table.high[r, b, c]), regime, int(table.blocks[r]),
+                    int(table.flights[r]), None if then is None else float(then.rms[r, b, c]),
+                    float(top[r, b, c])))
+    return cells
+
+
+def _shown(kind: str, baseline: bool, no_gyro: bool) -> np.ndarray:
+    """Which cells mean something, bool (bands, COUNT).
+
+    Rates hold turns that were flown, so in the air they are only held against baseline
+    flights; without a gyro torque is known at low frequency only; commands need a law.
+    """
+    shown = np.ones((len(BANDS_HZ), COUNT), bool)
+    shown[1:, RATE] = False
+    shown[:, RATE] &= kind == "ground" or baseline
+    shown[0, COMMAND], shown[-1, COMMAND] = False, False
+    if kind == "ground":
+        shown[:, COMMAND] = False
+    if no_gyro:
+        shown[1:, TORQUE] = False
+    if no_gyro and kind == "ground":
+        shown[:, TORQUE] = False
+    return shown

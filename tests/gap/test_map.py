@@ -1,0 +1,159 @@
+"""The gap map against closed forms: noise, offsets, tones and short phases of known size."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
+
+from airtouch.gap import gap_map as maps
+from airtouch.gap.band_sums import BANDS_HZ, REGIMES, filtered, gains, sensor_rms, stretches, sums
+from airtouch.gap.candidates import terms
+from airtouch.simulation.flight import prepare
+
+NOISE = float(prepare(VEHICLE, ())[0][0]["acc_noise"][0])
+WIDTH = np.array([b - a for a, b in BANDS_HZ])
+
+
+def cell(made, channel, band, phase="hover", regime="all"):
+    return next(c for c in made.cells if (c.channel, c.band_hz, c.phase, c.regime)
+                == (channel, BANDS_HZ[band], phase, regime))
+
+
+def test_bands_share_the_power_out():
+    f = (np.arange(5000) + 0.5) * 0.01
+    assert np.allclose((gains(f) ** 2).sum(axis=0), 1.0)
+    assert (gains(f) ** 2).mean(axis=1) * 50.0 == pytest.approx(WIDTH, rel=2e-3)
+
+
+@pytest.mark.parametrize("rms", [0.05, 3.0])
+def test_white_noise_has_its_rms_in_every_band(rms):
+    made = maps.gap_map(study(), [flight(120.0, noise(120.0, rms, 1))])
+    for b, width in enumerate(WIDTH):
+        for axis in "xyz":
+            c = cell(made, f"force_{axis}", b)
+            expected = rms * np.sqrt(width / 50.0)
+            assert c.gap == pytest.approx(expected, rel=0.25 if b == 0 else 0.1)
+            assert c.low < expected < c.high and c.unit == "m/s^2" and c.blocks == 47 and c.flights == 1
+
+
+def test_intervals_cover():
+    inside = []
+    for seed in range(30):
+        made = maps.gap_map(study(), [flight(30.0, noise(30.0, 1.0, seed))])
+        inside += [cell(made, "force_x", b).low < np.sqrt(w / 50.0) < cell(made, "force_x", b).high
+                   for b, w in enumerate(WIDTH)]
+    assert np.mean(inside) >= 0.85
+
+
+def test_an_offset_is_in_the_lowest_band_alone():
+    made = maps.gap_map(study(), [flight(7.0, np.array([0.5, 0.0, -0.2]))])
+    assert cell(made, "force_x", 0).gap == pytest.approx(0.5)
+    assert cell(made, "force_z", 0).gap == pytest.approx(0.2)
+    assert all(cell(made, f"force_{a}", b).gap < 1e-9 for a in "xyz" for b in range(1, 6))
+
+
+@pytest.mark.parametrize(("hz", "band"), [(1.0, 1), (4.0, 2), (8.1, 3), (18.0, 4), (40.0, 5)])
+def test_a_tone_is_in_its_band(hz, band):
+    t = np.arange(2000) * 0.01
+    tone = np.zeros((2000, 3))
+    tone[:, 1] = 0.8 * np.sin(2 * np.pi * hz * t)
+    made = maps.gap_map(study(), [flight(20.0, tone)])
+    assert cell(made, "force_y", band).gap == pytest.approx(0.8 / np.sqrt(2), rel=0.05)
+    assert sum(cell(made, "force_y", b).gap ** 2 for b in range(6) if b != band) < 0.02 * 0.32
+
+
+def test_a_phase_shorter_than_a_block_keeps_what_is_in_it():
+    n = 1200
+    phase, force = np.full(n, HOVER), np.zeros((n, 3))
+    phase[:50] = TAKE_OFF
+    force[:50, 2] = np.sin(2 * np.pi * 16.0 * np.arange(50) * 0.01)
+    made = maps.gap_map(study(), [flight(12.0, force, phase=phase)])
+    assert cell(made, "force_z", 4, "take-off").gap == pytest.approx(np.sqrt(0.5), rel=0.1)
+    assert cell(made, "force_z", 4).gap < 0.1
+    assert cell(made, "force_z", 4, "take-off").blocks == 1
+
+
+def test_lost_samples_do_not_count():
+    force, lost = np.full((2000, 3), 0.3), np.zeros(2000, bool)
+    force[700:720], lost[700:720] = 50.0, True
+    made = maps.gap_map(study(), [flight(20.0, force, lost=lost)])
+    assert cell(made, "force_x", 0).gap == pytest.approx(0.3)
+    assert cell(made, "force_x", 5).gap < 1e-9
+
+
+def test_baseline_floor_is_what_differs_between_flights_not_what_they_share():
+    offsets = np.array([-0.3, -0.1, 0.1, 0.3])
+    nominal = [flight(20.0, 2.0 + o + noise(20.0, 0.2, i), name=str(i)) for i, o in enumerate(offsets)]
+    made = maps.gap_map(study(), [flight(20.0, 2.0 + noise(20.0, 0.06, 9))], nominal)
+    lowest = cell(made, "force_x", 0)
+    assert lowest.gap == pytest.approx(2.0, rel=0.02)
+    assert lowest.floor == pytest.approx(offsets.std(ddof=1), rel=0.08)
+    assert cell(made, "force_x", 5).floor == pytest.approx(0.2 * np.sqrt(0.5), rel=0.1)
+    assert made.floor_from == maps.BASELINE
+
+
+def test_without_baseline_the_floor_is_sensor_noise_and_spread():
+    same = [flight(20.0, 1.0 + noise(20.0, 0.06, i), name=str(i)) for i in range(3)]
+    spread = [flight(20.0, o + noise(20.0, 0.06, i), name=str(i)) for i, o in enumerate((0.5, 1.0, 1.5))]
+    sensor, rms = sensor_rms(VEHICLE), NOISE
+    assert cell(maps.gap_map(study(), same), "force_x", 0).floor < 0.05
+    assert cell(maps.gap_map(study(), spread), "force_x", 0).floor == pytest.approx(0.5, rel=0.05)
+    assert sensor[:, 0] == pytest.approx(rms * np.sqrt(WIDTH / 50.0), rel=0.01)
+
+
+def test_no_gap_is_rarely_called_one():
+    quiet = lambda seed: flight(20.0, noise(20.0, 0.06, seed), noise(20.0, 0.006, seed + 100))
+    hits = [maps.significant(c) for s in range(8) for c in maps.gap_map(
+        study(), [quiet(s)], [quiet(50 + s), quiet(70 + s)]).cells if c.regime == "all"]
+    assert np.mean(hits) < 0.02
+
+
+def test_largest_names_what_was_injected():
+    t = np.arange(2000) * 0.01
+    force = noise(20.0, 0.06, 1)
+    force[:, 2] += 0.5 * np.sin(2 * np.pi * 4.0 * t)
+    made = maps.gap_map(study(), [flight(20.0, force)], [flight(20.0, noise(20.0, 0.06, i)) for i in (2, 3)])
+    first = maps.largest(made.cells)[0]
+    assert (first.channel, first.band_hz) == ("force_z", (2.0, 6.0)) and first.gap == pytest.approx(0.35, rel=0.1)
+    assert "2-6 Hz, lift: 0.35 m/s^2" in maps.in_words(first) and "times the floor" in maps.in_words(first)
+
+
+def test_a_regime_is_named_only_where_it_is_worse_than_its_phase():
+    force = noise(60.0, 0.06, 1)
+    force[4000:, 0] += np.random.default_rng(0).normal(0.0, 1.0, 2000)
+    found = maps.largest(maps.gap_map(study(), [flight(60.0, force)]).cells)
+    assert found and found[0].channel == "force_x"
+    assert any(c.regime == "last third of the flight" for c in found)
+
+
+@pytest.mark.parametrize(("name", "values", "force", "band"), [
+    ("imu_bias", {"acc_x": 0.4}, np.array([0.4, 0.0, 0.0]), 0),
+    ("imu_noise", {"factor": 4.0}, noise(40.0, 4.0 * NOISE, 3), 5)])
+def test_after_an_effect_that_is_right_little_is_left(name, values, force, band):
+    term = terms(name)[0]
+    right = term.fitted(np.zeros(len(term.free)))
+    right = type(term)(term.effect, term.kind, term.free, {**right.values, **values})
+    c = cell(maps.gap_map(study(), [flight(40.0, force)], terms=[right]), "force_x", band)
+    assert c.after < 0.25 * c.gap + c.floor and c.gap > 3 * c.floor
+
+
+def test_sums_of_phases_are_sums_of_blocks():
+    made = sums(flight(20.0, noise(20.0, 1.0, 0)), np.zeros((2000, 13)) + 1.0, VEHICLE)
+    whole = made.by_phase()
+    assert len(made.phase) > 5 and len(whole.phase) == 1
+    assert whole.weight[0, REGIMES.index("all")] == 2000
+    assert whole.power[0, 0, 0] == pytest.approx(2000.0)
+
+
+@given(st.integers(2, 900), st.integers(0, 2 ** 32 - 1))
+def test_any_stretch_can_be_filtered(n, seed):
+    values = np.random.default_rng(seed).normal(size=(n, 2))
+    bands = filtered(values)
+    assert bands.shape == (6, n, 2) and np.isfinite(bands).all()
+
+
+def test_stretches_leave_contact_out():
+    made = flight(10.0)
+    made.usable[300:400] = False
+    assert stretches(made) == [(0, 300), (400, 1000)]

@@ -1,0 +1,40 @@
+"""Flights whose gap is known: what the model says plus what a test injects."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.gap.channels import residual
+from airtouch.gap.fit import Study
+from airtouch.gap.flight import PERIOD_S, Flight
+from airtouch.gap.spectra import Floor
+from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.segments import KINDS
+from airtouch.simulation import replay
+
+VEHICLE = vehicles.load("crazyflie-2.1-flow")
+HOVER, TAKE_OFF = KINDS.index("hover"), KINDS.index("take-off")
+
+
+def study(vehicle=VEHICLE):
+    """A study without calibration, controller or floor."""
+    return Study(vehicle, (), None, Floor({}, {}, np.zeros(13), 0.0, 0.0))
+
+
+def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=None):
+    """A hover whose gap is `force` (n, 3) m/s^2; gyro: (n, 3) rad/s on top of none."""
+    n = round(seconds / PERIOD_S)
+    pwm = np.full((n, 4), 40000.0)
+    log = FlightLog({"t_s": np.arange(n) * PERIOD_S, **{f"m{i}_pwm": pwm[:, i - 1] for i in range(1, 5)}},
+                    {"source": name})
+    made = Flight(
+        name, log, replay.signals_of(log, VEHICLE), np.zeros((n, 3)), np.zeros((n, 3)) + gyro, pwm,
+        np.tile(np.eye(3), (n, 1, 1)), np.broadcast_to(np.int8(phase), n).copy(), np.ones(n, bool),
+        np.zeros(n), np.zeros(n, bool) if lost is None else lost)
+    return replace(made, acceleration=force - residual(made, VEHICLE)[:, :3])
+
+
+def noise(seconds, rms, seed):
+    """White noise (n, 3)."""
+    return np.random.default_rng(seed).normal(0.0, rms, (round(seconds / PERIOD_S), 3))
