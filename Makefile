@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
 
-.PHONY: help setup demo test bench clean
+.PHONY: help setup demo test bench firmware gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -28,6 +28,15 @@ test: setup  ## every test, sanitizers included
 bench: setup  ## time the kernels and the simulator against their peers, as ratios
 	$(BIN)/python tools/bench.py $(BENCH_ARGS)
 	$(BIN)/python tools/bench_simulation.py
+
+firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [CONFIG=app-config-tap]
+	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)"
+
+gap8:  ## build the GAP8 app: GAP_SDK_HOME=...
+	@sh gap8/app/build.sh "$(GAP_SDK_HOME)"
+
+flash: setup  ## check and flash an image: IMAGE=... [URI=radio://...]
+	$(BIN)/airtouch flash "$(or $(IMAGE),build/firmware/firmware/app/build/cf2.bin)" $(if $(URI),--uri "$(URI)")
 
 clean:  ## remove what was built
 	rm -rf .venv build out host/*.egg-info host/airtouch/kernels/*.so

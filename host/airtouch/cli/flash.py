@@ -1,0 +1,25 @@
+"""`airtouch flash`: an image onto the drone, after a look at it."""
+
+from pathlib import Path
+
+import click
+
+from airtouch.crazyflie import flash
+
+
+@click.command()
+@click.argument("image", type=click.Path(path_type=Path))
+@click.option("--uri", help="The running Crazyflie, e.g. radio://0/80/2M/E7E7E7E7E7. Left out: cold boot, switch it on.")
+@click.option("--target", type=click.Choice(list(flash.TARGETS)), help="What the image is for; found out if left out.")
+@click.option("--check", is_flag=True, help="Only look at the image.")
+def command(image: Path, uri: str | None, target: str | None, check: bool) -> None:
+    """Flash IMAGE (cf2.bin, or the GAP8's target.board.devices.flash.img) through cfloader.
+
+    \b
+    airtouch flash build/firmware/firmware/app/build/cf2.bin --uri radio://0/80/2M/E7E7E7E7E7
+    airtouch flash target.board.devices.flash.img --uri radio://0/80/2M/E7E7E7E7E7
+    """
+    found = flash.inspect(image, target)
+    click.echo(f"{found.path}: {found.target}, {found.size_bytes} bytes, entry 0x{found.entry:08x}")
+    if not check:
+        flash.flash(found, uri)
