@@ -46,26 +46,40 @@ class GapMap:
     flights: tuple[str, ...]
 
 
-def gap_map(study: Study, flights: Iterable[Flight], baseline: Sequence[Flight] = (),
+@dataclass(frozen=True)
+class Part:
+    """What one flight adds to a map."""
+
+    name: str
+    before: Sums
+    after: Sums | None
+    has_gyro: bool
+
+
+def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] = (),
             terms: Sequence[Term] = ()) -> GapMap:
     """The map of flights under a study; `after` of each cell is with the terms' effects in the model.
 
     baseline: flights declared nominal, whose differences are the floor. One flight is held
     at a time besides those that the caller keeps.
     """
-    before, after, names, no_gyro = [], [], [], True
-    for f in flights:
-        left = residual(f, study.vehicle, study.calibration, study.controller)
-        before.append(sums(f, left, study.vehicle))
-        no_gyro &= f.rates is None
-        names.append(f.name)
-        if terms:
-            after.append(_after(study, f, terms))
-    nominal = [sums(f, residual(f, study.vehicle, study.calibration, study.controller), study.vehicle)
-               for f in baseline]
-    joined, sensor = join(before), sensor_rms(study.vehicle)
-    floors = floors_of(join(nominal), len(nominal), sensor) if nominal else spreads_of(joined, sensor)
-    later = join(after) if terms else None
+    return assemble(study, [part_of(study, f, terms) for f in flights], [part_of(study, f) for f in baseline])
+
+
+def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
+    """One flight's part of the map under a study, and with the terms' effects in the model."""
+    left = residual(flight, study.vehicle, study.calibration, study.controller)
+    return Part(flight.name, sums(flight, left, study.vehicle), _after(study, flight, terms) if terms else None,
+                flight.rates is not None)
+
+
+def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = ()) -> GapMap:
+    """The map of flights that were gone through one by one."""
+    joined, sensor = join([p.before for p in parts]), sensor_rms(study.vehicle)
+    floors = floors_of(join([p.before for p in nominal]), len(nominal), sensor) if nominal \
+        else spreads_of(joined, sensor)
+    later = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
+    no_gyro = not any(p.has_gyro for p in parts)
     cells = []
     for k, kind in enumerate(KINDS):
         table = table_of(joined, k, seed=k)
@@ -74,7 +88,7 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Sequence[Flight] 
         then = table_of(later, k, seed=k) if later else None
         level, top = floors.get(k) or (floors[GROUND] if k == GROUND else floors[AIR])
         cells += _cells(kind, table, then, level, top, bool(nominal), no_gyro)
-    return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(names))
+    return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
 
 
 def significant(cell: Cell) -> bool:

@@ -96,14 +96,15 @@ class Diagnosis:
             "control": dict(self.control), "advice": self.advice, "arms": dict(self.arms),
             "notes": list(self.notes), "cannot": list(self.cannot), "flights": list(self.flights),
         }
-        return _rounded(made)
+        return rounded(made)
 
 
-def _rounded(value: Any) -> Any:
+def rounded(value: Any) -> Any:
+    """Plain data with floats to six digits, None where not finite."""
     if isinstance(value, Mapping):
-        return {k: _rounded(v) for k, v in value.items()}
+        return {k: rounded(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_rounded(v) for v in value]
+        return [rounded(v) for v in value]
     if isinstance(value, (float, np.floating)):
         return float(f"{float(value):.6g}") if np.isfinite(value) else None
     return int(value) if isinstance(value, np.integer) else value

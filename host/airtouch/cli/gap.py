@@ -1,0 +1,229 @@
+"""`airtouch gap`: where real flights and the simulator part, why, and how far an effect closes it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.cli import scores
+from airtouch.errors import AirTouchError
+
+
+@click.group("gap")
+def command() -> None:
+    """Diagnose the gap between recorded flights and the simulator."""
+
+
+class Greedy(click.Command):
+    """A command whose --baseline takes every word up to the next option, as a shell's pattern gives them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        spread: list[str] = []
+        taking = False
+        for word in args:
+            if word.startswith("-"):
+                taking = word == "--baseline"
+                spread += [] if taking else [word]
+            else:
+                spread += ["--baseline", word] if taking else [word]
+        if args and args[-1] == "--baseline":
+            spread.append("--baseline")  # click says that its value is missing
+        return super().parse_args(ctx, spread)
+
+
+def _shared(function: Callable) -> Callable:
+    """Options of `measure` and `diagnose` alike."""
+    path = click.Path(path_type=Path, dir_okay=False)
+    for option in (
+        click.option("--force", is_flag=True, help="Replace the files."),
+        click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler."),
+        click.option("--json", "json_path", type=path, help="Write every figure to this file."),
+        click.option("--report", type=path, help="Write a report to this HTML file."),
+        click.option("--baseline", multiple=True, metavar="NOMINAL...",
+                     help="Flights without any unmodelled effect, up to the next option."),
+        click.option("--vehicle", "vehicle_name", metavar="V",
+                     help="Name or .toml file; else the one that the log names."),
+        click.argument("real", nargs=-1, required=True),
+    ):
+        function = option(function)
+    return function
+
+
+@command.command("measure", cls=Greedy)
+@_shared
+def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
+                    report: Path | None, json_path: Path | None, dask: str | None, force: bool) -> None:
+    """Map where REAL flights and the model part: channel, band, phase, regime.
+
+    REAL and --baseline are log files, folders or patterns; REAL comes first.
+    """
+    from airtouch.cli import gap_input, gap_show
+    from airtouch.gap import measure, on_cluster
+
+    _check_free(report, json_path, force)
+    flights, nominal = gap_input.Flights(real), gap_input.Flights(baseline)
+    vehicle = gap_input.vehicle_of(vehicle_name, flights)
+    run = on_cluster.mapper(dask) if dask else map
+    with gap_show.Bar(len(flights) + bool(baseline)) as bar:
+        found = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
+    failed = (*flights.failed.values(), *nominal.failed.values())
+    found = replace(found, left_out=(*failed, *found.left_out))
+    gap_show.measurement(scores.console(), found)
+    gap_show.left_out(found.left_out)
+    if json_path:
+        scores.write_json(json_path, found.plain(), force)
+    if report:
+        from airtouch.report import gap_report
+
+        gap_report.write_measurement(report, found, command=_line("measure", real, baseline, vehicle_name),
+                                     force=force)
+    _written(json_path, report)
+
+
+@command.command("diagnose", cls=Greedy)
+@_shared
+@click.option("--without", multiple=True, metavar="EFFECT", help="Leave a candidate out; may be given again.")
+@click.option("--effects-file", "effect_files", multiple=True, metavar="FILE",
+              help="Python file with effects of your own; may be given again.")
+@click.option("--each", is_flag=True, help="Every flight is a case of its own.")
+def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
+                     report: Path | None, json_path: Path | None, dask: str | None, force: bool,
+                     without: tuple[str, ...], effect_files: tuple[str, ...], each: bool) -> None:
+    """Name the unmodelled effect that REAL flights have in common, and how much of the gap it is.
+
+    REAL and --baseline are log files, folders or patterns, REAL first; one flight is enough. The exit
+    code is 0 for any verdict.
+    """
+    from airtouch.cli import gap_input, gap_show
+    from airtouch.simulation import effects
+
+    _check_free(report, json_path, force)
+    if each and report:
+        raise AirTouchError("--report shows one diagnosis; leave --each out")
+    for path in effect_files:
+        effects.load_file(path)
+    for name in without:
+        effects.get(name)
+    flights, nominal = gap_input.Flights(real), gap_input.Flights(baseline)
+    vehicle = gap_input.vehicle_of(vehicle_name, flights)
+    case = _case(vehicle, list(nominal), without)
+    if each:
+        _each(flights, case, json_path, _runner(dask, effect_files), force)
+    else:
+        logs = list(flights)
+        if not logs:
+            raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
+        with gap_show.Bar() as bar:
+            found = case(logs, progress=bar)
+        gap_show.diagnosis(scores.console(), found)
+        if json_path:
+            scores.write_json(json_path, found.plain(), force)
+        if report:
+            from airtouch.report import gap_report
+
+            gap_report.write_diagnosis(report, found, logs, vehicle, list(nominal),
+                                       command=_line("diagnose", real, baseline, vehicle_name), force=force)
+    gap_show.left_out([*flights.failed.values(), *nominal.failed.values()])
+    _written(json_path, report)
+
+
+def _case(vehicle: Any, nominal: list, without: tuple[str, ...]) -> Callable:
+    """The diagnosis of some flights, everything else being given."""
+    from functools import partial
+
+    from airtouch.gap import diagnose
+
+    return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without))
+
+
+def _runner(dask: str | None, effect_files: tuple[str, ...]) -> Callable:
+    if not dask:
+        return map
+    from airtouch.gap import on_cluster
+
+    return on_cluster.mapper(dask, [Path(p).read_text(encoding="utf-8") for p in effect_files])
+
+
+def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> None:
+    """Every flight diagnosed alone, one row each."""
+    from functools import partial
+
+    from rich.table import Table
+
+    from airtouch.cli import gap_show
+    from airtouch.gap import words
+
+    table = Table("flight", "verdict", "effects", "probability")
+    rows = []
+    with gap_show.Bar(len(flights)) as bar:
+        for found in run(partial(_alone, case), flights):
+            if isinstance(found, str):
+                gap_show.left_out([found])
+                continue
+            bar(found.flights[0])
+            first = found.ranking[0]
+            table.add_row(Path(found.flights[0]).name, found.verdict,
+                          "; ".join(words.effect_in_words(e) for e in found.effects), f"{first.probability:.0%}")
+            rows.append(found.plain())
+    scores.console().print(table)
+    if json_path:
+        scores.write_json(json_path, {"cases": rows}, force)
+
+
+def _alone(case: Callable, log: Any) -> Any:
+    try:
+        return case([log])
+    except AirTouchError as error:
+        return str(error)
+
+
+@command.group("blind")
+def blind() -> None:
+    """Sealed sets of flights whose effect is withheld: make them, score a diagnosis of them."""
+
+
+@blind.command("make")
+@click.argument("out", type=click.Path(path_type=Path, file_okay=False))
+@click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1), help="How many flights.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@click.option("--force", is_flag=True, help="Replace a set in --out.")
+def blind_make(out: Path, flights: int, seed: int, force: bool) -> None:
+    """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart."""
+    from airtouch.gap import blind as sealed
+
+    sealed.make(out, flights, seed, force=force)
+    click.echo(f"{flights} flights in {out}")
+
+
+@blind.command("score")
+@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.argument("answers", type=click.Path(path_type=Path, exists=True))
+@click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False), help="Write every figure.")
+@click.option("--force", is_flag=True, help="Replace the file.")
+def blind_score(folder: Path, answers: Path, json_path: Path | None, force: bool) -> None:
+    """Open the key of the set in FOLDER and score the diagnoses in ANSWERS."""
+    from airtouch.gap import blind as sealed
+
+    _check_free(None, json_path, force)
+    table = sealed.score(folder, answers)
+    scores.console().print(table)
+    if json_path:
+        scores.write_json(json_path, table, force)
+
+
+def _check_free(report: Path | None, json_path: Path | None, force: bool) -> None:
+    for path in (report, json_path):
+        scores.check_free(path, force)
+
+
+def _line(name: str, real: tuple[str, ...], baseline: tuple[str, ...], vehicle: str | None) -> str:
+    """The command as it was given, for the report."""
+    base = "".join(f" --baseline {b}" for b in baseline)
+    return f"airtouch gap {name} {' '.join(real)}" + (f" --vehicle {vehicle}" if vehicle else "") + base
+
+
+def _written(*paths: Path | None) -> None:
+    for path in filter(None, paths):
+        click.echo(f"written: {path}")

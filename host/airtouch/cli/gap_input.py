@@ -1,0 +1,77 @@
+"""Flights and vehicle that `airtouch gap` is given: files, folders, patterns."""
+
+import glob
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import click
+
+from airtouch import logs, vehicle
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.vehicle import Vehicle
+
+ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin")
+DEFAULT = "crazyflie-2.1-flow"
+
+
+class Flights:
+    """Log files that are read as they are needed, one at a time, any number of times.
+
+    Of several, those that cannot be read are left out, with their reason in `failed`; a
+    single one raises AirTouchError.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.paths = files_of(names)
+        self.failed: dict[Path, str] = {}
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __iter__(self) -> Iterator[FlightLog]:
+        for path in self.paths:
+            try:
+                log = logs.read(path)
+            except AirTouchError as error:
+                if len(self.paths) == 1:
+                    raise
+                self.failed[path] = str(error)
+                continue
+            yield log
+
+
+def files_of(names: Sequence[str]) -> list[Path]:
+    """Files named, logs in folders named, and what patterns match; each once, in order.
+
+    Raises AirTouchError for a name that is none of these.
+    """
+    found: dict[Path, None] = {}
+    for name in names:
+        path = Path(name)
+        if path.is_dir():
+            some = [p for p in sorted(path.iterdir()) if p.name.endswith(ENDINGS) and p.name != "manifest.csv"]
+        elif path.exists():
+            some = [path]
+        else:
+            some = [Path(p) for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file()]
+        if not some:
+            raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
+        found.update(dict.fromkeys(some))
+    return list(found)
+
+
+def vehicle_of(named: str | None, flights: Flights) -> Vehicle:
+    """The vehicle named, else the one that the first log names, else the Crazyflie with flow deck."""
+    if named:
+        return vehicle.load(named)
+    said = next(iter(flights), None)
+    name = str(said.meta.get("vehicle") or "") if said is not None else ""
+    if not name:
+        return vehicle.load(DEFAULT)
+    try:
+        return vehicle.load(name)
+    except AirTouchError:
+        click.echo(f"airtouch: the log names vehicle {name!r}, of which no file is known; {DEFAULT} is used, "
+                   "--vehicle names another", err=True)
+        return vehicle.load(DEFAULT)

@@ -1,0 +1,113 @@
+"""What `airtouch gap` prints: tables, sentences, and a bar when it takes long."""
+
+import threading
+from collections.abc import Iterable, Sequence
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from airtouch.gap import words
+from airtouch.gap.gap_map import CHANNEL_WORDS, ratio
+from airtouch.gap.measure import Measurement
+from airtouch.gap.result import Cell, Diagnosis
+
+PATIENCE_S = 2.0
+
+
+class Bar:
+    """A progress bar on stderr that shows itself when the work takes more than two seconds.
+
+    Called with a line of what is done now; `total` calls are the whole, None: unknown.
+    """
+
+    def __init__(self, total: int | None = None) -> None:
+        self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(),
+                                 console=Console(stderr=True), transient=True)
+        self.task = self.progress.add_task("", total=total)
+        self.timer = threading.Timer(PATIENCE_S, self.progress.start)
+        self.timer.daemon = True
+
+    def __enter__(self) -> "Bar":
+        self.timer.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.timer.cancel()
+        self.progress.stop()
+
+    def __call__(self, text: str) -> None:
+        self.progress.update(self.task, advance=1, description=text[-60:])
+
+
+def cells(some: Iterable[Cell], title: str) -> Table:
+    """The largest cells of a gap map."""
+    some = list(some)
+    after = any(c.after is not None for c in some)
+    table = Table(title=title, title_justify="left", caption_justify="left",
+                  caption="90 % intervals; a cell is listed when its interval clears the floor's")
+    for name in ("phase", "regime", "channel", "band, Hz", "gap", "interval", "unit", "floor", "gap/floor"):
+        right = name in ("gap", "floor", "gap/floor")
+        table.add_column(name, justify="right" if right else "left", no_wrap=name != "regime")
+    if after:
+        table.add_column("after", justify="right")
+    for c in some:
+        row = [c.phase, "" if c.regime == "all" else c.regime, CHANNEL_WORDS[c.channel],
+               f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", f"{c.gap:.2g}",
+               "" if c.low is None else f"{c.low:.2g} to {c.high:.2g}", c.unit, f"{c.floor:.2g}",
+               f"{ratio(c):.1f}"]
+        table.add_row(*row, *([("" if c.after is None else f"{c.after:.2g}")] if after else []))
+    return table
+
+
+def measurement(screen: Console, found: Measurement) -> None:
+    """What `measure` says."""
+    count = len(found.flights)
+    screen.print(f"{count} flight{'s' * (count != 1)} against {found.vehicle}; floor: {found.map.floor_from}"
+                 + (f" ({len(found.baseline)})" if found.baseline else ""))
+    if found.where:
+        screen.print(cells(found.where, "Largest cells of the gap"))
+    else:
+        screen.print("No cell of the gap stands out of its floor.")
+    screen.print(f"overall: {found.gap['before']:.2g} times the floor"
+                 + (f"; with the vehicle calibrated on the baseline {found.gap['calibrated']:.2g} times"
+                    if "calibrated" in found.gap else ""))
+    remarks(screen, "What these logs cannot say", found.cannot)
+    remarks(screen, "Notes", found.notes)
+
+
+def diagnosis(screen: Console, found: Diagnosis) -> None:
+    """What `diagnose` says: sentence, effects, ranking, where, advice."""
+    screen.print(words.answer(found))
+    for effect in found.effects:
+        screen.print("  " + words.effect_in_words(effect))
+    table = Table(title="Ranking", title_justify="left", caption_justify="left",
+                  caption="shrink: part of the gap above the floor that goes away on data held out, 90 % interval")
+    for name in ("candidate", "probability", "shrink"):
+        table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
+    for r in [r for i, r in enumerate(found.ranking) if i < 8 or r.name in ("none", "unknown")]:
+        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"))
+    screen.print(table)
+    for group in found.indistinguishable:
+        screen.print(f"cannot be told apart here: {', '.join(group)}")
+    if found.where:
+        screen.print(cells(found.where, "Where"))
+    if found.advice:
+        screen.print(f"advice: {found.advice}")
+    remarks(screen, "What these logs cannot say", found.cannot)
+    remarks(screen, "Notes", found.notes)
+
+
+def remarks(screen: Console, title: str, lines: Sequence[str]) -> None:
+    """A list with a heading, nothing when it is empty."""
+    if lines:
+        screen.print(f"{title}:")
+    for line in lines:
+        screen.print(f"  - {line}", highlight=False)
+
+
+def left_out(reasons: Iterable[str]) -> None:
+    """Flights that could not be used, on stderr."""
+    for reason in reasons:
+        click.echo(f"airtouch: left out: {reason}", err=True)

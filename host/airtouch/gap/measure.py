@@ -1,0 +1,180 @@
+"""Where: the gap of recorded flights to the simulator, before anything is blamed for it."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.gap import calibrate, twin
+from airtouch.gap.channels import residual
+from airtouch.gap.fit import Study
+from airtouch.gap.flight import GROUND, Flight, ready
+from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, largest, overall,
+                                   part_of)
+from airtouch.gap.result import Cell, Quantity, rounded
+from airtouch.logs.flight_log import FlightLog
+from airtouch.vehicle import Vehicle
+
+#: means of nominal flights that differ by more than this are worth a word: force m/s^2, torque rad/s^2
+APART = np.array([0.2, 0.2, 0.2, 4.0, 4.0, 4.0])
+SURE = 6.0  #: and by more than this many standard errors
+NAMES = tuple(CHANNEL_WORDS.values())[:6]
+UNITS = ("m/s^2",) * 3 + ("rad/s^2",) * 3
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """The gap map with its largest cells, and what these logs cannot say.
+
+    gap: rms over the floor of all cells in the air, for the vehicle as declared and, with
+    baseline flights, as calibrated on them; spectra: of the commands, as flown and as
+    nominal flights have them (twin view), N^2/Hz.
+    """
+
+    vehicle: str
+    map: GapMap
+    where: tuple[Cell, ...]
+    gap: Mapping[str, float]
+    flights: tuple[str, ...]
+    baseline: tuple[str, ...] = ()
+    calibration: Mapping[str, Quantity] = field(default_factory=dict)
+    spectra: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    cannot: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    def plain(self) -> dict[str, Any]:
+        """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
+        return rounded({
+            "vehicle": self.vehicle, "flights": list(self.flights), "baseline": list(self.baseline),
+            "where": [plain_cell(c) | {"words": in_words(c)} for c in self.where],
+            "gap": dict(self.gap), "floor_from": self.map.floor_from,
+            "calibration": {k: q.plain() for k, q in self.calibration.items()},
+            "cannot": list(self.cannot), "notes": list(self.notes), "left_out": list(self.left_out),
+            "spectra": dict(self.spectra), "map": [plain_cell(c) for c in self.map.cells],
+        })
+
+
+def plain_cell(cell: Cell) -> dict[str, Any]:
+    """A cell without the fields that it does not have."""
+    return {k: v for k, v in asdict(cell).items() if v is not None}
+
+
+@dataclass(frozen=True)
+class Held:
+    """One flight held against the model: parts of the maps, and what it cannot say."""
+
+    parts: tuple[Part, ...]
+    power: np.ndarray
+    notes: tuple[str, ...]
+    cannot: tuple[str, ...]
+
+
+def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[FlightLog] = (), *,
+            progress: Callable[[str], None] = lambda _: None, run: Callable = map) -> Measurement:
+    """Hold flights against the vehicle's model and map what is left.
+
+    Flights that cannot be used are left out with their reason; raises AirTouchError when
+    none is left. Works from accelerations and motor commands; `cannot` says what more
+    channels would show. Where `flights` reads them as it goes, one is in memory at a time.
+    run: what maps a function over flights, in place of `map`, to spread the work.
+    """
+    left_out: list[str] = []
+    nominal = list(usable(baseline, vehicle, left_out))
+    studies, fitted = [calibrate.declared(vehicle, nominal)], None
+    notes = differences(studies[0], nominal)
+    if nominal:
+        progress("calibration")
+        study, fitted = calibrate.calibrated(vehicle, nominal)
+        studies.append(study)
+        notes += [n for n in fitted.notes if n not in notes]
+    found: list[Held] = []
+    for held in run(partial(hold, tuple(studies)), flights):
+        if isinstance(held, str):
+            left_out.append(held)
+        else:
+            progress(held.parts[0].name)
+            found.append(held)
+    if not found:
+        raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
+                            (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
+    maps = [assemble(study, [h.parts[i] for h in found], [part_of(study, f) for f in nominal])
+            for i, study in enumerate(studies)]
+    gap = {"before": overall(maps[0].cells), "floor": 1.0}
+    if len(maps) > 1:
+        gap["calibrated"] = overall(maps[1].cells)
+    notes += [f"{h.parts[0].name}: {n}" for h in found for n in h.notes]
+    return Measurement(
+        vehicle.name, maps[0], tuple(largest(maps[0].cells)), gap, maps[0].flights,
+        tuple(f.name for f in nominal), fitted.parameters if fitted else {},
+        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]), tuple(notes),
+        _cannot([h.cannot for h in found]), tuple(left_out))
+
+
+def hold(studies: Sequence[Study], log: FlightLog) -> Held | str:
+    """One flight against the model of each study, or the reason why it cannot be used."""
+    try:
+        flight = ready(log, studies[0].vehicle)
+    except AirTouchError as error:
+        return str(error)
+    return Held(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
+                flight.notes, flight.cannot)
+
+
+def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> Iterator[Flight]:
+    """Flights made ready, one at a time; the reasons of those that cannot be go to `left_out`."""
+    for log in logs:
+        try:
+            yield ready(log, vehicle)
+        except AirTouchError as error:
+            left_out.append(str(error))
+
+
+def differences(study: Study, nominal: Sequence[Flight]) -> list[str]:
+    """In words, in which channels flights declared nominal differ among themselves."""
+    if len(nominal) == 1:
+        return ["one baseline flight: how much nominal flights differ among themselves is not known"]
+    means, errors = [], []
+    for f in nominal:
+        left = residual(f, study.vehicle, study.calibration)[(f.phase != GROUND) & f.usable][:, :6]
+        parts = np.array([p.mean(axis=0) for p in np.array_split(left, 8)])
+        means.append(left.mean(axis=0))
+        errors.append(parts.std(axis=0, ddof=1) / np.sqrt(8.0))
+    if not means:
+        return []
+    spread = np.ptp(means, axis=0)
+    error = np.sqrt(np.mean(np.square(errors), axis=0))
+    found = [f"{spread[i]:.2g} {UNITS[i]} in {NAMES[i]}" for i in np.argsort(-spread / APART)
+             if spread[i] > APART[i] and spread[i] > SURE * error[i]]
+    return ["the baseline flights are not consistent: among themselves they differ by " + ", ".join(found)
+            + "; the floor is that much higher"] if found else []
+
+
+def _cannot(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    count = Counter(reason for one in flights for reason in one)
+    return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
+
+
+def _command_power(flight: Flight, vehicle: Vehicle) -> np.ndarray:
+    """Sum of the commands' spectra over blocks and their number, (bins, 4): three axes and the count."""
+    blocks = twin.block_spectra(flight, vehicle)[1]
+    power = (np.abs(blocks) ** 2).sum(axis=0)
+    return np.column_stack([power, np.full(len(power), float(len(blocks)))])
+
+
+def _spectra(flown: Sequence[np.ndarray], nominal: Sequence[np.ndarray]) -> dict[str, Any]:
+    """The twin view: mean spectra of the commands, empty without a steady stretch in flight."""
+    total = np.sum(flown, axis=0)
+    if not len(flown) or not total[0, -1]:
+        return {}
+    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": twin.frequencies().tolist()}
+    usual = np.sum(nominal, axis=0) if len(nominal) else None
+    for i, axis in enumerate(twin.AXES):
+        made[axis] = {"flown": (total[:, i] / total[0, -1]).tolist()}
+        if usual is not None and usual[0, -1]:
+            made[axis]["nominal"] = (usual[:, i] / usual[0, -1]).tolist()
+    return made

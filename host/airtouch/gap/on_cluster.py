@@ -1,0 +1,36 @@
+"""Work on flights spread over a dask.distributed cluster (extra `scale`)."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+from airtouch.simulation import cluster
+from airtouch.simulation.effects import load_text
+
+AHEAD = 64  #: flights sent out and not yet back
+
+
+def mapper(address: str, plugins: Sequence[str] = ()) -> Callable[[Callable, Iterable], Iterator]:
+    """What stands in for `map`: results in order, a few flights ahead.
+
+    plugins: texts of effect files that the workers register first. Raises AirTouchError
+    where no scheduler answers.
+    """
+    client = cluster.connect(address)
+
+    def run(function: Callable, items: Iterable[Any]) -> Iterator[Any]:
+        waiting: deque = deque()
+        for item in items:
+            waiting.append(client.submit(_one, function, item, tuple(plugins), pure=False, retries=3))
+            if len(waiting) >= AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+    return run
+
+
+def _one(function: Callable, item: Any, plugins: Sequence[str]) -> Any:
+    for text in plugins:
+        load_text(text)
+    return function(item)

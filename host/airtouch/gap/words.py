@@ -1,0 +1,67 @@
+"""A diagnosis in sentences, for the terminal and the report alike."""
+
+from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, ratio
+from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
+
+LEAST_SHARE = 0.05  #: effects that take less of a cell's gap are not its cause
+
+
+def answer(diagnosis: Diagnosis) -> str:
+    """The result in one sentence: how much of the gap is which effect, before, after and floor."""
+    if diagnosis.verdict == "none":
+        return "No unmodelled effect stands out: what these flights leave of the model is the floor."
+    names = joined([e.name.replace("_", " ") for e in diagnosis.effects])
+    cell = telling(diagnosis)
+    if diagnosis.verdict == "unknown":
+        where = f" It is largest {in_words(diagnosis.where[0])}." if diagnosis.where else ""
+        also = f" besides {names}" if names else ""
+        return f"There is a gap{also} that no known effect explains.{where}"
+    if cell is None:
+        return f"The gap is {names}{_shrink(diagnosis)}."
+    return (f"{share(cell):.0%} of the gap {PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} "
+            f"({cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz) is {names}; adding it shrinks the gap from "
+            f"{cell.gap:.2g} to {cell.after:.2g} {cell.unit}, floor {cell.floor:.2g}.")
+
+
+def telling(diagnosis: Diagnosis) -> Cell | None:
+    """The cell that the named effects take most from, in units of its floor; None where they take little."""
+    better = [c for c in diagnosis.where if c.after is not None and share(c) > LEAST_SHARE]
+    return max(better, key=lambda c: (c.gap - c.after) / max(c.floor_high or c.floor, 1e-12), default=None)
+
+
+def share(cell: Cell) -> float:
+    """Part of a cell's gap above its floor that the named effects take away, 0 to 1."""
+    if cell.after is None or cell.gap <= cell.floor:
+        return 0.0
+    return min(max((cell.gap - cell.after) / (cell.gap - cell.floor), 0.0), 1.0)
+
+
+def effect_in_words(effect: Found) -> str:
+    """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`."""
+    return f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
+
+
+def quantity(q: Quantity, form: str = "{:.3g}") -> str:
+    """A number with unit and interval."""
+    unit = "" if q.unit in ("1", "") else f" {q.unit}"
+    interval = "" if q.low is None or q.high is None else f" ({form.format(q.low)} to {form.format(q.high)})"
+    return form.format(q.value) + unit + interval
+
+
+def joined(names: list[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def unexplained(diagnosis: Diagnosis) -> list[str]:
+    """The cells that stay well above their floor with the named effects in the model."""
+    left = [c for c in diagnosis.where if (c.gap if c.after is None else c.after) > 1.5 * (c.floor_high or c.floor)]
+    return [in_words(c) if c.after is None else
+            f"{in_words(c)}; after: {c.after:.2g} {c.unit}, {c.after / max(c.floor, 1e-12):.2g} times the floor"
+            for c in sorted(left, key=ratio, reverse=True)]
+
+
+def _shrink(diagnosis: Diagnosis) -> str:
+    if diagnosis.shrink is None:
+        return ""
+    return f"; adding it shrinks the gap by {quantity(diagnosis.shrink, '{:.0%}')} on data held out"
