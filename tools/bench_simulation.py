@@ -1,24 +1,32 @@
-"""Simulated seconds per wall second: 64 flights, every effect on, physics at 500 Hz; RotorPy in the same run.
+"""Simulated seconds a wall second: 64 flights at 500 Hz, all effects on and none; the peers in the same run.
 
-    .venv/bin/python tools/bench_simulation.py [--flights 64] [--workers 2] [--json out.json]
+    .venv/bin/python tools/bench_simulation.py [--flights 64] [--json out.json] [--crazyflow PYTHON]
 
 Every effect of the registry is on at a fifth of its default strength (all at full
 strength at once is not flyable). The first, untimed flight pays for compilation.
 RotorPy (extra `bench`) flies its Crazyflie in a closed loop with its own controller, on one core:
-it has no batch of its own without PyTorch. Three pairs in turn, medians.
+it has no batch of its own without PyTorch. crazyflow (JAX, 1.2 GB, not among AirTouch's packages)
+flies 64 worlds on all cores, without sensors, log or effects: `--crazyflow` names the Python that has
+it, made with `python -m venv crazyflow && crazyflow/bin/pip install crazyflow==0.4.0`. Three rounds in
+turn, medians.
 """
 
 import argparse
+import importlib.util
 import json
 import statistics
+import subprocess
+import sys
 import time
+from pathlib import Path
+from typing import Any
 
 from airtouch import vehicle as vehicles
 from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
 
 STRENGTH = 0.2
-PAIRS = 3
+ROUNDS = 3
 PEER_S = 4.0  #: simulated by the peer each time
 
 
@@ -27,20 +35,23 @@ def every_effect() -> list[effects.Active]:
     return [effects.Active(e, e.scaled(e.values(), STRENGTH)) for e in effects.EFFECTS.values()]
 
 
-def measure(flights: int, workers: int, name: str = "paper-mixed") -> dict[str, float | int | str]:
-    """Fly and time; the result says what was flown."""
-    scene, craft, active = scenario.load(name), vehicles.load(), every_effect()
+def measure(flights: int, workers: int, on: bool = True, name: str = "paper-mixed") -> dict[str, Any]:
+    """Fly and time, every effect on or none; the result says what was flown."""
+    scene, craft, active = scenario.load(name), vehicles.load(), every_effect() if on else []
+    without = () if on else tuple(effects.EFFECTS)
     started = time.perf_counter()
-    list(batch.flights(scene, 1, vehicle=craft, effects=active, workers=1))
+    list(batch.flights(scene, 1, vehicle=craft, effects=active, without=without, workers=1))
     first = time.perf_counter() - started
-    started = time.perf_counter()
-    results = list(batch.flights(scene, flights, vehicle=craft, effects=active, workers=workers))
-    wall = time.perf_counter() - started
+    started, busy = time.perf_counter(), time.process_time()
+    results = list(batch.flights(scene, flights, vehicle=craft, effects=active, without=without,
+                                 workers=workers))
+    wall, busy = time.perf_counter() - started, time.process_time() - busy
     good = [r for r in results if not isinstance(r, Diverged)]
     seconds = sum(r["t_s"][-1] for r in good)
     return {"scenario": name, "flights": flights, "diverged": len(results) - len(good), "effects": len(active),
             "physics_hz": 500, "workers": workers, "first_flight_s": round(first, 2), "simulated_s": round(seconds, 1),
-            "wall_s": round(wall, 3), "simulated_s_per_wall_s": round(seconds / wall)}
+            "wall_s": round(wall, 3), "simulated_s_per_wall_s": round(seconds / wall),
+            "simulated_s_per_cpu_s": round(seconds / busy)}
 
 
 def rotorpy_rate(seconds: float = PEER_S) -> float | None:
@@ -61,24 +72,48 @@ def rotorpy_rate(seconds: float = PEER_S) -> float | None:
     return seconds / (time.perf_counter() - started)
 
 
+def crazyflow_rates(python: str | None) -> dict[str, list[float]]:
+    """Simulated seconds a wall second and a CPU second, by integrator; {} without crazyflow."""
+    if python is None and importlib.util.find_spec("crazyflow") is None:
+        return {}
+    command = [python or sys.executable, str(Path(__file__).with_name("bench_crazyflow.py")), "--rounds", "1"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {}
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=int, default=64)
     parser.add_argument("--workers", type=int, default=batch.available_cores())
     parser.add_argument("--json", help="write the figures here")
+    parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")
     options = parser.parse_args()
-    pairs = [(measure(options.flights, options.workers), rotorpy_rate()) for _ in range(PAIRS)]
-    figures = {**pairs[-1][0], "first_flight_s": pairs[0][0]["first_flight_s"],
-               "simulated_s_per_wall_s": statistics.median(ours["simulated_s_per_wall_s"] for ours, _ in pairs)}
-    peers = [peer for _, peer in pairs if peer is not None]
-    if peers:
-        figures["rotorpy_s_per_wall_s"] = round(statistics.median(peers), 2)
+    rounds = []
+    for _ in range(ROUNDS):
+        ours = measure(options.flights, options.workers)
+        bare = measure(options.flights, options.workers, on=False)
+        rounds.append((ours, bare, rotorpy_rate(), crazyflow_rates(options.crazyflow)))
+    figures = {**rounds[-1][0], "first_flight_s": rounds[0][0]["first_flight_s"]}
+    for k, unit in enumerate(("wall_s", "cpu_s")):
+        rate = f"simulated_s_per_{unit}"
+        figures[rate] = statistics.median(r[0][rate] for r in rounds)
+        figures[f"no_effects_s_per_{unit}"] = statistics.median(r[1][rate] for r in rounds)
+        for name in rounds[0][3]:
+            figures[f"crazyflow_{name}_s_per_{unit}"] = statistics.median(r[3][name][k] for r in rounds)
+            for label, i in (("", 0), ("no_effects_", 1)):
+                figures[f"{label}times_crazyflow_{name}_{unit}"] = round(
+                    statistics.median(r[i][rate] / r[3][name][k] for r in rounds), 2)
+    if rounds[0][2] is not None:
+        figures["rotorpy_s_per_wall_s"] = round(statistics.median(r[2] for r in rounds), 2)
         figures["times_rotorpy"] = round(statistics.median(
-            ours["simulated_s_per_wall_s"] / peer for ours, peer in pairs))
+            r[0]["simulated_s_per_wall_s"] / r[2] for r in rounds))
     print("\n".join(f"{key}: {value}" for key, value in figures.items()))
-    if not peers:
+    if rounds[0][2] is None:
         print("RotorPy is not installed (extra 'bench'), so it is not compared")
+    if not rounds[0][3]:
+        print("crazyflow is not installed, so it is not compared: python -m venv crazyflow && "
+              "crazyflow/bin/pip install crazyflow==0.4.0, then --crazyflow crazyflow/bin/python")
     if options.json:
         with open(options.json, "w", encoding="utf-8") as file:
             json.dump(figures, file, indent=1)

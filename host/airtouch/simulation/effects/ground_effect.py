@@ -8,6 +8,7 @@ from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 from airtouch.simulation.random_stream import normal
 
 STRENGTH, FOUNTAIN, FADE, TURBULENCE, TURBULENCE_TIME = range(5)
+STEP, DECAY, FRESH = range(8, 11)  #: of the memory: what follows from the step's length
 LEAST_HEIGHT_RADII = 0.75  #: the formula diverges below it
 
 
@@ -36,8 +37,10 @@ def faded(ratio, height, fade):
 
 @wrench
 def ground_effect(p, s, memory, stream, out):
-    decay = math.exp(-s[at.STEP] / p[TURBULENCE_TIME])
-    fresh = math.sqrt(1.0 - decay * decay)
+    if memory[STEP] != s[at.STEP]:
+        memory[STEP], memory[DECAY] = s[at.STEP], math.exp(-s[at.STEP] / p[TURBULENCE_TIME])
+        memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
+    decay, fresh = memory[DECAY], memory[FRESH]
     radius, spacing = s[at.ROTOR_RADIUS], s[at.ROTOR_SPACING]
     for i in range(4):
         height, share = s[at.LOWER_HEIGHT + i], s[at.COVER + i]

@@ -7,6 +7,7 @@ from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 from airtouch.simulation.random_stream import normal
 
 RMS, LENGTH, AIRSPEED, DRAG = range(4)
+STEP, DECAY, FRESH, WHITE = range(8, 12)  #: of the memory: what follows from the step's length
 ROOT_3 = math.sqrt(3.0)
 
 
@@ -14,10 +15,13 @@ ROOT_3 = math.sqrt(3.0)
 def gust(p, s, memory, stream, out):
     # memory: world x through one lag of tau; world y and z each through two
     h = s[at.STEP]
-    tau = p[LENGTH] / p[AIRSPEED]
-    decay = math.exp(-h / tau)
-    memory[0] = decay * memory[0] + math.sqrt(1.0 - decay * decay) * normal(stream)
-    white = math.sqrt(tau / h)  # held white noise of density tau: gives both shapes unit variance
+    if memory[STEP] != h:
+        tau = p[LENGTH] / p[AIRSPEED]
+        memory[STEP], memory[DECAY] = h, math.exp(-h / tau)
+        memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
+        memory[WHITE] = math.sqrt(tau / h)  # held white noise of density tau: gives both shapes unit variance
+    decay, white = memory[DECAY], memory[WHITE]
+    memory[0] = decay * memory[0] + memory[FRESH] * normal(stream)
     for axis in range(2):
         first, second = 1 + 2 * axis, 2 + 2 * axis
         memory[first] = decay * memory[first] + (1.0 - decay) * white * normal(stream)
