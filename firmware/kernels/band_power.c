@@ -8,6 +8,15 @@
 #define BIN_TOLERANCE 1e-3f
 #define HALF_PI 1.57079632679489662f
 #define MAX_WINDOW 16384
+#define RECENT_SAMPLES 16u  // in which the latest sums are kept apart
+#define USUAL_BINS 7  // those of 6 to 8 Hz in 2 s: the loops over them unroll
+
+// Inlined whatever the compiler thinks of it, so that USUAL_BINS is a constant there.
+#if defined(__GNUC__)
+#define INLINED static inline __attribute__((always_inline))
+#else
+#define INLINED static inline
+#endif
 
 uint16_t bandPowerBins(float sampleRateHz, uint16_t window, float lowHz, float highHz, uint16_t *firstBin) {
   if (!(sampleRateHz > 0.0f) || !isfinite(sampleRateHz)) {
@@ -39,6 +48,25 @@ static void twiddle(uint32_t i, uint32_t n, float *cosine, float *sine) {
   *sine = quadrant >= 2 ? -y : y;
 }
 
+static inline uint16_t wrap(uint32_t phase, uint16_t window) {
+  return (uint16_t)(phase >= window ? phase - window : phase);
+}
+
+/** The twiddles of the next sample, and so of the oldest one in the window: bins are read relative to it. */
+static void findTwiddles(bandPower_t *self) {
+  uint16_t phase = self->phase;
+  float *twiddle = self->twiddle;
+  for (uint16_t b = 0; b < self->bins; b++, twiddle += 2) {
+    twiddle[0] = self->cosine[phase];
+    twiddle[1] = self->sine[phase];
+    phase = wrap((uint32_t)phase + self->position, self->window);
+  }
+  if (self->firstBin == 0) {  // the window's mean is not part of the power
+    self->twiddle[0] = 0.0f;
+    self->twiddle[1] = 0.0f;
+  }
+}
+
 bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float lowHz, float highHz,
                    uint16_t hop, uint16_t channels, float *storage, size_t floats) {
   memset(self, 0, sizeof(*self));
@@ -54,18 +82,21 @@ bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float
   self->bins = bins;
   self->hop = hop;
   self->nyquist = 2u * (self->firstBin + bins - 2u) == window;
-  self->gain = 1.0f / (1.73205080756887729f * (float)window);
   const size_t sums = (size_t)bins * channels;
-  self->whole = (bandSum_t *)storage;
-  self->fresh = self->whole + sums;
+  self->sum = (bandSum_t *)storage;
+  self->recent = self->sum + sums;
   self->cosine = storage + 8 * sums;
   self->sine = self->cosine + window;
-  self->rotation = self->sine + window;
-  self->held = self->rotation + 2 * (size_t)bins;
+  self->twiddle = self->sine + window;
+  self->held = self->twiddle + 2 * (size_t)bins;
   self->reference = self->held + channels;
-  self->change = self->reference + channels;
-  self->level = self->change + channels;
-  self->ring = self->level + channels;
+  self->ring = self->reference + channels;
+  self->scale = 1.0f;
+  while (self->scale * (float)window > 1.0f) {  // a power of two: scaling by it rounds nothing
+    self->scale *= 0.5f;
+  }
+  const float share = self->scale * (float)window;
+  self->gain = 1.0f / (3.0f * share * share);
   for (uint32_t i = 0; i < window; i++) {
     twiddle(i, window, &self->cosine[i], &self->sine[i]);
   }
@@ -75,104 +106,132 @@ bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float
 
 void bandPowerReset(bandPower_t *self) {
   const size_t sums = (size_t)self->bins * self->channels;
-  memset(self->whole, 0, sums * sizeof(bandSum_t));
-  memset(self->fresh, 0, sums * sizeof(bandSum_t));
+  memset(self->sum, 0, sums * sizeof(bandSum_t));
+  memset(self->recent, 0, sums * sizeof(bandSum_t));
   memset(self->ring, 0, (size_t)self->window * self->channels * sizeof(float));
   memset(self->held, 0, self->channels * sizeof(float));
   self->position = 0;
   self->phase = 0;
   self->wait = 0;
+  self->started = false;
   self->full = false;
+  findTwiddles(self);
 }
 
-static inline uint16_t wrap(uint32_t phase, uint16_t window) {
-  return (uint16_t)(phase >= window ? phase - window : phase);
+/** The latest few samples of a channel join the rest. */
+static void keepRecent(bandSum_t *sum, bandSum_t *recent, uint16_t bins) {
+  for (uint16_t b = bins; b > 0; b--, sum++, recent++) {
+    sum->re += recent->re;
+    sum->im += recent->im;
+    sum->blockRe += recent->blockRe;
+    sum->blockIm += recent->blockIm;
+    *recent = (bandSum_t){0.0f, 0.0f, 0.0f, 0.0f};
+  }
 }
 
-static void takeSample(bandPower_t *self, const float *sample) {
+/** The block is as long as the window: its sums are the window's. */
+static void endBlock(bandSum_t *sum, uint16_t bins) {
+  for (uint16_t b = bins; b > 0; b--, sum++) {
+    *sum = (bandSum_t){sum->blockRe, sum->blockIm, 0.0f, 0.0f};
+  }
+}
+
+/** Adds to the sums of each bin of a channel what has changed in the window and what is new in the block. */
+INLINED void addSample(bandSum_t *recent, const float *twiddle, uint16_t bins, float change, float level) {
+  for (uint16_t b = 0; b < bins; b++) {
+    const float cosine = twiddle[2 * b];
+    const float sine = twiddle[2 * b + 1];
+    recent[b].re += change * cosine;
+    recent[b].im += change * sine;
+    recent[b].blockRe += level * cosine;
+    recent[b].blockIm += level * sine;
+  }
+}
+
+/** Takes a sample of every channel; `bins` is a constant where it is known, so that loops over it unroll. */
+INLINED void takeSample(bandPower_t *self, const float *sample, uint16_t bins) {
   float *slot = self->ring + (size_t)self->position * self->channels;
-  for (uint16_t c = 0; c < self->channels; c++) {
+  bandSum_t *sum = self->sum;
+  bandSum_t *recent = self->recent;
+  uint16_t age = self->position;  // samples in the channel's block; channels begin theirs one after the other
+  for (uint16_t c = 0; c < self->channels; c++, sum += bins, recent += bins) {
     const float x = guardSample(sample[c], &self->held[c]);
-    if (self->position == 0) {
-      self->reference[c] = x;
+    if (!self->started) {
+      self->reference[c] = x;  // the past before the first sample is like it, and adds nothing to any bin
     }
-    self->change[c] = x - slot[c];
-    self->level[c] = x - self->reference[c];
+    if (age % RECENT_SAMPLES == 0) {
+      keepRecent(sum, recent, bins);
+    }
+    if (age == 0) {
+      endBlock(sum, bins);
+      age = self->window;
+      if (self->full) {
+        self->reference[c] = x;
+      }
+    }
+    age--;
+    const float level = (x - self->reference[c]) * self->scale;
+    const float change = self->full ? (x - slot[c]) * self->scale : level;
     slot[c] = x;
+    addSample(recent, self->twiddle, bins, change, level);
   }
-}
-
-static void updateSums(bandPower_t *self) {
-  const float *change = self->change;
-  const float *level = self->level;
-  bandSum_t *whole = self->whole;
-  bandSum_t *fresh = self->fresh;
-  uint16_t phase = self->phase;
-  for (uint16_t b = 0; b < self->bins; b++) {
-    const float cosine = self->cosine[phase];
-    const float sine = self->sine[phase];
-    for (uint16_t c = 0; c < self->channels; c++, whole++, fresh++) {
-      addCompensated(&whole->re, &whole->reLow, change[c] * cosine);
-      addCompensated(&whole->im, &whole->imLow, change[c] * sine);
-      addCompensated(&fresh->re, &fresh->reLow, level[c] * cosine);
-      addCompensated(&fresh->im, &fresh->imLow, level[c] * sine);
-    }
-    phase = wrap((uint32_t)phase + self->position, self->window);
-  }
+  self->started = true;
 }
 
 static void advance(bandPower_t *self) {
   self->phase = wrap((uint32_t)self->phase + self->firstBin, self->window);
   self->position++;
   if (self->position == self->window) {
-    bandSum_t *done = self->fresh;
-    self->fresh = self->whole;
-    self->whole = done;
-    memset(self->fresh, 0, (size_t)self->bins * self->channels * sizeof(bandSum_t));
     self->position = 0;
+    self->phase = 0;
     self->full = true;
   }
+  findTwiddles(self);
 }
 
-/** The twiddles of the oldest sample in the window, which turn each bin's phase to start there. */
-static void findRotations(bandPower_t *self) {
-  uint16_t phase = self->phase;
-  for (uint16_t b = 0; b < self->bins; b++) {
-    self->rotation[2 * b] = self->cosine[phase];
-    self->rotation[2 * b + 1] = self->sine[phase];
-    phase = wrap((uint32_t)phase + self->position, self->window);
-  }
-  if (self->firstBin == 0) {  // the window's mean is not part of the power
-    self->rotation[0] = 0.0f;
-    self->rotation[1] = 0.0f;
-  }
-}
-
-static float channelPower(const bandPower_t *self, uint16_t channel) {
-  const bandSum_t *sum = self->whole + channel;
-  const float *rotation = self->rotation;
-  float re0 = 0.0f, im0 = 0.0f, re1 = 0.0f, im1 = 0.0f;  // the two bins before this one
+INLINED float channelPower(const bandSum_t *sum, const bandSum_t *recent, const float *twiddle, uint16_t bins,
+                                 bool nyquist) {
+  float re0 = 0.0f, im0 = 0.0f;            // the bin before this one
+  float reSlope0 = 0.0f, imSlope0 = 0.0f;  // and its difference from the one before that
   float power = 0.0f, last = 0.0f;
-  for (uint16_t b = 0; b < self->bins; b++, sum += self->channels, rotation += 2) {
-    const float re2 = sum->re * rotation[0] + sum->im * rotation[1];
-    const float im2 = sum->im * rotation[0] - sum->re * rotation[1];
+  for (uint16_t b = 0; b < bins; b++) {
+    const float cosine = twiddle[2 * b];
+    const float sine = twiddle[2 * b + 1];
+    const float re = sum[b].re + recent[b].re;
+    const float im = sum[b].im + recent[b].im;
+    const float re1 = re * cosine + im * sine;
+    const float im1 = im * cosine - re * sine;
+    const float reSlope1 = re1 - re0;
+    const float imSlope1 = im1 - im0;
     if (b >= 2) {
-      const float re = ((re1 - re0) + (re1 - re2)) * self->gain;
-      const float im = ((im1 - im0) + (im1 - im2)) * self->gain;
-      last = re * re + im * im;
+      const float reWindowed = reSlope1 - reSlope0;
+      const float imWindowed = imSlope1 - imSlope0;
+      last = reWindowed * reWindowed + imWindowed * imWindowed;
       power += last;
     }
     re0 = re1;
     im0 = im1;
-    re1 = re2;
-    im1 = im2;
+    reSlope0 = reSlope1;
+    imSlope0 = imSlope1;
   }
-  return self->nyquist ? power - 0.5f * last : power;
+  return nyquist ? power - 0.5f * last : power;
+}
+
+INLINED void findPowers(const bandPower_t *self, float *power, uint16_t bins) {
+  size_t first = 0;
+  for (uint16_t c = 0; c < self->channels; c++, first += bins) {
+    power[c] = self->gain * channelPower(self->sum + first, self->recent + first, self->twiddle, bins,
+                                         self->nyquist);
+  }
 }
 
 bool bandPowerStep(bandPower_t *self, const float *sample, float *power) {
-  takeSample(self, sample);
-  updateSums(self);
+  const bool usual = self->bins == USUAL_BINS;
+  if (usual) {
+    takeSample(self, sample, USUAL_BINS);
+  } else {
+    takeSample(self, sample, self->bins);
+  }
   advance(self);
   if (!self->full) {
     return false;
@@ -182,9 +241,10 @@ bool bandPowerStep(bandPower_t *self, const float *sample, float *power) {
     return false;
   }
   self->wait = (uint16_t)(self->hop - 1);
-  findRotations(self);
-  for (uint16_t c = 0; c < self->channels; c++) {
-    power[c] = channelPower(self, c);
+  if (usual) {
+    findPowers(self, power, USUAL_BINS);
+  } else {
+    findPowers(self, power, self->bins);
   }
   return true;
 }

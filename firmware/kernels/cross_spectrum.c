@@ -3,6 +3,42 @@
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
+
+#define SIGNIFICAND_BITS 23
+#define EXPONENT_OF_ONE 127
+
+static uint32_t toBits(float x) {
+  uint32_t bits;
+  memcpy(&bits, &x, sizeof(bits));
+  return bits;
+}
+
+static float fromBits(uint32_t bits) {
+  float x;
+  memcpy(&x, &bits, sizeof(x));
+  return x;
+}
+
+/** The mantissa of @p x in [0.5, 1), its exponent added to @p exponent; for 0 < x <= FLT_MAX. */
+static float splitFloat(float x, int *exponent) {
+  if (x < FLT_MIN) {  // denormal
+    x *= 0x1p24f;
+    *exponent -= 24;
+  }
+  const uint32_t bits = toBits(x);
+  *exponent += (int)(bits >> SIGNIFICAND_BITS) - (EXPONENT_OF_ONE - 1);
+  return fromBits((bits & 0x007fffffu) | ((EXPONENT_OF_ONE - 1u) << SIGNIFICAND_BITS));
+}
+
+/** x 2^exponent, at most FLT_MAX; for x in [0.7, 1.42). */
+static float joinFloat(float x, int exponent) {
+  if (exponent >= 1 - EXPONENT_OF_ONE && exponent <= EXPONENT_OF_ONE) {
+    return x * fromBits((uint32_t)(exponent + EXPONENT_OF_ONE) << SIGNIFICAND_BITS);
+  }
+  const float joined = ldexpf(x, exponent);
+  return joined > FLT_MAX ? FLT_MAX : joined;
+}
 
 float crossSpectrum(const float *power, uint16_t axes) {
   float mantissa = 0.5f;  // with exponent 1: the number one
@@ -17,9 +53,7 @@ float crossSpectrum(const float *power, uint16_t axes) {
       zero = true;
       continue;
     }
-    int shift = 0;
-    mantissa *= frexpf(p > FLT_MAX ? FLT_MAX : p, &shift);
-    exponent += shift;
+    mantissa *= splitFloat(p > FLT_MAX ? FLT_MAX : p, &exponent);
     if (mantissa < 0.5f) {  // the product of two numbers in [0.5, 1) is at least 0.25
       mantissa *= 2.0f;
       exponent--;
@@ -29,8 +63,7 @@ float crossSpectrum(const float *power, uint16_t axes) {
     return 0.0f;
   }
   const int odd = exponent & 1;
-  const float root = ldexpf(sqrtf(odd ? 2.0f * mantissa : mantissa), (exponent - odd) / 2);
-  return root > FLT_MAX ? FLT_MAX : root;
+  return joinFloat(sqrtf(odd ? 2.0f * mantissa : mantissa), (exponent - odd) / 2);
 }
 
 void cascadedCrossSpectrum(const float *power, const uint16_t *groups, uint16_t groupCount, float *feature) {

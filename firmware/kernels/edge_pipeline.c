@@ -56,20 +56,25 @@ bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *conf
                     pipeline->cfarStorage, EDGE_PIPELINE_MAX_CELLS);
 }
 
+/** Keeps the finite ones of @p count values; returns how many were not. */
+static uint32_t holdFinite(const float *value, int count, float *held) {
+  uint32_t others = 0;
+  for (int i = 0; i < count; i++) {
+    others += isfinite(value[i]) ? 0u : 1u;
+    guardSample(value[i], &held[i]);
+  }
+  return others;
+}
+
 /** Keeps the finite values of @p sample in the pipeline, counts the others. */
 static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
   float *held = pipeline->held;
-  for (int i = 0; i < 10; i++) {
-    const float x = i < 3 ? sample->acc[i] : (i < 6 ? sample->gyro[i - 3] : sample->pwm[i - 6]);
-    pipeline->nonFinite += isfinite(x) ? 0u : 1u;
-    guardSample(x, &held[i]);
-  }
+  pipeline->nonFinite += holdFinite(sample->acc, 3, held) + holdFinite(sample->gyro, 3, held + 3) +
+                         holdFinite(sample->pwm, 4, held + 6);
   for (int i = 6; i < 10; i++) {
     held[i] = clampFloat(held[i], 0.0f, PWM_MAX);
   }
-  for (int i = 0; i < 3; i++) {
-    guardSample(sample->thrustAxis[i], &pipeline->thrustAxis[i]);
-  }
+  holdFinite(sample->thrustAxis, 3, pipeline->thrustAxis);
   if (voltageKnown(sample->vbat)) {
     pipeline->voltageFactor = voltageFactor(&pipeline->config.vehicle, sample->vbat);
   }
@@ -144,7 +149,6 @@ static uint8_t decode(edgePipeline_t *pipeline, float probability, bool armed) {
 }
 
 bool edgePipelineStep(edgePipeline_t *pipeline, const edgeSample_t *sample, edgeEvent_t *event) {
-  memset(event, 0, sizeof(*event));
   takeSample(pipeline, sample);
   event->ready = findFeatures(pipeline);
   memcpy(event->bandPower, pipeline->bandPower, sizeof(event->bandPower));
@@ -153,9 +157,9 @@ bool edgePipelineStep(edgePipeline_t *pipeline, const edgeSample_t *sample, edge
   event->armed = isArmed(pipeline);
   event->nonFinite = pipeline->nonFinite;
   event->edge = decode(pipeline, sample->probability, event->armed);
-  if (event->edge != EDGE_NONE && pipeline->config.physicalFilter && !event->alertRecent) {
+  event->filtered = event->edge != EDGE_NONE && pipeline->config.physicalFilter && !event->alertRecent;
+  if (event->filtered) {
     event->edge = EDGE_NONE;
-    event->filtered = 1;
   }
   return event->edge != EDGE_NONE;
 }

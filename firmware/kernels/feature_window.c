@@ -7,6 +7,7 @@
 
 /** Beyond so many time constants e^-t is less than half a unit in the last place of 1. */
 #define SETTLED 20.0f
+#define LONGEST_SETTLE 4e9f  // samples: more than a year at 100 Hz
 
 static float compensatedMean(const float *x, uint16_t count, uint16_t stride) {
   float sum = 0.0f, low = 0.0f;
@@ -49,23 +50,41 @@ void zScoreWindow(const float *features, uint16_t window, uint16_t columns, floa
   }
 }
 
+/** 1 - e^-x for x > 0: a series, then doublings of x. No library's rounding is in it. */
+static float decayRate(float x) {
+  if (!(x < SETTLED)) {
+    return 1.0f;
+  }
+  int doublings = 0;
+  for (; x > 0.5f; x *= 0.5f) {
+    doublings++;
+  }
+  float rest = 1.0f;
+  for (int i = 9; i >= 3; i--) {
+    rest = 1.0f - x / (float)i * rest;
+  }
+  float rate = x - 0.5f * x * x * rest;
+  for (; doublings > 0; doublings--) {
+    rate *= 2.0f - rate;
+  }
+  return rate;
+}
+
 void exponentialMeanInit(exponentialMean_t *self, float timeConstant) {
   memset(self, 0, sizeof(*self));
-  self->timeConstant = timeConstant;
-  self->rate = -expm1f(-1.0f / timeConstant);
+  self->rate = decayRate(1.0f / timeConstant);
+  const float settle = SETTLED * timeConstant;
+  self->settle = settle < LONGEST_SETTLE ? (uint32_t)settle + 1u : (uint32_t)LONGEST_SETTLE;
 }
 
 float exponentialMeanStep(exponentialMean_t *self, float x) {
-  if (self->count == 0) {
-    self->mean = x;
+  if (self->weight <= 0.0f) {
+    self->mean = x;  // the first sample
   }
-  const float age = (float)(self->count + 1) / self->timeConstant;
-  if (age < SETTLED) {
-    self->count++;
-    self->gain = self->rate / -expm1f(-age);
-  } else {
-    self->count = self->count == 0 ? 1 : self->count;
-    self->gain = self->rate;
+  if (self->settle > 0) {
+    self->settle--;
+    addCompensated(&self->weight, &self->weightLow, 1.0f - self->rate * self->weight);
+    self->gain = self->settle > 0 ? 1.0f / self->weight : self->rate;
   }
   const float deviation = (x - self->mean) + self->low;
   addCompensated(&self->mean, &self->low, self->gain * deviation);

@@ -23,8 +23,10 @@ static inline float clampFloat(float x, float low, float high) {
  * @return the sample to use, which is also kept in @p held
  */
 static inline float guardSample(float x, float *held) {
-  if (isfinite(x)) {
-    *held = clampFloat(x, -SAMPLE_LIMIT, SAMPLE_LIMIT);
+  if (fabsf(x) <= SAMPLE_LIMIT) {  // nearly always: one comparison says all
+    *held = x;
+  } else if (isfinite(x)) {
+    *held = x > 0.0f ? SAMPLE_LIMIT : -SAMPLE_LIMIT;
   }
   return *held;
 }

@@ -1,9 +1,11 @@
 #include "stream_detector.h"
 
-#include <math.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "sample_guard.h"
+
+#define QUANTISED_LIMIT 1024.0f  // beyond int8 whatever the zero point
 
 bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
                         const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena) {
@@ -24,8 +26,11 @@ bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion
 
 void streamQuantise(const streamQuantisation_t *quantisation, const float *channels, int32_t count, int8_t *q) {
   for (int32_t i = 0; i < count; i++) {
-    const float value = floorf(channels[i] / quantisation->inputScale + 0.5f) + (float)quantisation->inputZeroPoint;
-    q[i] = (int8_t)clampFloat(value, -128.0f, 127.0f);
+    const float scaled = channels[i] / quantisation->inputScale + 0.5f;
+    const float value = clampFloat(scaled, -QUANTISED_LIMIT, QUANTISED_LIMIT);
+    const int32_t towardsZero = (int32_t)value;
+    const int32_t down = towardsZero - ((float)towardsZero > value ? 1 : 0) + quantisation->inputZeroPoint;
+    q[i] = (int8_t)(down < INT8_MIN ? INT8_MIN : (down > INT8_MAX ? INT8_MAX : down));
   }
 }
 
