@@ -2,7 +2,7 @@
 
 #include "job_int8.h"
 
-enum { CONV_MAX_FILTER = 64 };  // kernelRows * kernelColumns * inChannels at most
+enum { CONV_MAX_FILTER = 64 };  // kernelRows * kernelColumns * inChannels at most, a multiple of four
 
 /**
  * @brief Two-dimensional convolution of int8 activations, stride 1, no padding; with
@@ -23,6 +23,6 @@ enum { CONV_MAX_FILTER = 64 };  // kernelRows * kernelColumns * inChannels at mo
 void convInt8(const jobInt8_t *job);
 
 /**
- * @brief Whether convInt8 can do a pool on the way: 2 or 4 positions to one.
+ * @brief Whether convInt8 can do a pool on the way: two positions to one.
  */
 int32_t convCanPool(const layerInt8_t *pool);

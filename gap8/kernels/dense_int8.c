@@ -28,7 +28,7 @@ void denseInt8(const jobInt8_t *job) {
       first += *x * *a++;
       second += *x++ * *b++;
     }
-    job->output[one] = requantise(first, layer->multiplier[one], layer->shift[one], range);
-    job->output[two] = requantise(second, layer->multiplier[two], layer->shift[two], range);
+    job->output[one] = requantise(requantiser(layer, one, range), first);
+    job->output[two] = requantise(requantiser(layer, two, range), second);
   }
 }

@@ -21,11 +21,6 @@ ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
   return xpulpDot4(x, w, sum);
 }
 
-// The last one to three values of a row, then zeros.
-ALWAYS_INLINE int32_t loadLast(const int8_t *p, int32_t count) {
-  return xpulpPack4(p[0], count > 1 ? p[1] : 0, count > 2 ? p[2] : 0, 0);
-}
-
 #else
 
 enum { UNIT = 1 };
@@ -36,11 +31,6 @@ ALWAYS_INLINE int32_t loadUnit(const int8_t *p) {
 
 ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
   return sum + x * w;
-}
-
-ALWAYS_INLINE int32_t loadLast(const int8_t *p, int32_t count) {
-  (void)count;  // a row has no rest
-  return *p;
 }
 
 #endif

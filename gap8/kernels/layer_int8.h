@@ -37,7 +37,8 @@ typedef struct {
   int32_t outputZeroPoint;
   int32_t outputMin;  // clamp of the output; a ReLU is outputMin = outputZeroPoint
   int32_t outputMax;
-  const int8_t *weights;        // aligned to 4; conv: [out][row][column][in]; dense: [out][in]; sparse: [block][4]
+  const int8_t *weights;        // aligned to 4; dense: [out][in]; sparse: [block][4]; conv: [out][row][column][in],
+                                // the values of each output followed by zeros up to a multiple of four
   const int32_t *bias;          // [out], input zero point folded in
   const int32_t *multiplier;    // [out], Q31 mantissa of inputScale * weightScale / outputScale
   const int8_t *shift;          // [out], its exponent: positive is a shift to the left

@@ -11,10 +11,14 @@
 #include "layer_int8.h"
 #include "xpulp.h"
 
-// round(a * b / 2^31), ties up, for b >= 0 and a result within +-2^30, of which one word holds twice the value.
+// round(a * b / 2^31), ties up, for |a| < 2^29 and b >= 0.
 static inline int32_t roundingDoublingHighMultiply(int32_t a, int32_t b) {
-  const int32_t halves = (int32_t)(((int64_t)a * (int64_t)b) >> 30);
+  const int32_t halves = (int32_t)(((int64_t)(int32_t)((uint32_t)a << 2) * (int64_t)b) >> 32);  // one instruction
+#if AIRTOUCH_XPULP
+  return xpulpHalve(halves);
+#else
   return (halves + 1) >> 1;
+#endif
 }
 
 // round(x / 2^exponent), ties away from zero, for exponent 1 to 31 and |x| < 2^30.
@@ -38,15 +42,29 @@ static inline outputRange_t outputRange(const layerInt8_t *layer) {
   return (outputRange_t){.zeroPoint = layer->outputZeroPoint, .min = layer->outputMin, .max = layer->outputMax};
 }
 
-// The activation of an accumulator. Accumulator and activation, before clamping, must lie
-// within +-2^30, as in every layer that training makes and loading accepts. Never falls
-// with a rising accumulator, so that the largest of several may be taken before it.
-static inline int8_t requantise(int32_t accumulator, int32_t multiplier, int32_t shift, outputRange_t range) {
-  int32_t value = shift < 0
-                      ? roundingShiftRight(roundingDoublingHighMultiply(accumulator, multiplier), -shift)
-                      : roundingDoublingHighMultiply((int32_t)((uint32_t)accumulator << shift), multiplier);
-  value += range.zeroPoint;
-  value = value < range.min ? range.min : value;
-  value = value > range.max ? range.max : value;
+// What one output channel needs.
+typedef struct {
+  int32_t multiplier;
+  int32_t right;  // shift to the right
+  outputRange_t range;
+} requantiser_t;
+
+static inline requantiser_t requantiser(const layerInt8_t *layer, int32_t channel, outputRange_t range) {
+  return (requantiser_t){.multiplier = layer->multiplier[channel], .right = -layer->shift[channel], .range = range};
+}
+
+// The activation of an accumulator. |accumulator|, and its product with a scale above one,
+// must be below 2^28, as in every layer that training makes and loading accepts. Never
+// falls with a rising accumulator, so that the largest of several may be taken before it.
+static inline int8_t requantise(requantiser_t r, int32_t accumulator) {
+  int32_t value;
+  if (r.right > 0) {
+    value = roundingShiftRight(roundingDoublingHighMultiply(accumulator, r.multiplier), r.right);
+  } else {
+    value = roundingDoublingHighMultiply((int32_t)((uint32_t)accumulator << -r.right), r.multiplier);
+  }
+  value += r.range.zeroPoint;
+  value = value < r.range.min ? r.range.min : value;
+  value = value > r.range.max ? r.range.max : value;
   return (int8_t)value;
 }

@@ -36,6 +36,6 @@ void sparseDenseInt8(const jobInt8_t *job) {
         sum = multiplyAdd(loadUnit(x + i), loadUnit(weights + i), sum);
       }
     }
-    job->output[channel] = requantise(sum, layer->multiplier[channel], layer->shift[channel], range);
+    job->output[channel] = requantise(requantiser(layer, channel, range), sum);
   }
 }

@@ -39,6 +39,11 @@ static inline int32_t xpulpPack4(int8_t a, int8_t b, int8_t c, int8_t d) {
   return (int32_t)__builtin_pulp_pack4(a, b, c, d);
 }
 
+// (a + 1) >> 1; the sum must fit in int32.
+static inline int32_t xpulpHalve(int32_t a) {
+  return __builtin_pulp_addRN(a, 0, 1, 1);
+}
+
 // (a + b + 2^(shift - 1)) >> shift for shift 1 to 31; the sum must fit in int32.
 static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
   return __builtin_pulp_addRN_r(a, b, shift);
@@ -71,6 +76,12 @@ static inline int32_t xpulpPack4(int8_t a, int8_t b, int8_t c, int8_t d) {
   __asm__("cv.packlo.b %0, %1, %2" : "+r"(packed) : "r"((int32_t)b), "r"((int32_t)a));
   __asm__("cv.packhi.b %0, %1, %2" : "+r"(packed) : "r"((int32_t)d), "r"((int32_t)c));
   return packed;
+}
+
+static inline int32_t xpulpHalve(int32_t a) {
+  int32_t half;
+  __asm__("cv.addrn %0, %1, zero, 1" : "=r"(half) : "r"(a));
+  return half;
 }
 
 static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
@@ -113,6 +124,10 @@ static inline int32_t xpulpMax4(int32_t a, int32_t b) {
     larger[i] = (int8_t)(xpulpByte(a, i) > xpulpByte(b, i) ? xpulpByte(a, i) : xpulpByte(b, i));
   }
   return xpulpPack4(larger[0], larger[1], larger[2], larger[3]);
+}
+
+static inline int32_t xpulpHalve(int32_t a) {
+  return (a + 1) >> 1;
 }
 
 static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {

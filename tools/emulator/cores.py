@@ -28,4 +28,12 @@ RV32IMC = Core(
     ("-target", "riscv32-freestanding", "-mcpu=generic_rv32+m+c", "-mabi=ilp32", "-msmall-data-limit=0"),
     has_fpu=False, registers=8)
 
-CORES = {core.name: core for core in (CORTEX_M4, RV32IMC)}
+#: A core of GAP8's cluster under CORE-V's encoding of XPULP, which upstream compilers have; see xpulp.py.
+RV32IM_XPULP = Core(
+    "rv32im-xpulp", "riscv32-corev-elf-gcc",
+    ("-march=rv32im_zicsr_xcvmac_xcvalu_xcvsimd_xcvmem", "-mabi=ilp32", "-msmall-data-limit=0"),
+    ("-target", "riscv32-freestanding", "-mcpu=generic_rv32+m+xcvmac+xcvalu+xcvsimd+xcvmem", "-mabi=ilp32",
+     "-msmall-data-limit=0"),
+    has_fpu=False, registers=8)
+
+CORES = {core.name: core for core in (CORTEX_M4, RV32IMC, RV32IM_XPULP)}

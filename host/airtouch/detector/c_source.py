@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.kernels.network import layer_shape, packed_weights
 from airtouch.reference.int8_network import Int8Layer
 
-_KINDS = ("LAYER_CONV", "LAYER_MAX_POOL", "LAYER_DENSE", "LAYER_SPARSE_DENSE")
+_KINDS = ("LAYER_CONV", "LAYER_MAX_POOL", "LAYER_DENSE", "LAYER_SPARSE_DENSE", "LAYER_SPARSE_CONV")
 
 
 def fields(layer: Int8Layer) -> list[str]:
@@ -21,8 +21,8 @@ def fields(layer: Int8Layer) -> list[str]:
 def layer_arrays(name: str, layer: Int8Layer) -> tuple[str, list[str]]:
     """The C arrays of one layer, and the initialisers that point to them."""
     weights, counts, skips = packed_weights(layer)
-    multiplier, shift = layer.multipliers()
-    arrays = [("Weights", "int8_t", weights), ("Bias", "int32_t", layer.folded_bias()),
+    bias, multiplier, shift = layer.c_constants()
+    arrays = [("Weights", "int8_t", weights), ("Bias", "int32_t", bias),
               ("Multiplier", "int32_t", multiplier), ("Shift", "int8_t", shift)]
     if counts.size:
         arrays += [("BlockCounts", "uint16_t", counts), ("BlockSkips", "uint8_t", skips)]

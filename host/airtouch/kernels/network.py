@@ -120,10 +120,12 @@ def arena_bytes(network: Int8Network) -> int:
 
 def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A layer's weights, block counts and block skips as the C kernels take them; the last two are
-    empty where the layer keeps all its weights."""
+    empty where the layer keeps all its weights. A convolution's filters are filled up to a multiple of four."""
     if runs_sparse(layer):
         return sparse_blocks(layer.weights)
-    return layer.weights, np.zeros(0, np.uint16), np.zeros(0, np.uint8)
+    weights = layer.weights.reshape(len(layer.weights), -1)
+    fill = -weights.shape[1] % 4 if layer.kind == "conv" else 0
+    return np.pad(weights, ((0, 0), (0, fill))), np.zeros(0, np.uint16), np.zeros(0, np.uint8)
 
 
 def layer_shape(layer: Int8Layer) -> list[int]:
@@ -145,12 +147,11 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[object, list[np.ndarray]]:
     weighted = [layer for layer in layers if layer.kind != "max_pool"]
     packed = [packed_weights(layer) for layer in weighted]
     padded = [np.pad(np.ravel(weights), (0, -weights.size % 4)) for weights, _, _ in packed]
-    multipliers = [layer.multipliers() for layer in weighted]
+    constants = [layer.c_constants() for layer in weighted]
     weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
                               zip((padded, *list(zip(*packed))[1:]), (np.int8, np.uint16, np.uint8)))
-    bias = _joined([layer.folded_bias() for layer in weighted], np.int32)
-    multiplier, shift = (_joined(parts, dtype)
-                         for parts, dtype in zip(zip(*multipliers), (np.int32, np.int8)))
+    bias, multiplier, shift = (_joined(parts, dtype)
+                               for parts, dtype in zip(zip(*constants), (np.int32, np.int32, np.int8)))
     shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,

@@ -13,10 +13,10 @@ static int32_t inputs(const int32_t *shape) {
   return shape[1] * shape[2] * shape[3];
 }
 
-// Weights of a layer that keeps all of them; 0 for a pool.
-static int32_t weights(const int32_t *shape) {
+// Weights of a layer that keeps all of them; 0 for a pool. `multiple`: what a filter is filled up to.
+static int32_t weights(const int32_t *shape, int32_t multiple) {
   if (shape[0] == LAYER_CONV) {
-    return shape[6] * shape[7] * shape[8] * shape[3];
+    return shape[6] * ((shape[7] * shape[8] * shape[3] + multiple - 1) / multiple * multiple);
   }
   return shape[0] == LAYER_DENSE ? shape[6] * inputs(shape) : 0;
 }
@@ -58,7 +58,7 @@ int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
         }
       }
     }
-    weight = (weight + weights(s) + 3) & ~3;  // each layer's weights are aligned to 4
+    weight = (weight + weights(s, 4) + 3) & ~3;  // each layer's weights are aligned to 4
     if (weight > flat->weightCount) {
       return i;
     }
@@ -83,7 +83,7 @@ static void unpackFloat(const flatNetworkFloat_t *flat, layerFloat_t *layers, ne
                                .outRows = s[4], .outColumns = s[5], .outChannels = s[6],
                                .kernelRows = s[7], .kernelColumns = s[8], .relu = s[9],
                                .weights = weight, .bias = bias};
-    weight += weights(s);
+    weight += weights(s, 1);
     bias += s[0] == LAYER_MAX_POOL ? 0 : s[6];
   }
   *network = (networkFloat_t){.layers = layers, .layerCount = flat->layerCount};
@@ -105,7 +105,7 @@ int32_t networkFloatBatchArena(const flatNetworkFloat_t *flat) {
   }
   for (int32_t i = 0; i < flat->layerCount; i++) {
     const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
-    weight += weights(s);
+    weight += weights(s, 1);
     channel += s[0] == LAYER_MAX_POOL ? 0 : s[6];
     if (s[0] > LAYER_DENSE || weight > flat->weightCount || channel > flat->channelCount) {
       return -1 - i;

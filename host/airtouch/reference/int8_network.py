@@ -45,10 +45,19 @@ class Int8Layer:
         real = np.float64(np.float32(self.input_scale)) * self.weight_scale.astype(np.float64)
         return quantised_multiplier(real / np.float64(np.float32(self.output_scale)))
 
-    def folded_bias(self) -> np.ndarray:
-        """int32 (out,): bias with the input's zero point folded in, as the C kernels take it."""
+    def c_constants(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """bias, multiplier and shift (out,) as the C kernels take them: int32, int32, int8.
+
+        The input's zero point is folded into the bias. An output whose weights pruning took has a weight scale of
+        next to nothing and a bias to match; it gets that constant as a bias at scale 1 instead.
+        """
         weights = self.weights.astype(np.int64).reshape(len(self.bias), -1)
-        return (self.bias - self.input_zero_point * weights.sum(axis=1)).astype(np.int32)
+        bias = (self.bias - self.input_zero_point * weights.sum(axis=1)).astype(np.int32)
+        multiplier, shift = self.multipliers()
+        constant = requantise(bias, multiplier, shift, self.output_zero_point, self.output_min)
+        dead = ~weights.any(axis=1)
+        return (np.where(dead, constant.astype(np.int32) - self.output_zero_point, bias).astype(np.int32),
+                np.where(dead, 2**30, multiplier).astype(np.int32), np.where(dead, 1, shift).astype(np.int8))
 
 
 @dataclass(frozen=True)
