@@ -4,7 +4,15 @@
 
 #define HOLD_OFF_STEPS 4
 
+/** The stream begins with as much of the past as the network needs. */
+static void rebase(linkSender_t *sender) {
+  const uint32_t held = sender->samples < sender->refill ? sender->samples : sender->refill;
+  sender->base = sender->samples - held;
+  sender->next = sender->base;
+}
+
 static void restart(linkSender_t *sender, uint8_t session) {
+  rebase(sender);
   sender->session = session;
   sender->state = LINK_STARTING;
   sender->outstanding = 0;
@@ -43,9 +51,7 @@ void linkSenderPush(linkSender_t *sender, const uint8_t sample[EDGE_LINK_SAMPLE_
   memcpy(sender->history[sender->samples % LINK_HISTORY], sample, EDGE_LINK_SAMPLE_BYTES);
   sender->samples++;
   if (sender->state == LINK_STARTING || sender->state == LINK_REFUSED) {
-    const uint32_t held = sender->samples < sender->refill ? sender->samples : sender->refill;
-    sender->base = sender->samples - held;
-    sender->next = sender->base;
+    rebase(sender);
   }
   forget(sender);
   count(&sender->silent);

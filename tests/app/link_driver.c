@@ -1,0 +1,309 @@
+// The two ends of the link over a pipe of bytes with faults; built with sanitizers by test_link.py.
+// Each file is a script: its bytes decide what happens to each packet. Checked here, for any script:
+// every answer that the sender accepts is what the network says of that sample without any fault; and once
+// the faults end, answers come within ten packets where the GAP8 kept its state, else within those that
+// a whole window takes and ten more.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "feature_window.h"
+#include "gap8_core.h"
+#include "link_sender.h"
+#include "stream_window.h"
+
+#define MAX_STEPS 1400
+#define CLEAN_STEPS 320  // before the faults, so that answers come
+#define AFTER_STEPS 120  // after them
+#define QUEUE 64
+#define ROOM 160         // of a packet on the pipe: faults may lengthen it
+
+typedef struct {
+  uint8_t bytes[ROOM];
+  uint16_t length;
+  int due;  // step at which it arrives
+} flight_t;
+
+typedef struct {
+  flight_t packets[QUEUE];
+  int count;
+} pipe_t;
+
+typedef struct {
+  const uint8_t *at;
+  size_t left;
+} script_t;
+
+typedef struct {
+  uint8_t samples[MAX_STEPS][EDGE_LINK_SAMPLE_BYTES];
+  int8_t truth[MAX_STEPS][EDGE_LINK_OUTPUTS];
+  bool known[MAX_STEPS];
+} world_t;
+
+static world_t best, paper;
+static gap8Core_t gap8;
+static linkSender_t sender;
+static pipe_t up, down;
+static uint32_t noise = 1;
+static bool swift;
+
+static void check(bool good, const char *what) {
+  if (!good) {
+    fprintf(stderr, "broken promise: %s\n", what);
+    abort();
+  }
+}
+
+static uint8_t random8(void) {
+  noise = noise * 1664525u + 1013904223u;
+  return (uint8_t)(noise >> 24);
+}
+
+static uint8_t next(script_t *script) {
+  if (script->left == 0) {
+    return 0;
+  }
+  script->left--;
+  return *script->at++;
+}
+
+// What the networks say without a link: the kernels alone, from the first sample on.
+static void findTruth(void) {
+  static int8_t arena[AIRTOUCH_STREAM_ARENA_BYTES] __attribute__((aligned(4)));
+  static int8_t network[AIRTOUCH_MODEL_ARENA_BYTES] __attribute__((aligned(4)));
+  static float rows[MAX_STEPS][3];
+  static int8_t quantised[GAP8_VALUES];
+  static float window[GAP8_VALUES];
+  streamState_t state;
+  streamInt8Reset(&airtouchStream, &state, arena);
+  for (int i = 0; i < MAX_STEPS; i++) {
+    for (int c = 0; c < EDGE_LINK_SAMPLE_BYTES; c++) {
+      best.samples[i][c] = (uint8_t)(random8() >> (i % 5));
+    }
+    const int8_t *logits = streamInt8Step(&airtouchStream, &state, (const int8_t *)best.samples[i]);
+    best.known[i] = logits != NULL;
+    if (logits != NULL) {
+      memcpy(best.truth[i], logits, EDGE_LINK_OUTPUTS);
+    }
+    for (int c = 0; c < 3; c++) {
+      rows[i][c] = (float)random8() * (float)(1 + i % 7);
+    }
+    memcpy(paper.samples[i], rows[i], EDGE_LINK_SAMPLE_BYTES);
+    paper.known[i] = i >= AIRTOUCH_MODEL_ROWS - 1;
+    if (paper.known[i]) {
+      zScoreWindow(rows[i - AIRTOUCH_MODEL_ROWS + 1], AIRTOUCH_MODEL_ROWS, 3, window);
+      networkInt8Quantise(&airtouchNetwork, window, GAP8_VALUES, quantised);
+      memcpy(paper.truth[i], networkInt8Run(&airtouchNetwork, quantised, network), AIRTOUCH_MODEL_OUTPUTS);
+    }
+  }
+}
+
+static void push(pipe_t *pipe, const uint8_t *bytes, uint16_t length, int due) {
+  if (pipe->count < QUEUE) {
+    flight_t *packet = &pipe->packets[pipe->count++];
+    memcpy(packet->bytes, bytes, length);
+    packet->length = length;
+    packet->due = due;
+  }
+}
+
+// Puts a packet on the pipe, with the fault that the script orders.
+static void transmit(pipe_t *pipe, const uint8_t *packet, uint16_t length, int step, script_t *script) {
+  uint8_t bytes[ROOM];
+  memcpy(bytes, packet, length);
+  switch (next(script) % 16) {
+    case 6:
+    case 7:
+      return;
+    case 8:
+      push(pipe, bytes, length, step);
+      push(pipe, bytes, length, step + next(script) % 50);
+      return;
+    case 9:
+      push(pipe, bytes, (uint16_t)(next(script) % (length + 1)), step);
+      return;
+    case 10:
+      bytes[next(script) % length] ^= (uint8_t)(1 + next(script) % 255);
+      push(pipe, bytes, length, step);
+      return;
+    case 11:
+      for (int i = 0; i < ROOM; i++) {
+        bytes[i] = random8();
+      }
+      push(pipe, bytes, (uint16_t)(next(script) % ROOM), step);
+      return;
+    case 12:
+      push(pipe, bytes, length, step + next(script) % 50);
+      return;
+    case 13: {
+      const uint16_t longer = (uint16_t)(length + next(script) % (ROOM - EDGE_LINK_MAX_BYTES));
+      for (int i = length; i < longer; i++) {
+        bytes[i] = random8();
+      }
+      if (next(script) % 2) {
+        bytes[2] = (uint8_t)longer;  // a corrupted length that looks right
+      }
+      push(pipe, bytes, longer, step);
+      return;
+    }
+    default:
+      push(pipe, bytes, length, step);
+      return;
+  }
+}
+
+// Takes the packets off that are due, oldest first; the later ones stay.
+static int arrived(pipe_t *pipe, int step, flight_t *out) {
+  int count = 0, kept = 0;
+  for (int i = 0; i < pipe->count; i++) {
+    if (pipe->packets[i].due <= step) {
+      out[count++] = pipe->packets[i];
+    } else {
+      pipe->packets[kept++] = pipe->packets[i];
+    }
+  }
+  pipe->count = kept;
+  return count;
+}
+
+static void gap8Step(int step, script_t *script) {
+  static flight_t packets[QUEUE];
+  uint8_t reply[EDGE_LINK_MAX_BYTES];
+  const int count = arrived(&up, step, packets);
+  for (int i = 0; i < count; i++) {
+    // Exactly as much memory as the packet has, so that a byte too far is seen.
+    uint8_t *exact = malloc(packets[i].length + 1u);
+    memcpy(exact, packets[i].bytes, packets[i].length);
+    const uint16_t length = gap8CoreTake(&gap8, exact, packets[i].length, reply);
+    free(exact);
+    check(length <= EDGE_LINK_MAX_BYTES, "a reply fits a packet");
+    if (length > 0) {
+      transmit(&down, reply, length, step, script);
+    }
+  }
+  if (step % 50 == 0) {
+    transmit(&down, reply, gap8CoreHeartbeat(&gap8, (uint32_t)step * 10u, reply), step, script);
+  }
+}
+
+// @return how many answers were accepted
+static int takeAnswers(const world_t *world, int step) {
+  static flight_t packets[QUEUE];
+  linkAnswer_t answers[EDGE_LINK_ANSWERS];
+  static uint32_t last;
+  static bool any;
+  if (step == 0) {
+    any = false;
+  }
+  int accepted = 0;
+  const int count = arrived(&down, step, packets);
+  for (int i = 0; i < count; i++) {
+    uint8_t *exact = malloc(packets[i].length + 1u);
+    memcpy(exact, packets[i].bytes, packets[i].length);
+    const int found = linkSenderTake(&sender, exact, packets[i].length, answers);
+    free(exact);
+    for (int k = 0; k < found; k++) {
+      const uint32_t at = answers[k].sequence;
+      check(at < MAX_STEPS && (int)at <= step, "an answer is to a sample that was sent");
+      check(world->known[at], "the network computes at that sample");
+      check(memcmp(answers[k].output, world->truth[at], world == &best ? 3 : 2) == 0, "an answer is right");
+      check(!any || at > last, "answers come in order, each once");
+      last = at;
+      any = true;
+    }
+    accepted += found;
+  }
+  return accepted;
+}
+
+// One step of both ends. @return how many answers were accepted; *packets grows by those sent
+static int stepLink(const world_t *world, int step, script_t *script, int *packets, bool *wasReset) {
+  uint8_t bytes[EDGE_LINK_MAX_BYTES];
+  int accepted = 0;
+  linkSenderPush(&sender, world->samples[step]);
+  for (int i = 0; i < 2; i++) {
+    const uint16_t length = linkSenderPoll(&sender, bytes);
+    if (length == 0) {
+      break;
+    }
+    check(length <= EDGE_LINK_MAX_BYTES, "a packet fits");
+    const uint8_t fate = script->left > 0 ? next(script) : 0;
+    if (fate % 64 == 63) {
+      linkSenderSent(&sender, false);
+      continue;
+    }
+    if (fate % 64 == 62) {
+      gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork);
+      *wasReset = true;
+    }
+    linkSenderSent(&sender, true);
+    (*packets)++;
+    transmit(&up, bytes, length, step, script);
+    if (swift) {  // the answer is there before the step's second packet is made
+      gap8Step(step, script);
+      accepted += takeAnswers(world, step);
+    }
+  }
+  gap8Step(step, script);
+  return accepted + takeAnswers(world, step);
+}
+
+static void runScript(const uint8_t *data, size_t length, int *slowest) {
+  script_t script = {data, length}, none = {data, 0};
+  const uint8_t kind = next(&script);
+  const bool isPaper = kind % 2;
+  swift = kind / 2 % 2;
+  const world_t *world = isPaper ? &paper : &best;
+  const char *sha = isPaper ? AIRTOUCH_MODEL_SHA256 : AIRTOUCH_STREAM_SHA256;
+  uint8_t digest[EDGE_LINK_DIGEST_BYTES];
+  edgeLinkDigest(sha, digest);
+  const uint16_t window = isPaper ? AIRTOUCH_MODEL_ROWS : streamWindow(&airtouchStream);
+  up.count = down.count = 0;
+  gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork);
+  linkSenderInit(&sender, isPaper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, (uint16_t)(window + 1), 7, 250);
+  int packets = 0, step = 0;
+  bool wasReset = false;
+  for (; step < CLEAN_STEPS; step++) {
+    stepLink(world, step, &none, &packets, &wasReset);
+  }
+  check(sender.state == LINK_UP && !wasReset, "the link comes up");
+  while (script.left > 0 && step < MAX_STEPS - AFTER_STEPS) {
+    stepLink(world, step++, &script, &packets, &wasReset);
+  }
+  for (int i = 0; i < up.count; i++) {
+    up.packets[i].due = step;  // late packets come now; then the faults are over
+  }
+  for (int i = 0; i < down.count; i++) {
+    down.packets[i].due = step;
+  }
+  const bool anew = wasReset || sender.counters.lost > 0 || sender.counters.resets > 0;
+  const int allowed = anew ? 10 + (window + EDGE_LINK_SAMPLES) / EDGE_LINK_SAMPLES : 10;
+  packets = 0;
+  int accepted = 0;
+  for (int i = 0; i < AFTER_STEPS; i++) {
+    accepted += stepLink(world, step++, &none, &packets, &wasReset);
+    check(accepted > 0 || packets < allowed, anew ? "answers come back after a reset" : "answers within ten packets");
+    if (accepted == 0 && !anew && packets + 1 > *slowest) {
+      *slowest = packets + 1;
+    }
+  }
+  check(sender.state == LINK_UP, "the link is up again");
+  check(linkSenderBacklog(&sender) <= EDGE_LINK_SAMPLES, "nothing lags behind");
+}
+
+int main(int argc, char **argv) {
+  findTruth();
+  int slowest = 1;
+  for (int i = 1; i < argc; i++) {
+    FILE *file = fopen(argv[i], "rb");
+    check(file != NULL, argv[i]);
+    uint8_t *data = malloc(1 << 16);
+    const size_t length = fread(data, 1, 1 << 16, file);
+    fclose(file);
+    noise = (uint32_t)i + 77u;
+    runScript(data, length, &slowest);
+    free(data);
+  }
+  printf("%d scripts, answers after at most %d packets\n", argc - 1, slowest);
+  return 0;
+}
