@@ -72,6 +72,11 @@ class Drone:
         return self.setpoint[controller.MOTORS] > 0.5
 
     @property
+    def height_over_floor(self) -> float:
+        """True height of the down range sensor, m."""
+        return float(self.row[loop.PLACE + 2])
+
+    @property
     def low_battery(self) -> bool:
         """The firmware's state "low power"."""
         return self._low_s > LOW_AFTER_S

@@ -28,7 +28,6 @@ class Firmware:
         self.log = LogService(items, variables.reader(table, items, drone))
         self.param = ParamService(variables.parameters(drone, ai_deck), self._changed)
         self._fed_s: float | None = None
-        self.say("SYS: Virtual Crazyflie, nothing here can break")
 
     def say(self, text: str) -> None:
         """Print on the console."""
@@ -37,6 +36,7 @@ class Firmware:
     def tick(self) -> list[Packet]:
         """Fly 10 ms: console and log packets."""
         if self._fed_s is not None and self.drone.now_s - self._fed_s > WATCHDOG_S:
+            self._fed_s = None
             self.drone.stop()
         self.drone.step()
         packets = []
@@ -62,6 +62,8 @@ class Firmware:
             drone.commander.take_generic(data, drone.now_s, drone.estimate)
         elif port == crtp.GENERIC and channel == 1 and data[:1] == b"\0":
             drone.commander.relax()
+        elif port == crtp.LOCALIZATION and channel == 1:
+            self._stop_command({3: EMERGENCY, 4: WATCHDOG}.get(data[0] if data else None))
         elif port == crtp.HIGH_LEVEL:
             code = drone.commander.planner.command(data, drone.now_s)
             return [Packet(port, channel, (data[:3] + b"\0" * 3)[:3] + bytes([code]))]
@@ -100,11 +102,15 @@ class Firmware:
             answer = bytes([self.drone.info() >> (command - 1) & 1])
         elif channel == 1 and command in (ARM, RECOVER):
             answer = self._request(command)
-        elif channel == 1 and command == EMERGENCY:
-            self.drone.stop()
-        elif channel == 1 and command == WATCHDOG:
-            self._fed_s = self.drone.now_s
+        elif channel == 1:
+            self._stop_command(command)
         return [] if answer is None else [Packet(crtp.SUPERVISOR, channel, bytes([command | RESPONSE]) + answer)]
+
+    def _stop_command(self, command: int | None) -> None:
+        if command == EMERGENCY:
+            self.drone.stop()
+        elif command == WATCHDOG:
+            self._fed_s = self.drone.now_s
 
     def _request(self, command: int) -> bytes:
         """Arming is automatic here, so it succeeds where the drone can fly."""

@@ -5,7 +5,6 @@ from typing import NamedTuple
 CONSOLE, PARAM, COMMANDER, MEMORY, LOG, LOCALIZATION, GENERIC, HIGH_LEVEL, SUPERVISOR = 0, 2, 3, 4, 5, 6, 7, 8, 9
 PLATFORM, LINK = 13, 15
 MOST_DATA = 30
-NULL = b"\xff"  #: the packet that a scan sends
 
 
 class Packet(NamedTuple):
@@ -25,3 +24,8 @@ def parse(datagram: bytes) -> Packet | None:
     if not 1 <= len(datagram) <= MOST_DATA + 1:
         return None
     return Packet(datagram[0] >> 4, datagram[0] & 3, bytes(datagram[1:]))
+
+
+def is_null(packet: Packet) -> bool:
+    """Whether it is the empty packet with which clients look for drones."""
+    return packet.port == LINK and packet.channel == 3

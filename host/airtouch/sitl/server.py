@@ -1,4 +1,7 @@
-"""The virtual Crazyflie on a UDP port: real time (or faster), faults, one client at a time."""
+"""The virtual Crazyflie on a UDP port: real time (or faster), faults, one client at a time.
+
+Who sends to the log port last gets the log data, as who holds the radio does.
+"""
 
 import contextlib
 import math
@@ -11,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from airtouch import __version__
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.simulation import scenario as scenarios
@@ -24,6 +28,7 @@ from airtouch.sitl.recorder import Recorder
 from airtouch.vehicle import Vehicle
 
 HOST, PORT = "127.0.0.1", 19850  #: where cflib looks for virtual drones
+GREETING = f"SYS: virtual Crazyflie, AirTouch {__version__}"
 MOST_BEHIND_S = 0.5  #: a machine that is slower than this loses time, not samples
 LINK_TIMEOUT_S = 1.0  #: the firmware forgets its log blocks when the link is down for so long
 
@@ -67,6 +72,10 @@ class Server:
         """End `run`, from any thread."""
         self._stop.set()
 
+    def close(self) -> None:
+        """Free the port; `run` does so at its end."""
+        self._socket.close()
+
     def run(self, told: Callable[[str], None] = lambda _: None) -> None:
         """Serve until `stop`; told(text) gets the console's lines."""
         start = time.monotonic() - self.drone.now_s / self.speed
@@ -86,7 +95,7 @@ class Server:
                 self._receive()
                 self._tick(told)
         finally:
-            self._socket.close()
+            self.close()
             if self.recorder:
                 self.recorder.write()
 
@@ -139,10 +148,8 @@ class Server:
     def _exchange(self, now_s: float) -> None:
         """Take what has arrived, answer it, send what is due."""
         for packet, peer in self._up.ready(now_s):
-            if packet.to_bytes() != crtp.NULL and peer != self.client:
-                self.client = peer
-                if self.drone.state != "ready" or self.drone.emergency:
-                    self.drone.restart()
+            if peer != self.client and (self.client is None or packet.port == crtp.LOG) and not crtp.is_null(packet):
+                self._welcome(peer)
             for answer in self.firmware.take(packet):
                 self._down.put(answer, peer, now_s)
         for packet, peer in self._down.ready(now_s):
@@ -150,6 +157,14 @@ class Server:
                 continue
             with contextlib.suppress(OSError):
                 self._socket.sendto(packet.to_bytes(), peer)
+
+
+    def _welcome(self, peer: object) -> None:
+        """Another client: log data and console go there. On the ground the drone is as after its start."""
+        self.client = peer
+        if not self.drone.motors_on:
+            self.drone.restart()
+        self.firmware.say(GREETING)
 
 
 def _bind(host: str, port: int) -> socket.socket:

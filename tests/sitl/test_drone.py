@@ -1,0 +1,177 @@
+"""What the drone does with set-points: commander, watchdog, supervisor, crash; and the log of it."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.sitl import Server
+from airtouch.sitl.drone import CRASHED, LOCKED, PRE_FLIGHT
+from airtouch.sitl.packet import COMMANDER, CONSOLE, GENERIC, LOCALIZATION, PLATFORM, SUPERVISOR
+
+HOVER, POSITION, VELOCITY, Z_DISTANCE, MANUAL, STOP = 10, 7, 8, 9, 11, 0
+QUIET = {"without": ["gust"]}
+
+
+def keep(craft, seconds, kind, *values, every=0.1):
+    """Repeat a set-point as a client does."""
+    for _ in range(round(seconds / every)):
+        craft.take(GENERIC, 0, bytes([kind]) + struct.pack("<ffff", *values))
+        craft.fly(every)
+
+
+def place(craft):
+    return np.array(craft.drone.row[17:20])
+
+
+def test_hover_set_points_follow_the_nose(bench):
+    craft = bench(**QUIET)
+    keep(craft, 3.0, HOVER, 0.0, 0.0, 0.0, 0.5)
+    keep(craft, 2.0, HOVER, 0.0, 0.0, 45.0, 0.5)  # 90 degrees to the left
+    assert math.degrees(craft.drone.row[25]) == pytest.approx(90.0, abs=8.0)
+    before = place(craft)
+    keep(craft, 3.0, HOVER, 0.3, 0.0, 0.0, 0.5)
+    moved = place(craft) - before
+    assert moved[1] == pytest.approx(0.9, abs=0.3) and abs(moved[0]) < 0.35
+    assert craft.height == pytest.approx(0.5, abs=0.12)
+
+
+def test_position_and_velocity_set_points(bench):
+    craft = bench(**QUIET)
+    keep(craft, 3.0, POSITION, 0.0, 0.0, 0.5, 0.0)
+    keep(craft, 4.0, POSITION, 0.5, -0.5, 0.6, 0.0)
+    np.testing.assert_allclose(craft.drone.estimate[6:9], [0.5, -0.5, 0.6], atol=0.12)
+    before = place(craft)
+    keep(craft, 2.0, VELOCITY, -0.2, 0.0, 0.2, 0.0)
+    moved = place(craft) - before
+    assert moved[0] < -0.2 and moved[2] == pytest.approx(0.4, abs=0.15)
+
+
+def test_tilts_push_the_right_way(bench):
+    craft = bench(**QUIET)
+    keep(craft, 3.0, HOVER, 0.0, 0.0, 0.0, 0.6)
+    before = place(craft)
+    keep(craft, 0.8, Z_DISTANCE, 0.0, -6.0, 0.0, 0.6)  # nose down in the firmware's legacy axes
+    assert (place(craft) - before)[0] > 0.15
+    keep(craft, 1.5, HOVER, 0.0, 0.0, 0.0, 0.6)
+    before = place(craft)
+    keep(craft, 0.8, Z_DISTANCE, 6.0, 0.0, 0.0, 0.6)
+    assert (place(craft) - before)[1] < -0.15
+
+
+def test_thrust_is_locked_until_it_was_zero(bench):
+    craft = bench(**QUIET)
+    for _ in range(10):
+        craft.take(COMMANDER, 0, struct.pack("<fffH", 0.0, 0.0, 0.0, 50000))
+        craft.fly(0.05)
+    assert not craft.drone.motors_on
+    craft.take(COMMANDER, 0, struct.pack("<fffH", 0.0, 0.0, 0.0, 0))
+    for _ in range(10):
+        craft.take(COMMANDER, 0, struct.pack("<fffH", 0.0, 0.0, 0.0, 55000))
+        craft.fly(0.05)
+    assert craft.drone.motors_on and craft.height > 0.03
+
+
+def test_watchdog_levels_out_and_then_stops(bench):
+    craft = bench(**QUIET)
+    keep(craft, 3.0, HOVER, 0.0, 0.0, 0.0, 0.6)
+    craft.take(GENERIC, 0, bytes([HOVER]) + struct.pack("<ffff", 0.4, 0.0, 0.0, 0.6))
+    craft.fly(0.6)
+    assert craft.drone.commander.levelled and craft.drone.motors_on
+    sent = craft.fly(3.0)
+    assert craft.drone.state == LOCKED and not craft.drone.motors_on
+    assert b"".join(p.data for p in sent if p.port == CONSOLE).count(b"Locked, reboot required") == 1
+    keep(craft, 0.5, HOVER, 0.0, 0.0, 0.0, 0.6)
+    assert not craft.drone.motors_on
+
+
+def test_the_high_level_commander_needs_no_radio_and_gives_way(bench):
+    craft = bench(**QUIET)
+    craft.take_off(0.5)
+    craft.fly(5.0)  # nobody speaks to it
+    assert craft.height == pytest.approx(0.5, abs=0.12)
+    keep(craft, 1.0, HOVER, 0.0, 0.0, 0.0, 0.7)
+    assert craft.drone.commander.low_level
+    craft.take(GENERIC, 1, [0, 0, 0, 0, 0])  # set-points end
+    assert craft.high_level("<BBff?f", 8, 0, 0.0, 0.0, True, 2.0) == 0
+    craft.fly(2.5)
+    assert craft.height < 0.03 and not craft.drone.motors_on and craft.drone.state == PRE_FLIGHT
+    craft.fly(2.1)
+    assert not craft.drone.is_flying
+
+
+def bits(craft):
+    answer, = craft.take(SUPERVISOR, 0, [0x0C])
+    assert answer.data[0] == 0x8C
+    return int.from_bytes(answer.data[1:], "little")
+
+
+def test_a_fall_from_high_up_is_a_crash_that_can_be_recovered_from(bench):
+    craft = bench(**QUIET)
+    craft.take_off(0.8)
+    craft.take(GENERIC, 0, [MANUAL, 0, 0])  # too short: ignored
+    craft.fly(0.1)
+    assert craft.height > 0.6
+    for _ in range(60):
+        craft.take(GENERIC, 0, bytes([MANUAL]) + struct.pack("<fffHB", 0.0, 0.0, 0.0, 12000, 0))
+        craft.fly(0.02)
+    assert craft.drone.state == CRASHED and bits(craft) >> 7 & 1 and not bits(craft) & 1
+    craft.take(SUPERVISOR, 1, [2])
+    assert bits(craft) & 0b1011 == 0b1011 and craft.height < 0.05
+    craft.take_off(0.5)
+    assert craft.height > 0.35
+
+
+@pytest.mark.parametrize("port, channel, data", [(SUPERVISOR, 1, [3]), (LOCALIZATION, 1, [3])])
+def test_emergency_stop(bench, port, channel, data):
+    craft = bench(**QUIET)
+    craft.take_off(0.3)
+    craft.take(port, channel, data)
+    craft.fly(1.0)
+    assert not craft.drone.motors_on and craft.height < 0.05 and not bits(craft) & 1
+
+
+def test_versions(bench):
+    craft = bench()
+    assert craft.take(PLATFORM, 1, [0])[0].data == bytes([0, 12, 0, 0, 0])
+    assert craft.take(PLATFORM, 1, [2])[0].data == b"\2CF21"
+    assert craft.take(PLATFORM, 1, [9]) == []
+
+
+def test_the_flight_is_recorded(tmp_path):
+    path = tmp_path / "flight.csv"
+    server = Server("hover", port=0, record=path)
+    for _ in range(150):
+        server._tick(lambda _: None)
+    server.close()
+    server.recorder.write()
+    log = logs.read(path)
+    assert len(log) == 150 and log.meta["scenario"] == "hover"
+    np.testing.assert_allclose(np.diff(log["t_s"]), 0.01, atol=1e-6)
+    with pytest.raises(AirTouchError, match="exists already"):
+        Server("hover", port=0, record=path)
+
+
+@pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]}, {"faults": ["rain=1"]},
+                                   {"faults": ["disconnect=3"]}, {"record": "/nowhere/at/all.csv"}])
+def test_wrong_settings_are_named(wrong):
+    from pathlib import Path
+
+    settings = {"port": 0, **wrong}
+    if "record" in settings:
+        settings["record"] = Path(settings["record"])
+    with pytest.raises(AirTouchError) as error:
+        Server("hover", **settings)
+    assert "\n" not in str(error.value)
+
+
+def test_a_taken_port_is_named():
+    first = Server("hover", port=0)
+    try:
+        with pytest.raises(AirTouchError, match="--port"):
+            Server("hover", port=first.port)
+    finally:
+        first.close()
