@@ -65,6 +65,9 @@ class FakeCraft:
         self.dead_link_at = None
         self.lost.clear()
 
+    def revive(self):
+        pass
+
     def _plan(self, c):
         now = self.clock()
         if self.busy:

@@ -66,7 +66,7 @@ def test_the_drone_is_landed_when_its_pilot_dies(drone, how):
     data, sender = heard(drone, 15.0)
     command, _, height, _, keep_heading, seconds = struct.unpack("<BBff?f", data[1:])
     assert (data[0], command, height, keep_heading, seconds) == (LAND_HEADER, 8, 0.25, True, 4.0)
-    assert heard(drone, 2.0)[0] == data  # it is not answered, so it comes again
+    assert heard(drone, 5.0)[0] == data  # it is not answered, so it comes again
     drone.sendto(bytes([LAND_HEADER, 8, 0, 0, 0]), sender)
     time.sleep(0.3)
     while heard(drone, 0.05)[0]:

@@ -60,7 +60,7 @@ def test_ready_missions_cross_edges_low_enough_to_be_felt():
 
 
 def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
-    with pytest.raises(AirTouchError, match="ready ones: edge, sweep, zig-zag"):
+    with pytest.raises(AirTouchError, match="ready ones: sweep, there-and-back, zig-zag"):
         mission.load("nowhere")
     with pytest.raises(AirTouchError, match="no such scenario file"):
         mission.load(tmp_path / "none.toml")

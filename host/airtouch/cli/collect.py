@@ -34,7 +34,7 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 @click.option("--link-timeout", default=3.0, show_default=True, metavar="S",
               help="Silence after which it lands as soon as it is heard again.")
 @click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
-@click.option("--cache", type=click.Path(path_type=Path), help="Folder for the drone's tables, so that it connects faster.")
+@click.option("--cache", type=click.Path(path_type=Path), help="Folder for the drone's tables, so that it connects faster; ~/.cache/airtouch if left out.")
 @click.option("--yes", "-y", is_flag=True, help="Take off without asking.")
 @click.option("--force", is_flag=True, help="Replace a flight that has the number already.")
 @click.option("--recover", is_flag=True, help="Only finish what killed flights left in --out.")
@@ -46,7 +46,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     """Fly a mission with the drone's high-level commander and log it at 100 Hz.
 
     \b
-    airtouch collect --uri radio://0/80/2M/E7E7E7E7E7 --mission edge --out flights
+    airtouch collect --uri radio://0/80/2M/E7E7E7E7E7 --mission there-and-back --out flights
     airtouch collect --uri udp://127.0.0.1:19850 --mission sweep.toml --out flights   # with `airtouch sitl` running
 
     Ctrl-C lands. Every row is on the disk at once, in NAME_0001.csv.gz.part until the flight is over.
@@ -54,6 +54,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     """
     from airtouch.crazyflie import collect, mission, recorder
     from airtouch.crazyflie.checks import parse_setting
+    from airtouch.crazyflie.drone import default_cache
 
     if recover:
         found, unreadable = recorder.recover(out)
@@ -75,7 +76,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     asked = sys.stdin.isatty() and not yes
     early = 0
     with stopping() as stop:
-        drone = collect.Drone(uri, cache)
+        drone = collect.Drone(uri, cache or default_cache())
         try:
             for flight_number in range(first_number, first_number + flights):
                 ready = collect.make_ready(drone, plan, click.echo) if flight_number == first_number else ready

@@ -14,7 +14,7 @@ from airtouch.cli.replay import screen
 @click.option("--host-detector", is_flag=True,
               help="Run the detector here, from the raw log, though the drone has the app; without the app it always does.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE", help="Set a parameter of the drone first.")
-@click.option("--cache", type=click.Path(path_type=Path), help="Folder for the drone's tables, so that it connects faster.")
+@click.option("--cache", type=click.Path(path_type=Path), help="Folder for the drone's tables, so that it connects faster; ~/.cache/airtouch if left out.")
 def command(uri: str, duration: float | None, host_detector: bool, settings: tuple[str, ...], cache: Path | None) -> None:
     """Show signals, P(over a platform), edges on a map, losses and latency; never flies.
 
@@ -27,12 +27,12 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
     from airtouch.crazyflie import board as boards
     from airtouch.crazyflie import monitor
     from airtouch.crazyflie.checks import parse_setting
-    from airtouch.crazyflie.drone import Drone
+    from airtouch.crazyflie.drone import Drone, default_cache
     from airtouch.crazyflie.intake import Intake
 
     pairs = [parse_setting(text) for text in settings]
     with stopping(quiet=True) as stop:
-        drone = Drone(uri, cache)
+        drone = Drone(uri, cache or default_cache())
         try:
             for name, text in pairs:
                 drone.set_parameter(name, text)

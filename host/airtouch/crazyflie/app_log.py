@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from airtouch.crazyflie.blocks import Block, available
 
 GROUP = "airtouch"
-#: most wanted first; 23 bytes
+#: names as in firmware/app/src/airtouch_app.c; 25 bytes
 WANTED = Block("airtouch", 50, tuple((f"{GROUP}.{name}", kind) for name, kind in (
-    ("probability", "FP16"), ("edges", "uint16_t"), ("edge", "uint8_t"), ("edgeSample", "uint32_t"), ("samples", "uint32_t"),
+    ("prob", "FP16"), ("edges", "uint16_t"), ("edge", "uint8_t"), ("edgeStep", "uint32_t"), ("steps", "uint32_t"),
     ("health", "uint16_t"), ("load", "uint16_t"), ("timeouts", "uint16_t"), ("lost", "uint16_t"), ("dropped", "uint16_t"),
     ("detector", "uint8_t"), ("link", "uint8_t"))))
 KINDS = {1: "entry", 2: "exit"}
@@ -16,8 +16,7 @@ DETECTORS = {0: "FR-CFAR on the STM32", 1: "best on the STM32", 2: "best on the 
 #: appHealth_t of firmware/app
 HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GAP8 fills its window",
           8: "the GAP8 has another model", 16: "a setting was out of range", 32: "no AI-deck: another detector runs",
-          64: "the CPX queue was full", 128: "a step began late", 512: "a log variable is missing"}
-STALLED_S = 0.5
+          64: "the CPX queue was full", 128: "a step began late", 256: "the app stands still", 512: "a log variable is missing"}
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class AppState:
 def block(known: Collection[str]) -> Block | None:
     """The app's block as far as this firmware has it; None without the app."""
     found = available(WANTED, known)
-    return found if any(name == f"{GROUP}.probability" for name in found.names) else None
+    return found if any(name == f"{GROUP}.prob" for name in found.names) else None
 
 
 def state(values: Mapping[str, float]) -> AppState:
@@ -48,6 +47,6 @@ def state(values: Mapping[str, float]) -> AppState:
     faults = [text for bit, text in HEALTH.items() if health & bit]
     if health & 2 and value("timeouts"):
         faults[faults.index(HEALTH[2])] += f" ({int(value('timeouts'))} timeouts)"
-    age = max(value("samples") - value("edgeSample"), 0.0) * 0.01 if f"{GROUP}.edgeSample" in values else 0.0
-    return AppState(value("probability", float("nan")), int(value("edges")), KINDS.get(int(value("edge")), "edge"), age,
+    age = max(value("steps") - value("edgeStep"), 0.0) * 0.01 if f"{GROUP}.edgeStep" in values else 0.0
+    return AppState(value("prob", float("nan")), int(value("edges")), KINDS.get(int(value("edge")), "edge"), age,
                     DETECTORS.get(int(value("detector", -1)), "the app's detector"), value("load"), tuple(faults))

@@ -1,6 +1,8 @@
 """One Crazyflie through cflib: connection, log blocks, parameters, commands, answers. Thin on purpose."""
 
+import contextlib
 import logging
+import os
 import queue
 import struct
 import threading
@@ -16,8 +18,9 @@ from airtouch.crazyflie.checks import representable
 from airtouch.errors import AirTouchError
 
 CONNECT_S = 20.0
-ATTEMPT_S = 4.0  #: a first packet that is lost over UDP is never asked for again
-BLOCK_S = 3.0
+ATTEMPT_S = 2.0  #: without a packet; cflib never asks twice for the first two
+BLOCK_S = 1.5  #: that a log block gets until its first packet
+BLOCK_ATTEMPTS = 6  #: a lost "create" makes the "append" after it fail
 TAKEN_S = 0.1  #: that an app gets to put a parameter right
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
@@ -54,6 +57,21 @@ def cflib_or_error() -> Any:
     return cflib
 
 
+def _usable(cache: Path | None) -> str | None:
+    """The folder as cflib wants it, None where it cannot be made."""
+    try:
+        if cache:
+            cache.mkdir(parents=True, exist_ok=True)
+        return str(cache) if cache else None
+    except OSError:
+        return None
+
+
+def default_cache() -> Path:
+    """Where the tables of known drones are kept, so that the next connection is quick."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airtouch" / "drones"
+
+
 class Drone:
     """A connected drone. `samples` and `answers` fill up from cflib's thread; everything else is called from ours.
 
@@ -69,39 +87,36 @@ class Drone:
         self.lost = threading.Event()
         self.round_trip_s = float("nan")
         self._refusals: queue.SimpleQueue[tuple[int, int]] = queue.SimpleQueue()
-        self._started: set[str] = set()
+        self._configs: dict[str, Any] = {}
+        self._reviving: threading.Thread | None = None
         self._cf: Any = None
         self._open(patience_s)
 
     # connection
 
     def _open(self, patience_s: float) -> None:
-        cflib = cflib_or_error()
+        """Try until a connection stands. One whose packets keep coming may take longer than `patience_s`."""
+        crazyflie = cflib_or_error().crazyflie
         deadline, reason = time.monotonic() + patience_s, "nobody answers there"
         while time.monotonic() < deadline:
-            cf = cflib.crazyflie.Crazyflie(rw_cache=str(self.cache) if self.cache else None)
-            done, failure = threading.Event(), []
-            heard = threading.Event()
-            cf.connected.add_callback(lambda _: done.set())
-            cf.link_established.add_callback(lambda _: heard.set())
-            cf.connection_failed.add_callback(lambda _, text: (failure.append(str(text)), done.set()))
-            cf.connection_lost.add_callback(lambda _, text: (failure.append(str(text)), done.set()))
+            cf = crazyflie.Crazyflie(rw_cache=_usable(self.cache))
+            done, failure, heard_s = threading.Event(), [], [time.monotonic()]
+            cf.connected.add_callback(lambda _, done=done: done.set())
+            for failed in (cf.connection_failed, cf.connection_lost):
+                failed.add_callback(lambda _, text, f=failure, done=done: (f.append(str(text)), done.set()))
+            cf.packet_received.add_callback(lambda _, heard_s=heard_s: heard_s.append(time.monotonic()))
             cf.open_link(self.uri)
             if cf.link is not None:
                 cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
-            limit = min(deadline, time.monotonic() + ATTEMPT_S)
-            while not done.is_set() and time.monotonic() < limit:
-                done.wait(0.1)
-                if heard.is_set():
-                    limit = deadline
+            while not done.wait(0.05) and time.monotonic() - heard_s[-1] < ATTEMPT_S:
+                del heard_s[:-1]
             if done.is_set() and not failure:
                 self._listen(cf)
                 return
             if failure:
                 reason = failure[0].strip().splitlines()[0]
+                time.sleep(min(0.5, max(deadline - time.monotonic(), 0.0)))
             self._drop(cf)
-            if failure and time.monotonic() + 1.0 < deadline:
-                time.sleep(0.5)
         raise AirTouchError(f"{self.uri}: no connection: {reason}; is the drone on, the radio plugged in and the URI "
                             "right (radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850)?")
 
@@ -125,10 +140,9 @@ class Drone:
 
     def reopen(self, patience_s: float) -> None:
         """Connect anew after the link died, with the same log blocks. Raises AirTouchError if it stays dead."""
-        blocks, self.blocks = self.blocks, []
         self._drop(self._cf)
         self._open(patience_s)
-        for block in blocks:
+        for block in self.blocks:
             self.start(block)
 
     def close(self) -> None:
@@ -204,35 +218,57 @@ class Drone:
 
     def start(self, block: Block) -> None:
         """Have a block logged into `samples`. Raises AirTouchError that says what the drone has against it."""
+        reason = f"log block {block.name}: the drone sends none of it; is the link good?"
+        for _ in range(BLOCK_ATTEMPTS):
+            drain(self._refusals)
+            came = self._configure(block)
+            until = time.monotonic() + BLOCK_S
+            while not came.wait(0.02) and time.monotonic() < until:
+                if not self._refusals.empty():
+                    command, code = self._refusals.get()
+                    reason = (f"log block {block.name} rejected: the drone could not {LOG_COMMANDS[command]} it: "
+                              f"{LOG_ERRORS.get(code, f'error {code}')}")
+                    break
+            if came.is_set():
+                if block not in self.blocks:
+                    self.blocks.append(block)
+                return
+        raise AirTouchError(reason)
+
+    def _configure(self, block: Block) -> threading.Event:
+        """Ask for the block under a new number; the event is set by its first packet. An older one is given up."""
         from cflib.crazyflie.log import LogConfig
 
-        while not self._refusals.empty():
-            self._refusals.get()
-        config = LogConfig(block.name, block.period_ms)
+        config, came = LogConfig(block.name, block.period_ms), threading.Event()
         for name, kind in block.variables:
             config.add_variable(name, kind)
-        started = threading.Event()
-        config.started_cb.add_callback(lambda _, on: started.set() if on else None)
-        config.data_received_cb.add_callback(
-            lambda stamp, values, _: self.samples.put(Sample(block.name, stamp, time.monotonic(), values)))
+
+        def take(stamp: int, values: dict[str, float], _: Any) -> None:
+            if self._configs.get(block.name) is not config:
+                config.delete()
+                return
+            came.set()
+            self.samples.put(Sample(block.name, stamp, time.monotonic(), values))
+
+        config.data_received_cb.add_callback(take)
+        self._configs[block.name] = config
         try:
             self._cf.log.add_config(config)
             config.start()
         except (KeyError, AttributeError) as error:
             raise AirTouchError(f"log block {block.name}: {str(error).strip(chr(39))}") from None
-        deadline = time.monotonic() + BLOCK_S
-        while not started.wait(0.05):
-            self._raise_refusal(block)
-            if time.monotonic() > deadline:
-                raise AirTouchError(f"log block {block.name}: the drone does not answer; is the link good?")
-        self._raise_refusal(block)
-        self.blocks.append(block)
+        return came
 
-    def _raise_refusal(self, block: Block) -> None:
-        if not self._refusals.empty():
-            command, code = self._refusals.get()
-            what = LOG_ERRORS.get(code, f"error {code}")
-            raise AirTouchError(f"log block {block.name} rejected: the drone could not {LOG_COMMANDS[command]} it: {what}")
+    def revive(self) -> None:
+        """Ask for the log blocks again, in the background: the firmware forgets them when the link is down for 1 s."""
+        if self._reviving is None or not self._reviving.is_alive():
+            self._reviving = threading.Thread(target=self._revive, daemon=True)
+            self._reviving.start()
+
+    def _revive(self) -> None:
+        for block in list(self.blocks):
+            with contextlib.suppress(AirTouchError):
+                self.start(block)
 
     def _on_log_setting(self, packet: Any) -> None:
         if len(packet.data) >= 3 and packet.data[0] in LOG_COMMANDS and packet.data[2] not in (0, 17):

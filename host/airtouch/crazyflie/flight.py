@@ -19,6 +19,7 @@ from airtouch.errors import AirTouchError
 TURN_S = 0.02  #: of the loop
 PING_S = 0.5
 LINK_TIMEOUT_S = 3.0  #: of silence, then it lands as soon as it is heard again
+FORGOTTEN_S = 1.0  #: of silence, then the firmware has forgotten the log blocks
 GIVE_UP_S = 60.0  #: without an answer to the land command
 AFTER_S = 0.5  #: of log after the motors stopped
 BATTERY_SAMPLES = 100
@@ -39,6 +40,9 @@ class Craft(Protocol):
 
     def reopen(self, patience_s: float) -> None:
         """Connect anew; AirTouchError if that fails."""
+
+    def revive(self) -> None:
+        """Ask for the log again; the drone may have forgotten it."""
 
 
 @dataclass
@@ -79,6 +83,8 @@ class Flight:
                     landing_since = wall
                 if self.craft.lost.is_set():
                     self._reconnect()
+                elif silence > FORGOTTEN_S:
+                    self.craft.revive()
                 self.craft.send(self.pilot.step(self._now(silence), wall, silence))
                 if wall - last_ping > PING_S:
                     self.craft.ping()

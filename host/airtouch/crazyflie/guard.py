@@ -1,8 +1,8 @@
 """A process of its own that lands the drone when the one that flies it dies without having landed.
 
 The high-level commander would hover until the battery is empty. `python -m airtouch.crazyflie.guard URI
-HEIGHT SECONDS` waits on its standard input: a line "landed" ends it; the end of the input without it means
-that the flying process is gone, and land commands go out until one is answered.
+HEIGHT SECONDS` waits on its standard input, whose end means that the flying process is gone: land commands go
+out until one is answered. After a landing the flying process ends it.
 """
 
 import contextlib
@@ -41,17 +41,11 @@ def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
     try:
         yield guard
     finally:
-        try:
-            if guard.landed:
-                process.stdin.write(b"landed\n")
-            process.stdin.close()
-        except OSError:
-            pass  # it is gone itself
         if guard.landed:
-            try:
-                process.wait(5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
+            process.kill()
+        process.stdin.close()
+        if guard.landed:
+            process.wait()
 
 
 def land(uri: str, height_m: float, seconds: float, patience_s: float = PATIENCE_S) -> bool:
@@ -88,17 +82,16 @@ def _answered(link: object) -> bool:
 
 
 def main() -> None:
-    """Wait for the word or for the end; what landing needs is loaded before."""
+    """Wait for the end of the input; what landing needs is loaded before."""
     from airtouch.crazyflie.drone import cflib_or_error
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     cflib_or_error()
-    if sys.stdin.readline().strip() != "landed":
-        uri, height, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-        done = land(uri, height, seconds)
-        print(f"airtouch: the flying process is gone; {'landing' if done else 'NO CONTACT, land by hand'}",
-              file=sys.stderr)
+    sys.stdin.read()
+    uri, height, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+    done = land(uri, height, seconds)
+    print(f"airtouch: the flying process is gone; {'landing' if done else 'NO CONTACT, land by hand'}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import numpy as np
 from airtouch.crazyflie import app_log, blocks
 from airtouch.crazyflie.board import Board, Felt, Link
 from airtouch.crazyflie.drone import Drone, Sample, drain
+from airtouch.crazyflie.flight import FORGOTTEN_S
 from airtouch.crazyflie.host_detector import HostDetector, with_gaps
 from airtouch.crazyflie.intake import Intake
 from airtouch.crazyflie.ticks import Restarted
@@ -119,6 +120,9 @@ def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
             monitor.intake = Intake(monitor.intake.slow)
             monitor._before_ms = None
             continue
+        heard = monitor.intake.last_arrival_s
+        if heard is not None and time.monotonic() - heard > FORGOTTEN_S:
+            drone.revive()
         if time.monotonic() - pinged > PING_S:
             drone.ping()
             pinged = time.monotonic()
