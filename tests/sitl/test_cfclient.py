@@ -1,0 +1,68 @@
+"""The library code of cfclient, unmodified and without a display, in a process of its own.
+
+Its headless client with a gamepad that we move, the reader of its log configurations and the
+writer of log files. Windows and tabs (cfclient.ui) need a display and are not started.
+"""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from airtouch.sitl import serve
+
+SCRIPT = r"""
+import datetime, json, pathlib, sys, time
+import cfclient
+from cfclient.headless import HeadlessClient
+from cfclient.utils.logconfigreader import LogConfigReader
+from cfclient.utils.logdatawriter import LogWriter
+
+def wait_for(condition):
+    end = time.monotonic() + 20.0
+    while not condition():
+        if time.monotonic() > end:
+            raise SystemExit("it did not happen")
+        time.sleep(0.01)
+
+client = HeadlessClient()
+cf, reader = client._cf, LogConfigReader(client._cf)
+client.connect_crazyflie(sys.argv[1])
+wait_for(lambda: cf.param.is_updated)
+block = next(b for b in reader.getLogConfigs() if b.name == "stabilizer")
+assert block.valid  # the reader has given it to the drone's table of contents
+writer = LogWriter(block, datetime.datetime.now())
+writer.start()
+rows = []
+block.data_received_cb.add_callback(lambda stamp, values, _: rows.append(values))
+block.start()
+wait_for(lambda: len(rows) > 20)
+writer.stop()
+# a gamepad's assisted mode, then its thrust after it was zero
+client._jr.assisted_control_updated.call(False)
+wait_for(lambda: cf.param.get_value("flightmode.althold") == "0")
+for thrust in [0] * 5 + [55000] * 40:
+    client._jr.input_updated.call(0.0, 0.0, 0.0, thrust)
+    time.sleep(0.01)
+files = [path.read_text() for path in (pathlib.Path(cfclient.config_path) / "logdata").rglob("*.csv")]
+print(json.dumps({"names": sorted(rows[0]), "files": files}), file=sys.stderr)
+cf.close_link()
+"""
+
+
+def test_headless_client_log_configurations_and_log_files(tmp_path):
+    pytest.importorskip("cfclient")
+    environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"}
+    with serve("hover", port=0, without=["gust"]) as virtual:
+        done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri], env=environment, timeout=60,
+                              capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[-2000:]
+        assert virtual.drone.took_off_s is not None
+    told = json.loads(done.stderr.strip().splitlines()[-1])
+    assert told["names"] == ["stabilizer.pitch", "stabilizer.roll", "stabilizer.yaw"]
+    header, *lines = told["files"][0].splitlines()
+    assert header == "Timestamp,stabilizer.roll,stabilizer.pitch,stabilizer.yaw"
+    stamps = [int(line.split(",")[0]) for line in lines]
+    assert len(stamps) > 15 and {b - a for a, b in zip(stamps, stamps[1:])} == {20}
