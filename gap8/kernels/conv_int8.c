@@ -49,22 +49,35 @@ static convPlan_t plan(const jobInt8_t *job) {
                       .outputs = last->outRows * last->outColumns, .outColumns = last->outColumns};
 }
 
+enum { PIECE = 16 };  // bytes that are copied at once
+
 // One patch: pieces of rows of the input, one after the other, each a multiple of four bytes.
 static void copyWords(const int8_t *from, int8_t *to, int32_t rows, int32_t span, int32_t rowStride) {
   for (; rows > 0; rows--, from += rowStride - span) {
-    for (int32_t left = span; left > 0; left -= 4, from += 4, to += 4) {
+    int32_t left = span;
+    for (; left >= PIECE; left -= PIECE, from += PIECE, to += PIECE) {
+      memcpy(__builtin_assume_aligned(to, 4), __builtin_assume_aligned(from, 4), PIECE);
+    }
+    for (; left > 0; left -= 4, from += 4, to += 4) {
       memcpy(__builtin_assume_aligned(to, 4), __builtin_assume_aligned(from, 4), 4);
     }
   }
 }
 
+// The same for pieces of one byte.
+static void copySingles(const int8_t *from, int8_t *to, int32_t rows, int32_t rowStride) {
+  do {
+    *to++ = *from;
+    from += rowStride;
+  } while (--rows > 0);
+}
+
 // The same for pieces of any length.
 static void copyBytes(const int8_t *from, int8_t *to, int32_t rows, int32_t span, int32_t rowStride) {
-  for (; rows > 0; rows--, from += rowStride - span) {
-    int32_t left = span;
-    do {
-      *to++ = *from++;
-    } while (--left > 0);
+  for (; rows > 0; rows--, from += rowStride) {
+    for (int32_t i = 0; i < span; i++) {
+      *to++ = from[i];
+    }
   }
 }
 
@@ -77,6 +90,8 @@ static void gather(const convPlan_t *p, convPlace_t *at, int32_t count, int8_t *
     for (int32_t i = p->area; i > 0; i--, from += p->next, patches += CONV_MAX_FILTER) {
       if (words) {
         copyWords(from, patches, rows, p->span, p->rowStride);
+      } else if (p->span == 1) {
+        copySingles(from, patches, rows, p->rowStride);
       } else {
         copyBytes(from, patches, rows, p->span, p->rowStride);
       }
@@ -115,17 +130,17 @@ ALWAYS_INLINE void write(int8_t *to, int32_t channels, requantiser_t r, int32_t 
 // A last channel without a partner is done twice.
 ALWAYS_INLINE void densePairs(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t pair, int32_t end,
                               int32_t lanes, int32_t area) {
-  const layerInt8_t *layer = p->layer;
+  const layerInt8_t layer = *p->layer;  // a copy: the bytes written here might alias it
   const outputRange_t range = p->range;
-  const int32_t channels = layer->outChannels, filter = p->filter;
+  const int32_t channels = layer.outChannels, filter = p->filter;
   for (; pair < end; pair++) {
     const int32_t one = 2 * pair;
     const int32_t two = one + 1 < channels ? one + 1 : one;
     const int8_t *x = patches;
-    const int8_t *a = layer->weights + one * filter;
-    const int8_t *b = layer->weights + two * filter;
-    int32_t a0 = layer->bias[one], a1 = a0, a2 = a0, a3 = a0;
-    int32_t b0 = layer->bias[two], b1 = b0, b2 = b0, b3 = b0;
+    const int8_t *a = layer.weights + one * filter;
+    const int8_t *b = layer.weights + two * filter;
+    int32_t a0 = layer.bias[one], a1 = a0, a2 = a0, a3 = a0;
+    int32_t b0 = layer.bias[two], b1 = b0, b2 = b0, b3 = b0;
     int32_t units = filter / UNIT;
     do {
       const int32_t wa = loadUnit(a), wb = loadUnit(b);
@@ -151,8 +166,8 @@ ALWAYS_INLINE void densePairs(const convPlan_t *p, const int8_t *patches, int8_t
       a += UNIT;
       b += UNIT;
     } while (--units > 0);
-    write(to + one, channels, requantiser(layer, one, range), lanes, area, a0, a1, a2, a3);
-    write(to + two, channels, requantiser(layer, two, range), lanes, area, b0, b1, b2, b3);
+    write(to + one, channels, requantiser(&layer, one, range), lanes, area, a0, a1, a2, a3);
+    write(to + two, channels, requantiser(&layer, two, range), lanes, area, b0, b1, b2, b3);
   }
 }
 

@@ -58,7 +58,7 @@ static inline requantiser_t requantiser(const layerInt8_t *layer, int32_t channe
 // falls with a rising accumulator, so that the largest of several may be taken before it.
 static inline int8_t requantise(requantiser_t r, int32_t accumulator) {
   int32_t value;
-  if (r.right > 0) {
+  if (__builtin_expect(r.right > 0, 1)) {
     value = roundingShiftRight(roundingDoublingHighMultiply(accumulator, r.multiplier), r.right);
   } else {
     value = roundingDoublingHighMultiply((int32_t)((uint32_t)accumulator << -r.right), r.multiplier);

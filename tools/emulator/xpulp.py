@@ -9,8 +9,8 @@ product, 34 more for a division. Not in it: waits of eight cores for one memory 
 cache, waking the cluster. A barrier takes BARRIER_CYCLES.
 
 Upstream compilers make no hardware loops; GAP8's compiler does for a loop without a branch inside. `cycles` leaves
-loops as they are; `looped` takes off what a hardware loop saves: the branch back, its penalty and the
-counter, for two instructions of set-up each time that the loop is entered.
+loops as they are; `looped` takes off what a hardware loop saves: the branch back and its penalty, for two
+instructions of set-up each time that the loop is entered.
 """
 
 from collections.abc import Callable, Sequence
@@ -105,7 +105,7 @@ class XpulpMachine(Machine):
             if at != last + 1:
                 cost += 2
                 if at in self._innermost.get(last, ()):
-                    self._saved += 4  # the branch, its penalty, the counter
+                    self._saved += 3  # the branch and its penalty
             elif last in self._innermost:
                 self._saved -= 2
         if self._loaded and uses & (1 << self._loaded):
