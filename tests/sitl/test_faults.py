@@ -14,14 +14,14 @@ from airtouch.sitl.packet import CONSOLE, LOG, PARAM, Packet
 
 
 @pytest.mark.parametrize("text, fault", [
-    ("loss=0.3", Fault("loss", amount=0.3)), ("loss=0.3,streams", Fault("loss", amount=0.3, streams_only=True)),
+    ("loss=0.3", Fault("loss", amount=0.3)), ("loss=0.3,all", Fault("loss", amount=0.3, everything=True)),
     ("late=50ms", Fault("late", amount=0.05)), ("disconnect=3,5s", Fault("disconnect", 3.0, 5.0)),
     ("gap8-reset=2.5s", Fault("gap8-reset", 2.5)), ("low-battery=start", Fault("low-battery"))])
 def test_written_faults(text, fault):
     assert parse(text) == fault
 
 
-@pytest.mark.parametrize("text", ["", "loss", "loss=1", "loss=nan", "loss=0.3,all", "late=-1s", "late=1,2",
+@pytest.mark.parametrize("text", ["", "loss", "loss=1", "loss=nan", "loss=0.3,some", "late=-1s", "late=1,2",
                                   "disconnect=3", "gap8-reset=", "low-battery=soon", "late=1e99s"])
 def test_badly_written_faults_are_named(text):
     with pytest.raises(AirTouchError):
@@ -30,7 +30,7 @@ def test_badly_written_faults_are_named(text):
 
 def test_a_lossy_line_loses_that_share():
     log, answer = Packet(LOG, 2, b"1234"), Packet(PARAM, 1, b"123")
-    for fault, kept in (("loss=0.3", (0.7, 0.7)), ("loss=0.3,streams", (0.7, 1.0))):
+    for fault, kept in (("loss=0.3", (0.7, 1.0)), ("loss=0.3,all", (0.7, 0.7))):
         for packet, share in zip((log, answer), kept):
             line = Line([parse(fault)], np.random.default_rng(0))
             for _ in range(5000):
@@ -98,7 +98,7 @@ def test_low_battery(bench):
 
 
 def test_lost_samples_can_be_counted(cflib):
-    with serve("hover", port=0, speed=5.0, faults=["loss=0.3,streams"]) as virtual, connected(virtual.uri) as cf:
+    with serve("hover", port=0, speed=5.0, faults=["loss=0.3"]) as virtual, connected(virtual.uri) as cf:
         rows = []
         log_block(cf, "one", 10, {"pm.vbat": "float"}, rows)
         wait_for(lambda: rows and rows[-1][0] - rows[0][0] > 8000)

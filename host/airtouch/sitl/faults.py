@@ -1,13 +1,13 @@
 """Faults to order: what goes wrong, when, and for how long.
 
-    loss=0.3          each packet is lost with this probability, both ways
-    loss=0.3,streams  only what nobody waits for: log data, console, set-points (as over a radio,
-                      whose acknowledgements bring everything else through)
-    late=50ms         packets are up to so late, in order, both ways
-    disconnect=T,5s   no packet passes for 5 s
-    gap8-reset=T      the GAP8 restarts
-    gap8-silent=T     the GAP8 never answers again
-    low-battery=T     the battery is nearly empty
+    loss=0.3         this share is lost, both ways, of what nobody waits for: log data, console,
+                     set-points, pings (over a radio, acknowledgements bring the rest through)
+    loss=0.3,all     of every packet
+    late=50ms        packets are up to so late, in order, both ways
+    disconnect=T,5s  no packet passes for 5 s
+    gap8-reset=T     the GAP8 restarts
+    gap8-silent=T    the GAP8 never answers again
+    low-battery=T    the battery is nearly empty
 
 T is in seconds after take-off (`3` or `3s`), or `start` for at once.
 """
@@ -27,7 +27,7 @@ from airtouch.sitl.packet import Packet
 KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms", "disconnect": "when and how long, as disconnect=3,5s",
          "gap8-reset": "when, as gap8-reset=3", "gap8-silent": "when, as gap8-silent=3",
          "low-battery": "when, as low-battery=3"}
-STREAMS = "streams"
+ALL = "all"
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Fault:
     kind: str
     at_s: float = -math.inf
     amount: float = 0.0
-    streams_only: bool = False
+    everything: bool = False
 
 
 def parse(text: str) -> Fault:
@@ -49,9 +49,9 @@ def parse(text: str) -> Fault:
     try:
         if kind == "loss":
             share = float(parts[0])
-            if not 0.0 <= share < 1.0 or parts[1:] not in ([], [STREAMS]):
+            if not 0.0 <= share < 1.0 or parts[1:] not in ([], [ALL]):
                 raise ValueError
-            return Fault(kind, amount=share, streams_only=len(parts) > 1)
+            return Fault(kind, amount=share, everything=len(parts) > 1)
         if kind == "late" and len(parts) == 1:
             return Fault(kind, amount=seconds(parts[0]))
         if len(parts) == (2 if kind == "disconnect" else 1):
@@ -94,7 +94,7 @@ class Line:
 
     def put(self, packet: Packet, peer: object, now_s: float) -> None:
         """Send a packet to or from `peer`."""
-        if any(self._rng.random() < f.amount for f in self._loss if not f.streams_only or is_stream(packet)):
+        if any(self._rng.random() < f.amount for f in self._loss if f.everything or is_stream(packet)):
             self.lost += 1
             return
         due = now_s

@@ -27,6 +27,7 @@ class Firmware:
         items = variables.log_items(table)
         self.log = LogService(items, variables.reader(table, items, drone))
         self.param = ParamService(variables.parameters(drone, ai_deck), self._changed)
+        self.printed: list[str] = []  #: on the console in the last tick
         self._fed_s: float | None = None
 
     def say(self, text: str) -> None:
@@ -39,12 +40,10 @@ class Firmware:
             self._fed_s = None
             self.drone.stop()
         self.drone.step()
-        packets = []
-        while self.drone.messages:
-            text = self.drone.messages.pop(0).encode() + b"\n"
-            packets += [Packet(crtp.CONSOLE, 0, text[i:i + crtp.MOST_DATA])
-                        for i in range(0, len(text), crtp.MOST_DATA)]
-        return packets + self.log.due(self.drone.now_ms)
+        self.printed, self.drone.messages = self.drone.messages, []
+        text = "".join(line + "\n" for line in self.printed).encode()
+        console = [Packet(crtp.CONSOLE, 0, text[i:i + crtp.MOST_DATA]) for i in range(0, len(text), crtp.MOST_DATA)]
+        return console + self.log.due(self.drone.now_ms)
 
     def take(self, packet: Packet) -> list[Packet]:
         """Answers to any packet; unknown ports and what is too short are ignored."""

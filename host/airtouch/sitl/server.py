@@ -103,11 +103,11 @@ class Server:
         drone = self.drone
         self._exchange(drone.now_s)
         self._begin_faults(drone.now_s)
-        for line in drone.messages:
-            told(line)
         for packet in self.firmware.tick():
             if self.client:
                 self._down.put(packet, self.client, drone.now_s)
+        for line in self.firmware.printed:
+            told(line)
         if self.recorder:
             self.recorder.add(drone.row)
         self._exchange(drone.now_s)
