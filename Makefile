@@ -32,8 +32,8 @@ bench: setup  ## time the kernels and the simulator against their peers, as rati
 firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [CONFIG=app-config-tap]
 	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)"
 
-gap8:  ## build the GAP8 app: GAP_SDK_HOME=...
-	@sh gap8/app/build.sh "$(GAP_SDK_HOME)"
+gap8:  ## build the GAP8 app: GAP_SDK_HOME=... AIDECK=...
+	@sh gap8/app/build.sh "$(GAP_SDK_HOME)" "$(AIDECK)"
 
 flash: setup  ## check and flash an image: IMAGE=... [URI=radio://...]
 	$(BIN)/airtouch flash "$(or $(IMAGE),build/firmware/firmware/app/build/cf2.bin)" $(if $(URI),--uri "$(URI)")

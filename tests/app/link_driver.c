@@ -233,7 +233,7 @@ static int stepLink(const world_t *world, int step, script_t *script, int *packe
       continue;
     }
     if (fate % 64 == 62) {
-      gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork);
+      gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
       *wasReset = true;
     }
     linkSenderSent(&sender, true);
@@ -259,7 +259,7 @@ static void runScript(const uint8_t *data, size_t length, int *slowest) {
   edgeLinkDigest(sha, digest);
   const uint16_t window = isPaper ? AIRTOUCH_MODEL_ROWS : streamWindow(&airtouchStream);
   up.count = down.count = 0;
-  gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork);
+  gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
   linkSenderInit(&sender, isPaper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, (uint16_t)(window + 1), 7, 250);
   int packets = 0, step = 0;
   bool wasReset = false;

@@ -27,6 +27,25 @@ static void resetWindow(void *context) {
   window->oldest = 0;
 }
 
+/** One core's part of the windowed network. */
+static void shareWindow(void *argument) {
+  gap8Window_t *window = argument;
+  const gap8Team_t *team = window->team;
+  const teamInt8_t mine = {.core = team->core(), .cores = team->cores, .barrier = team->barrier};
+  const int8_t *logits = networkInt8RunTeam(window->network, window->quantised, window->arena, &mine);
+  if (mine.core == 0) {
+    window->logits = logits;
+  }
+}
+
+static void runWindow(gap8Window_t *window) {
+  if (window->team != NULL) {
+    window->team->fork(shareWindow, window);
+  } else {
+    window->logits = networkInt8Run(window->network, window->quantised, window->arena);
+  }
+}
+
 static bool stepWindow(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_BYTES],
                        int8_t output[EDGE_LINK_OUTPUTS]) {
   gap8Window_t *window = context;
@@ -42,13 +61,14 @@ static bool stepWindow(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_BYTE
   memcpy(window->window + tail, window->ring, (size_t)(GAP8_VALUES - tail) * sizeof(float));
   zScoreWindow(window->window, AIRTOUCH_MODEL_ROWS, AIRTOUCH_MODEL_COLUMNS, window->window);
   networkInt8Quantise(window->network, window->window, GAP8_VALUES, window->quantised);
-  const int8_t *logits = networkInt8Run(window->network, window->quantised, window->arena);
-  memcpy(output, logits, AIRTOUCH_MODEL_OUTPUTS);
+  runWindow(window);
+  memcpy(output, window->logits, AIRTOUCH_MODEL_OUTPUTS);
   return true;
 }
 
-void gap8CoreInit(gap8Core_t *core, const streamInt8_t *stream, const networkInt8_t *window) {
+void gap8CoreInit(gap8Core_t *core, const streamInt8_t *stream, const networkInt8_t *window, const gap8Team_t *team) {
   memset(core, 0, sizeof *core);
+  core->window.team = team;
   core->stream.network = stream;
   core->window.network = window;
   core->networks[0] = (linkNetwork_t){.context = &core->stream,

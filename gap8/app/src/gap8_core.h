@@ -2,7 +2,7 @@
  * @file gap8_core.h
  * Everything that the GAP8 app does, without an operating system: packets from the STM32 in,
  * networks, packets for the STM32 out. The PMSIS app (main.c) gives it CPX, the cluster and a clock;
- * tests give it a byte pipe. No heap, no global; about 15 kB, so that it lies in L1.
+ * tests give it a byte pipe. No heap, no global; about 11 kB, so that it lies in L1.
  */
 #pragma once
 
@@ -23,9 +23,19 @@ typedef struct {
   _Alignas(4) int8_t arena[AIRTOUCH_STREAM_ARENA_BYTES];
 } gap8Stream_t;
 
+/** The cores that share the windowed network. */
+typedef struct {
+  void (*fork)(void (*work)(void *argument), void *argument);  ///< runs work on all of them; returns when all have
+  int32_t (*core)(void);                                       ///< the one that calls: 0 to cores - 1
+  void (*barrier)(void *unused);                               ///< returns once all have called it
+  int32_t cores;
+} gap8Team_t;
+
 /** The windowed network and the last features. */
 typedef struct {
   const networkInt8_t *network;
+  const gap8Team_t *team;
+  const int8_t *logits;  ///< of the last run, in the arena
   float ring[GAP8_VALUES];  ///< rows of features, the oldest at `oldest`
   float window[GAP8_VALUES];
   int32_t oldest;
@@ -46,8 +56,9 @@ typedef struct {
  * Sets the app up, as after a reset of the GAP8.
  * @param stream  the network of `best`, in the memory where it shall be read
  * @param window  the network of `paper`; both as exported, and they must outlive the core
+ * @param team    the cores that share it, NULL for the calling one alone; must outlive the core
  */
-void gap8CoreInit(gap8Core_t *core, const streamInt8_t *stream, const networkInt8_t *window);
+void gap8CoreInit(gap8Core_t *core, const streamInt8_t *stream, const networkInt8_t *window, const gap8Team_t *team);
 
 /**
  * Takes a packet from the STM32: any bytes of any length.

@@ -33,7 +33,7 @@ void appHostSent(void *core, int taken) { appCoreSent(core, taken != 0); }
 
 void appHostTime(void *core, uint32_t microseconds, int late) { appCoreTime(core, microseconds, late != 0); }
 
-void gap8HostInit(void *core) { gap8CoreInit(core, &airtouchStream, &airtouchNetwork); }
+void gap8HostInit(void *core) { gap8CoreInit(core, &airtouchStream, &airtouchNetwork, NULL); }
 
 uint16_t gap8HostTake(void *core, const uint8_t *bytes, uint16_t length, uint8_t *reply) {
   return gap8CoreTake(core, bytes, length, reply);

@@ -1,0 +1,2 @@
+#pragma once
+void pi_bsp_init(void);
