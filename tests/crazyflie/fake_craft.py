@@ -1,12 +1,11 @@
 """A craft without a radio: the planner of the high-level commander, a point that follows it, log packets.
 
-Its clock runs `speed` times faster than the host's. It answers as crtp_commander_high_level.c and planner.c do.
+Time is its own: `sleep` makes it pass. It answers as crtp_commander_high_level.c and planner.c do.
 """
 
 import queue
 import random
 import threading
-import time
 
 from airtouch.crazyflie import blocks
 from airtouch.crazyflie.drone import Sample
@@ -19,10 +18,10 @@ PLAN_IDLE, PLAN_FLYING, PLAN_LANDING = "idle", "flying", "landing"
 class FakeCraft:
     """See `airtouch.crazyflie.flight.Craft`."""
 
-    def __init__(self, speed=40.0, loss=0.0, silent=(), volts=4.0, busy=False, dead_link_at=None, restart_at=None,
+    def __init__(self, loss=0.0, silent=(), volts=4.0, busy=False, dead_link_at=None, restart_at=None,
                  platform=(1.0, 2.0), seed=1):
         self.samples, self.answers, self.lost = queue.SimpleQueue(), queue.SimpleQueue(), threading.Event()
-        self.speed, self.loss, self.silent, self.volts, self.busy = speed, loss, silent, volts, busy
+        self.loss, self.silent, self.volts, self.busy = loss, silent, volts, busy
         self.dead_link_at, self.restart_at, self.platform = dead_link_at, restart_at, platform
         self.heard: list = []  #: commands that reached it: (drone's clock, command)
         self.random = random.Random(seed)
@@ -30,17 +29,23 @@ class FakeCraft:
         self.at = [0.0, 0.0, 0.0]
         self.crashed = False
         self.reopened = 0
-        self._began, self._next, self._pending = time.monotonic(), 0, []
-        self._lock = threading.Lock()
-        self._thread = threading.Thread(target=self._serve, daemon=True)
-        self._thread.start()
+        self.now, self._next = 0.0, 0
 
     @property
     def flying(self):
         return self.state != PLAN_IDLE
 
     def clock(self):
-        return (time.monotonic() - self._began) * self.speed
+        return self.now
+
+    def sleep(self, seconds):
+        """Time passes: packets come, the link may break."""
+        self.now += seconds
+        if self.dead_link_at is not None and self.now > self.dead_link_at:
+            self.lost.set()
+        while self._next * 0.01 <= self.now:
+            self._packet(self._next)
+            self._next += 1
 
     def _out_of_reach(self):
         return any(a <= self.clock() < b for a, b in self.silent)
@@ -49,9 +54,8 @@ class FakeCraft:
         for command in commands:
             if self.lost.is_set() or self._out_of_reach() or self.random.random() < self.loss:
                 continue
-            with self._lock:
-                self.heard.append((self.clock(), command))
-                code = self._plan(command)
+            self.heard.append((self.now, command))
+            code = self._plan(command)
             if self.random.random() >= self.loss:
                 self.answers.put((command.kind, code))
 
@@ -101,17 +105,6 @@ class FakeCraft:
             if share == 1.0 and self.state == PLAN_LANDING:
                 self.state = PLAN_IDLE
 
-    def _serve(self):
-        while True:
-            with self._lock:
-                now = self.clock()
-                if self.dead_link_at is not None and now > self.dead_link_at:
-                    self.lost.set()
-                while self._next * 0.01 <= now:
-                    self._packet(self._next)
-                    self._next += 1
-            time.sleep(0.002)
-
     def _packet(self, index):
         t = index * 0.01
         self._move(t)
@@ -127,9 +120,9 @@ class FakeCraft:
                   "gyro.x": self.random.random(), "gyro.y": 0.0, "gyro.z": 0.0, "range.zrange": int(1000 * down),
                   "pm.vbat": self.volts - 0.3 * self.flying}
         values |= {f"motor.m{i}": pwm for i in range(1, 5)}
-        self.samples.put(Sample(blocks.MOTION.name, stamp % (1 << 24), time.monotonic(), values))
+        self.samples.put(Sample(blocks.MOTION.name, stamp % (1 << 24), self.now, values))
         if index % 5 == 0:
             slow = {name: 0 for name in blocks.STATE.names}
             slow |= {f"stateEstimateZ.{a}": int(1000 * v) for a, v in zip("xyz", self.at)}
             slow |= {"stateEstimateZ.quat": 3 << 30, "supervisor.info": 0b11111}
-            self.samples.put(Sample(blocks.STATE.name, stamp % (1 << 24), time.monotonic(), slow))
+            self.samples.put(Sample(blocks.STATE.name, stamp % (1 << 24), self.now, slow))

@@ -69,13 +69,14 @@ def height(virtual):
     return virtual.drone.row[loop.PLACE + 2]
 
 
-def test_a_sweep_is_flown_logged_and_listed(hop, cache, tmp_path):
+def test_sweeps_are_flown_logged_and_listed(hop, cache, tmp_path):
     with serve(hop, port=0, speed=SPEED) as virtual:
-        shown = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1")
+        shown = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
         assert shown.exit_code == 0, shown.output
         assert on_the_ground(virtual)
-    log = logs.read(tmp_path / "hop_0001.csv.gz")
-    assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and shown.output.count("\ntrue ") == 2
+    assert logs.read(tmp_path / "hop_0005.csv.gz").meta["ended"] == "as planned"
+    log = logs.read(tmp_path / "hop_0004.csv.gz")
+    assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and shown.output.count("\ntrue ") == 4
     assert log.meta["lost_samples"] == 0 and log.meta["mission"] == "hop" and log.meta["decks"][:2] == ["bcAI", "bcFlow2"]
     assert log.meta["settings"] == ["airtouch.detector=1"] and log.meta["acc_frame"] == "body"
     entry, leave = (e.sample for e in logs.true_edges(log))
@@ -84,7 +85,7 @@ def test_a_sweep_is_flown_logged_and_listed(hop, cache, tmp_path):
     assert np.nanmedian(log["acc_z_mps2"][flying]) == pytest.approx(9.8, abs=0.3)
     assert np.isfinite(log.stack(("x_m", "roll_rad", "range_front_m"))[50:]).any(axis=0).all()
     listed = (tmp_path / "manifest.csv").read_text().splitlines()
-    assert listed[1].startswith("hop_0001.csv.gz,clean,1,40mm,") and listed[1].endswith(",0.4")
+    assert listed[1].startswith("hop_0004.csv.gz,clean,4,40mm,") and listed[1].endswith(",0.4")
     assert run("evaluate", tmp_path).exit_code == 0
 
 
@@ -107,7 +108,7 @@ def test_thirty_percent_packet_loss_of_everything(hop, cache, tmp_path):
 
 
 def test_a_connection_is_made_through_losses(hop, cache):
-    with serve(hop, port=0, speed=SPEED, faults=("loss=0.3",)) as virtual:
+    with serve(hop, port=0, speed=SPEED, faults=("loss=0.1",)) as virtual:
         drone = Drone(virtual.uri, cache)
         try:
             drone.start(blocks.MOTION)
@@ -117,12 +118,12 @@ def test_a_connection_is_made_through_losses(hop, cache):
 
 
 def test_a_five_second_drop_in_mid_sweep(hop, cache, tmp_path):
-    with serve(hop, port=0, speed=SPEED, faults=(f"disconnect=4,{5 * SPEED:g}s",)) as virtual:
-        shown = fly(virtual, hop, cache, tmp_path)
+    with serve(hop, port=0, speed=SPEED, faults=("disconnect=4,5s",)) as virtual:
+        shown = fly(virtual, hop, cache, tmp_path, "--link-timeout", 3.0 / SPEED)
         assert shown.exit_code == 1 and "link lost" in shown.output, shown.output
         assert on_the_ground(virtual)
     log = logs.read(tmp_path / "hop_0001.csv.gz")
-    assert log.meta["longest_gap_s"] == pytest.approx(5 * SPEED, abs=6.0) and "link lost" in log.meta["ended"]
+    assert log.meta["longest_gap_s"] == pytest.approx(6.0, abs=2.0) and "link lost" in log.meta["ended"]
     middle = int(np.argmax(np.diff(log["t_s"])))
     assert middle > 300 and len(log) - middle > 100  # before the drop and after it, to the ground
 
@@ -240,18 +241,3 @@ def test_an_interrupted_link_object_is_opened_again(virtual_on_the_ground, cache
         assert len(stamps) > 50 and not drone.lost.is_set() and set(np.diff(stamps)) == {10}
     finally:
         drone.close()
-
-
-def test_flights_go_on_counting_on_one_connection(hop, cache, tmp_path):
-    plan = collect.Plan("", tmp_path, "hop", guarded=False)
-    with serve(hop, port=0, speed=SPEED) as virtual:
-        drone = Drone(virtual.uri, cache)
-        try:
-            ready = collect.make_ready(drone, plan, lambda _: None)
-            for number in (1, 2):
-                outcome = collect.fly(drone, ready, mission.load(hop), plan, number, stop=threading.Event(),
-                                      say=lambda _: None)
-                assert outcome.planned and len(outcome.log) > 800
-        finally:
-            drone.close()
-    assert len((tmp_path / "manifest.csv").read_text().splitlines()) == 3

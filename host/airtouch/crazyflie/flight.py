@@ -21,6 +21,7 @@ PING_S = 0.5
 LINK_TIMEOUT_S = 3.0  #: of silence, then it lands as soon as it is heard again
 FORGOTTEN_S = 1.0  #: of silence, then the firmware has forgotten the log blocks
 GIVE_UP_S = 60.0  #: without an answer to the land command
+DOWN_S = 3.0  #: of a landing after an error
 AFTER_S = 0.5  #: of log after the motors stopped
 BATTERY_SAMPLES = 100
 
@@ -60,6 +61,8 @@ class Flight:
     link_timeout_s: float = LINK_TIMEOUT_S
     show: Callable[["Flight"], None] = lambda _: None
     say: Callable[[str], None] = lambda _: None
+    clock: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], None] = time.sleep
     silences: list[float] = field(default_factory=list)
     landed: bool = False
     _volts: deque = field(default_factory=lambda: deque(maxlen=BATTERY_SAMPLES))
@@ -67,10 +70,10 @@ class Flight:
 
     def run(self) -> str:
         """Fly. Returns how it ended: "as planned", or why it landed early."""
-        began, last_ping, landing_since = time.monotonic(), 0.0, None
+        began, last_ping, landing_since = self.clock(), 0.0, None
         try:
             while self.pilot.phase != "done":
-                wall = time.monotonic()
+                wall = self.clock()
                 if not self._receive():
                     return self._over("the drone restarted in flight")
                 silence = self._silence(wall, began)
@@ -92,7 +95,7 @@ class Flight:
                 if landing_since and self.pilot.waiting and wall - landing_since > GIVE_UP_S:
                     return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
                 self.show(self)
-                time.sleep(TURN_S)
+                self.sleep(TURN_S)
             self._tail()
             return self._over(self.pilot.reason)
         except BaseException:
@@ -157,11 +160,11 @@ class Flight:
 
     def _tail(self) -> None:
         """Half a second more of log, and "stop" once more in case it was lost."""
-        until = time.monotonic() + AFTER_S
-        while time.monotonic() < until:
+        until = self.clock() + AFTER_S
+        while self.clock() < until:
             self._receive()
             self.craft.send([Command("stop")])
-            time.sleep(5 * TURN_S)
+            self.sleep(5 * TURN_S)
         self._receive()
 
     def _bring_down(self) -> None:
@@ -170,14 +173,14 @@ class Flight:
             self.landed = True
             return
         self.say("an error in flight: landing")
-        command = Command("land", z_m=self.pilot.origin.z_m, seconds=3.0)
+        command = Command("land", z_m=self.pilot.origin.z_m, seconds=DOWN_S)
         for _ in range(50):
             try:
                 self.craft.send([command])
-                time.sleep(0.1)
+                self.sleep(0.1)
                 if any(kind == "land" for kind, _ in drain(self.craft.answers)):
                     self.landed = True
-                    time.sleep(command.seconds + 1.0)
+                    self.sleep(command.seconds + 1.0)
                     self.craft.send([Command("stop")])
                     return
             except Exception:  # whatever it is: the guard process lands when this one gives up
