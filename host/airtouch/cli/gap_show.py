@@ -14,6 +14,7 @@ from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 
 PATIENCE_S = 2.0
+MOST_CELLS = 12
 
 
 class Bar:
@@ -43,7 +44,7 @@ class Bar:
 
 def cells(some: Iterable[Cell], title: str) -> Table:
     """The largest cells of a gap map."""
-    some = list(some)
+    some = list(some)[:MOST_CELLS]
     after = any(c.after is not None for c in some)
     table = Table(title=title, title_justify="left", caption_justify="left",
                   caption="90 % intervals; a cell is listed when its interval clears the floor's")

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap import motion
 from airtouch.logs.clock import lost_samples, true_period
-from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, FlightLog
+from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
 from airtouch.logs.resample import resample
 from airtouch.logs.segments import KINDS, segments
 from airtouch.simulation import replay
@@ -19,6 +19,8 @@ from airtouch.vehicle import Vehicle
 PERIOD_S = 0.01
 GROUND = KINDS.index("ground")
 LEAST_AIR_S = 3.0  #: less time in the air than this is not diagnosed
+LARGEST = 1e5  #: no column holds more
+LEAST_GOOD = 0.5  #: part of a column's values that must be there
 CONTACT_S = 0.3  #: left out around the moments at which the vehicle touches the ground
 
 
@@ -63,6 +65,9 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     accelerations, when the clock runs backwards, and when there is no flight in it.
     """
     name, notes, cannot = log.source, [], []
+    log, unfit = _sane(log)
+    if unfit:
+        notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
     for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
         if not log.has(*columns):
             raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
@@ -101,6 +106,19 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     usable = ~lost & ~_near_contact(phase, pwm)
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
                   tuple(notes), tuple(cannot))
+
+
+def _sane(log: FlightLog) -> tuple[FlightLog, list[str]]:
+    """The log without values that cannot be and without columns that have few others; their names."""
+    columns, unfit = {}, []
+    for key, values in log.columns.items():
+        low, high = (-1.0, 66000.0) if key in PWM else (-LARGEST, LARGEST)
+        good = (values >= low) & (values <= high)
+        if len(good) and good.mean() < LEAST_GOOD:
+            unfit += [key] if key not in RANGES else []
+        else:
+            columns[key] = np.where(good, values, np.nan)
+    return FlightLog(columns, log.meta), unfit
 
 
 def _at_100_hz(log: FlightLog, name: str) -> FlightLog:

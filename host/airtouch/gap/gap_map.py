@@ -23,7 +23,6 @@ from airtouch.gap.result import Cell
 from airtouch.gap.spectra import frequencies
 from airtouch.logs.segments import KINDS
 
-MOST_BANDS = 2  #: of one channel and phase among the largest cells
 BASELINE, SPREAD = "baseline flights", "sensor noise and how these flights differ among themselves"
 
 CHANNEL_WORDS = {
@@ -96,13 +95,13 @@ def significant(cell: Cell) -> bool:
     return sure_ratio(cell) > 1.0
 
 
-def largest(cells: Iterable[Cell], count: int = 12) -> list[Cell]:
+def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
     """The significant cells that surely stand out most from their floor, largest first.
 
     Of a channel, band and phase the regime is named in which the gap is significantly
-    larger than in the phase as a whole, if there is one; at most MOST_BANDS bands of one
-    channel and phase.
+    larger than in the phase as a whole, if there is one.
     """
+    cells = list(cells)
     best: dict[tuple, Cell] = {}
     whole = {(c.channel, c.band_hz, c.phase): c for c in cells if c.regime == "all"}
     for c in cells:
@@ -113,11 +112,17 @@ def largest(cells: Iterable[Cell], count: int = 12) -> list[Cell]:
             continue
         if key not in best or sure_ratio(c) > sure_ratio(best[key]):
             best[key] = c
-    chosen: list[Cell] = []
-    for c in sorted(best.values(), key=sure_ratio, reverse=True):
-        if sum((o.channel, o.phase) == (c.channel, c.phase) for o in chosen) < MOST_BANDS:
-            chosen.append(c)
-    return chosen[:count]
+    return sorted(best.values(), key=sure_ratio, reverse=True)[:count]
+
+
+def where(made: GapMap, count: int = 10) -> list[Cell]:
+    """The largest cells, then the largest of each phase, and those from which the effects take most."""
+    chosen = largest(made.cells, count)
+    every = largest(made.cells, len(made.cells))
+    more = [next((c for c in every if c.phase == kind), None) for kind in KINDS]
+    closed = [c for c in every if c.after is not None]
+    more += sorted(closed, key=lambda c: (c.after - c.gap) / max(c.floor_high or c.floor, 1e-12))[:3]
+    return chosen + sorted({c for c in more if c is not None and c not in chosen}, key=sure_ratio, reverse=True)
 
 
 def ratio(cell: Cell) -> float:

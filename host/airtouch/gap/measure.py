@@ -13,8 +13,8 @@ from airtouch.gap import calibrate, twin
 from airtouch.gap.channels import residual
 from airtouch.gap.fit import Study
 from airtouch.gap.flight import GROUND, Flight, ready
-from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, largest, overall,
-                                   part_of)
+from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of,
+                                   where)
 from airtouch.gap.result import Cell, Quantity, rounded
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
@@ -109,7 +109,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         gap["calibrated"] = overall(maps[1].cells)
     notes += [f"{h.parts[0].name}: {n}" for h in found for n in h.notes]
     return Measurement(
-        vehicle.name, maps[0], tuple(largest(maps[0].cells)), gap, maps[0].flights,
+        vehicle.name, maps[0], tuple(where(maps[0])), gap, maps[0].flights,
         tuple(f.name for f in nominal), fitted.parameters if fitted else {},
         _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]), tuple(notes),
         _cannot([h.cannot for h in found]), tuple(left_out))
@@ -157,6 +157,11 @@ def differences(study: Study, nominal: Sequence[Flight]) -> list[str]:
 def _cannot(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
+
+
+def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:
+    """The twin view: mean spectra of the commands, as flown and as nominal flights have them."""
+    return _spectra(*([_command_power(f, vehicle) for f in some] for some in (flights, nominal)))
 
 
 def _command_power(flight: Flight, vehicle: Vehicle) -> np.ndarray:

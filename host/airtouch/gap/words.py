@@ -1,6 +1,6 @@
 """A diagnosis in sentences, for the terminal and the report alike."""
 
-from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, ratio
+from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
 
 LEAST_SHARE = 0.05  #: effects that take less of a cell's gap are not its cause
@@ -51,14 +51,6 @@ def quantity(q: Quantity, form: str = "{:.3g}") -> str:
 def joined(names: list[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
-
-
-def unexplained(diagnosis: Diagnosis) -> list[str]:
-    """The cells that stay well above their floor with the named effects in the model."""
-    left = [c for c in diagnosis.where if (c.gap if c.after is None else c.after) > 1.5 * (c.floor_high or c.floor)]
-    return [in_words(c) if c.after is None else
-            f"{in_words(c)}; after: {c.after:.2g} {c.unit}, {c.after / max(c.floor, 1e-12):.2g} times the floor"
-            for c in sorted(left, key=ratio, reverse=True)]
 
 
 def _shrink(diagnosis: Diagnosis) -> str:

@@ -1,0 +1,167 @@
+"""Bad input: one line that names file, place and remedy, or an answer that says what is missing."""
+
+import json
+
+import numpy as np
+import pytest
+import short_flights
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
+from airtouch.gap.measure import measure
+from airtouch.logs.flight_log import ACC, ACC_WORLD, COLUMNS, GYRO, POSITION, PWM, VELOCITY, FlightLog
+
+VEHICLE = vehicles.load("crazyflie-2.1-flow")
+
+
+@pytest.fixture(scope="module")
+def flown():
+    return short_flights.fly(2)
+
+
+def without(log, *names):
+    return FlightLog({k: v for k, v in log.columns.items() if k not in names}, dict(log.meta))
+
+
+def changed(log, **columns):
+    return log.with_columns(columns)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda log: log.slice(0, 1), "1 samples"),
+    (lambda log: log.slice(0, 260), "no flight in it"),
+    (lambda log: without(log, *PWM), "no motor commands (m1_pwm"),
+    (lambda log: without(log, "m3_pwm"), "no motor commands"),
+    (lambda log: without(log, *ACC, *ACC_WORLD), "no accelerations (acc_x_mps2"),
+    (lambda log: log.with_columns({c: np.zeros(len(log)) for c in PWM}), "no flight in it (0.0 s in the air)"),
+    (lambda log: changed(log, t_s=np.where(np.arange(len(log)) < 700, log["t_s"], log["t_s"] - 3.0)),
+     "sample 700: the clock runs backwards by 2.99"),
+    (lambda log: log.with_columns({c: np.full(len(log), np.nan) for c in PWM}), ""),
+    (lambda log: log.with_columns({c: np.full(len(log), np.nan) for c in ACC + ACC_WORLD if log.has(c)}), ""),
+])
+def test_what_cannot_be_used_is_said_in_one_line(flown, change, words):
+    with pytest.raises(AirTouchError) as error:
+        measure([change(flown[0])], VEHICLE)
+    text = str(error.value)
+    assert words in text and "\n" not in text and flown[0].source in text
+
+
+@pytest.mark.parametrize(("missing", "words", "still"), [
+    (GYRO, "no gyro", "force_x"), (("zrange_m",), "no down range", "torque_x"),
+    (VELOCITY, "no velocity", "force_z"), (("vbat_V", "t_s", *POSITION), None, "torque_z")])
+def test_a_missing_channel_leaves_the_others(flown, missing, words, still):
+    found = measure([without(flown[0], *missing)], VEHICLE)
+    assert any(c.channel == still for c in found.map.cells)
+    assert words is None or any(words in line for line in found.cannot)
+
+
+def test_one_bad_flight_does_not_stop_the_others(flown):
+    found = measure([flown[0].slice(0, 100), flown[1]], VEHICLE)
+    assert len(found.flights) == 1 and len(found.left_out) == 1 and flown[0].source in found.left_out[0]
+    with pytest.raises(AirTouchError, match="no flight that can be used of 2; the first: "):
+        measure([flown[0].slice(0, 100), flown[1].slice(0, 100)], VEHICLE)
+
+
+def test_nothing_at_all():
+    with pytest.raises(AirTouchError, match="no flight that can be used"):
+        measure([], VEHICLE)
+
+
+def test_a_vehicle_file_without_a_parameter_names_it(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\nmass_kg = 0.03\narm_m = 0.04\n')
+    with pytest.raises(AirTouchError, match=r"mine.toml: missing inertia_kg_m2, thrust_of_pwm_n"):
+        vehicles.load(path)
+
+
+def test_inconsistent_baseline_is_said_and_the_measurement_goes_on(flown):
+    """One of two nominal flights carries a bias that the other does not."""
+    other = flown[1].with_columns({a: flown[1][a] + 1.5 for a in ("acc_x_mps2",)})
+    found = measure([flown[0]], VEHICLE, [flown[0], other])
+    note = next(n for n in found.notes if "not consistent" in n)
+    assert "1.5 m/s^2 in forward force" in note and found.map.cells
+    lowest = [c for c in found.map.cells if c.channel == "force_x" and c.band_hz[0] == 0.0 and c.phase == "cruise"]
+    assert all(c.floor > 0.5 for c in lowest)
+
+
+def test_a_baseline_that_cannot_be_used_is_left_out(flown):
+    found = measure([flown[0]], VEHICLE, [flown[1].slice(0, 50)])
+    assert found.baseline == () and len(found.left_out) == 1
+
+
+VALUES = st.one_of(st.floats(-2.0, 2.0), st.sampled_from([np.nan, np.inf, -np.inf, 0.0, 1e300, -1e5, 65535.0, 9.81]))
+
+
+@st.composite
+def tables(draw):
+    n = draw(st.integers(0, 900))
+    names = draw(st.lists(st.sampled_from(COLUMNS), unique=True))
+    if draw(st.booleans()):
+        names = list(dict.fromkeys([*names, *ACC, *PWM]))
+    rng = np.random.default_rng(draw(st.integers(0, 2 ** 32 - 1)))
+    columns = {}
+    for name in names:
+        centre, spread = draw(VALUES), draw(st.sampled_from([0.0, 1.0, 1e4]))
+        with np.errstate(all="ignore"):
+            columns[name] = centre + spread * rng.normal(size=n)
+        if n and draw(st.booleans()):
+            columns[name][rng.integers(0, n, n // 10 + 1)] = draw(VALUES)
+    if "t_s" in columns and draw(st.booleans()):
+        columns["t_s"] = np.arange(n) * draw(st.sampled_from([0.01, 0.002, 0.1, -0.01, 0.0]))
+    return FlightLog(columns, {"source": "random.csv"})
+
+
+@st.composite
+def damages(draw):
+    """What becomes of some columns of a real flight: gone, constant, noise, spiked, or cut short."""
+    kinds = st.sampled_from(["drop", "constant", "noise", "spikes"])
+    columns = draw(st.dictionaries(st.sampled_from(COLUMNS), st.tuples(kinds, VALUES), max_size=8))
+    return columns, draw(st.integers(350, 1900)), draw(st.integers(0, 2 ** 32 - 1))
+
+
+def damaged(log, damage):
+    columns, stop, seed = damage
+    rng, log = np.random.default_rng(seed), log.slice(0, stop)
+    out = dict(log.columns)
+    for name, (kind, value) in columns.items():
+        if kind == "drop":
+            out.pop(name, None)
+        elif kind == "spikes" and name in out:
+            out[name] = out[name].copy()
+            out[name][rng.integers(0, len(log), 20)] = value
+        elif kind != "spikes":
+            with np.errstate(all="ignore"):
+                out[name] = value + (kind == "noise") * rng.normal(size=len(log))
+    return FlightLog(out, dict(log.meta))
+
+
+def answers_or_one_line(log, baseline):
+    try:
+        found = measure([log], VEHICLE, baseline)
+    except AirTouchError as error:
+        assert "\n" not in str(error) and str(error)
+        return
+    json.dumps(found.plain(), allow_nan=False)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@given(tables())
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_random_tables_give_an_answer_or_one_line(log):
+    answers_or_one_line(log, [])
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@given(damages())
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_damaged_flights_give_an_answer_or_one_line(flown, damage):
+    answers_or_one_line(damaged(flown[0], damage), [])
+
+
+@settings(max_examples=3, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@given(damages())
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_damaged_baseline_does_no_harm(flown, damage):
+    answers_or_one_line(flown[1], [damaged(flown[0], damage)])
