@@ -76,6 +76,21 @@ def test_ground_effect_turbulence_has_its_rms(signals):
     assert rough.std() / calm == pytest.approx(0.3 / 2, rel=0.1)  # four rotors, each on its own
 
 
+def test_modes_of_the_turbulence_have_their_shares(signals):
+    """heave and pitch scale total force and pitching torque, roll stays; swirl is yaw torque over lift."""
+    signals = np.repeat(signals[:1], 5000, axis=0)
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.05
+    signals[:, [at.LOWER_FACTOR, at.LOWER_FACTOR + 1, at.LOWER_FACTOR + 2, at.LOWER_FACTOR + 3]] = 1.0
+    calm = wrench("ground_effect", {"turbulence": 0.0}, signals)
+    alike, other = (wrench("ground_effect", {"turbulence": 0.3, **values}, signals) - calm
+                    for values in ({}, {"heave": 0.5, "pitch": 0.25, "swirl": 0.01}))
+    np.testing.assert_allclose(other[:, 2], 0.5 * alike[:, 2], atol=1e-12)
+    np.testing.assert_allclose(other[:, 3], alike[:, 3], atol=1e-12)
+    np.testing.assert_allclose(other[:, 4], 0.25 * alike[:, 4], atol=1e-12)
+    assert not alike[:, 5].any()
+    assert other[:, 5].std() == pytest.approx(0.01 * alike[:, 2].std(), rel=0.15)  # as much as four rotors' lift
+
+
 def test_rotor_drag_is_linear(signals):
     signals[:, at.VELOCITY:at.VELOCITY + 3] = (1.0, -2.0, 0.5)
     got = wrench("rotor_drag", {"horizontal": 0.01, "vertical": 0.02}, signals)[0]

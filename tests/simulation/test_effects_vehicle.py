@@ -89,9 +89,11 @@ def test_actuator_delay_shifts_the_thrust(vehicle, delay):
     assert np.interp(half, late, t) - np.interp(half, early, t) == pytest.approx(delay, abs=0.0012)
 
 
-def test_motor_noise_has_its_rms_and_colour(steady):
+@pytest.mark.parametrize("names", [("rms", "time"), ("fast", "fast_time")])
+def test_motor_noise_has_its_rms_and_colour(steady, names):
     rms, time = 0.05, 0.02
-    log = steady({"motor_noise": {"rms": rms, "time": time}, "controller_gain": {"rate": 0.7}})
+    values = {"rms": 0.0, **dict(zip(names, (rms, time), strict=True))}
+    log = steady({"motor_noise": values, "controller_gain": {"rate": 0.7}})
     quiet = steady()
     force = log["acc_z_mps2"] - quiet["acc_z_mps2"].mean()
     # four rotors each on their own: rms / 2 of the weight; the loop and 10 ms sampling change little

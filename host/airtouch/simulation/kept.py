@@ -19,7 +19,7 @@ from airtouch.simulation.sensors import RING
 SLOTS = 16  #: effects with a wrench that may be on at once
 #: scalars, at the start of the vector
 (STEP, GROUND, CHARGE, VOLTS, DOWN, TOP, NEXT_RANGE, NEXT_RANGES, FLYING, CHANGED) = range(10)
-_SIZES = (10, 13, 4, 6, 13, SLOTS * MEMORY, controller.SIZE, estimator.SIZE, 4, 4, 4, 4, RING * 6, RING * 4,
+_SIZES = (10, 13, 4, 6, 13, SLOTS * MEMORY, controller.SIZE, estimator.SIZE, 4, 8, 4, 4, RING * 6, RING * 4,
           5, 5, 6, 6, 3, 3, 4, 130)
 (STATE, SPEED, FORCE, SLOPE, EFFECTS, PID, ESTIMATE, PWM, FLICKER, GAIN, PHASE, SENSED, COMMANDED,
  ACC_FILTER, GYRO_FILTER, ACC_MEMORY, GYRO_MEMORY, ACC_RMS, DRIFT, RANGES, SCRATCH, SIZE) = (

@@ -90,6 +90,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     decay = math.exp(-h / plant.motor_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
+    hiss_decay = math.exp(-h / plant.motor_hiss_time)
+    hiss_fresh = math.sqrt(1.0 - hiss_decay * hiss_decay)
     attitude, slope = state[6:10], memory[kept.SLOPE:kept.EFFECTS]
     constant = rigid_body.constants(plant, h)
     motor_stream, imu_stream, other_stream = streams[0], streams[1], streams[2]
@@ -232,13 +234,18 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             if k == 0:
                 for j in range(RING):
                     command[j, i] = pwm[i]
+        if plant.motor_hiss > 0.0:
+            normals(motor_stream, motor_n)
+            for i in range(4):
+                flicker[4 + i] = hiss_decay * flicker[4 + i] + hiss_fresh * motor_n[i]
         normals(motor_stream, motor_n)
         power = 0.0
         for i in range(4):
             given = sensors.delayed(command, k, plant.actuator_delay / h, i)
             target[i] = motors.target_speed(plant, given, factor)
             flicker[i] = decay * flicker[i] + fresh * motor_n[i]
-            plant.gain[i] = base_gain[i] * (1.0 + plant.motor_noise * flicker[i])
+            random = plant.motor_noise * flicker[i] + plant.motor_hiss * flicker[4 + i]
+            plant.gain[i] = base_gain[i] * (1.0 + random)
             power += power_per_speed3 * speed[i] * speed[i] * speed[i]
             if plant.vibration > 0.0:
                 turns = (phase[i] + h * speed[i]) / TURN

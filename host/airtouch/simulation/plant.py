@@ -31,6 +31,8 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
      "thrust at a PWM over that at the nominal voltage, power of the voltage ratio"),
     ("motor_noise", 1, 0.0, "rms of thrust over its mean, each rotor on its own"),
     ("motor_noise_time", 1, 0.02, "s, correlation time of that noise"),
+    ("motor_hiss", 1, 0.0, "the same, a second, faster part"),
+    ("motor_hiss_time", 1, 0.01, "s, correlation time of that"),
     ("actuator_delay", 1, 0.0, "s, from command to motor"),
     ("battery_strength", 1, 0.0, "0: always the nominal voltage, 1: the battery's own"),
     ("battery_charge", 1, 1.0, "share of the capacity at take-off"),

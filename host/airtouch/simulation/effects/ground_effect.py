@@ -7,7 +7,7 @@ from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 from airtouch.simulation.random_stream import normal
 
-STRENGTH, FOUNTAIN, FADE, TURBULENCE, TURBULENCE_TIME = range(5)
+STRENGTH, FOUNTAIN, FADE, TURBULENCE, TURBULENCE_TIME, HEAVE, PITCH, SWIRL = range(8)
 STEP, DECAY, FRESH = range(8, 11)  #: of the memory: what follows from the step's length
 LEAST_HEIGHT_RADII = 0.75  #: the formula diverges below it
 
@@ -41,6 +41,13 @@ def ground_effect(p, s, memory, stream, out):
         memory[STEP], memory[DECAY] = s[at.STEP], math.exp(-s[at.STEP] / p[TURBULENCE_TIME])
         memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
     decay, fresh = memory[DECAY], memory[FRESH]
+    for i in range(4):
+        memory[i] = decay * memory[i] + fresh * normal(stream)
+    # the four draws as modes: all alike, left against right, rear against front, one diagonal against the other
+    alike = p[HEAVE] * 0.25 * (memory[0] + memory[1] + memory[2] + memory[3])
+    left = 0.25 * (memory[2] + memory[3] - memory[0] - memory[1])
+    rear = p[PITCH] * 0.25 * (memory[1] + memory[2] - memory[0] - memory[3])
+    cross = 0.25 * (memory[0] + memory[2] - memory[1] - memory[3])
     radius, spacing = s[at.ROTOR_RADIUS], s[at.ROTOR_SPACING]
     for i in range(4):
         height, share = s[at.LOWER_HEIGHT + i], s[at.COVER + i]
@@ -52,11 +59,14 @@ def ground_effect(p, s, memory, stream, out):
             near = share * s[at.UPPER_FACTOR + i] * thrust_ratio(height, radius, spacing, p[FOUNTAIN])
             lift += faded(near, height, p[FADE])
             rough += near * s[at.UPPER_ROUGHNESS + i]
-        memory[i] = decay * memory[i] + fresh * normal(stream)
-        force = p[STRENGTH] * s[at.THRUST + i] * (lift + p[TURBULENCE] * rough * memory[i])
+        spin = 1.0 if i % 2 == 0 else -1.0
+        draw = alike + (left if i >= 2 else -left) + (rear if i == 1 or i == 2 else -rear) + spin * cross
+        unsteady = p[STRENGTH] * s[at.THRUST + i] * p[TURBULENCE] * rough * draw
+        force = p[STRENGTH] * s[at.THRUST + i] * lift + unsteady
         out[2] += force
         out[3] += s[at.ROTOR_Y + i] * force
         out[4] -= s[at.ROTOR_X + i] * force
+        out[5] -= p[SWIRL] * spin * unsteady
 
 
 EFFECT = Effect(
@@ -72,5 +82,10 @@ EFFECT = Effect(
                "rms of the force over the published mean, on a surface of roughness 1",
                "roll rate 3.5 to 17.6 deg/s rms over the platform in the authors' low flights"),
      Parameter("turbulence_time", "s", 0.02, 0.002, 1.0, None, "its correlation time",
-               "rotor radius over wake speed, x 3")),
+               "rotor radius over wake speed, x 3"),
+     Parameter("heave", "1", 1.0, 0.0, 2.0, None,
+               "unsteady lift that all rotors share, over that of four independent rotors"),
+     Parameter("pitch", "1", 1.0, 0.0, 2.0, None,
+               "the same of front against rear; below 1 the rotors of one side share streaks of air"),
+     Parameter("swirl", "m", 0.0, 0.0, 0.2, 0.0, "unsteady yaw torque over unsteady lift of a rotor")),
     wrench=ground_effect)
