@@ -1,7 +1,5 @@
 """Unmodified cflib against the virtual Crazyflie over UDP."""
 
-import time
-
 import numpy as np
 import pytest
 from sitl.clients import connected, log_block, wait_for
@@ -99,19 +97,23 @@ def test_scan_finds_it(cflib, monkeypatch):
 
 
 def test_sweep_over_a_platform_is_felt(cflib):
-    speed = 4.0
-    with serve("paper-4cm", port=0, speed=speed) as virtual, connected(virtual.uri) as cf:
+    with serve("paper-4cm", port=0, speed=4.0, flight=1) as virtual, connected(virtual.uri) as cf:
         plan, rows = virtual.plan, []
         start, _, end, _ = plan.world.box[0]
         height = plan.values["cruise"]
         log_block(cf, "edges", 10, {"stateEstimate.x": "float", "range.zrange": "uint16_t", "airtouch.edges": "uint16_t",
                                     "airtouch.edge": "uint8_t", "airtouch.health": "uint16_t"}, rows)
         fly = cf.high_level_commander
+
+        def let_fly(seconds):
+            until = virtual.drone.now_s + seconds
+            wait_for(lambda: virtual.drone.now_s > until, 30.0)
+
         fly.takeoff(height, 2.0)
-        time.sleep(5.0 / speed)
+        let_fly(5.0)
         away = (end + 1.0) / 0.3
         fly.go_to(end + 1.0, 0.0, height, 0.0, away, linear=True)
-        time.sleep((away + 1.0) / speed)
+        let_fly(away + 1.0)
         fly.land(0.0, 2.5)
         wait_for(lambda: virtual.drone.took_off_s and not virtual.drone.motors_on, 20.0)
         x = np.array([row["stateEstimate.x"] for _, row in rows])

@@ -5,7 +5,10 @@ import socket
 import subprocess
 import sys
 
+import pytest
+
 from airtouch import logs
+from airtouch.cli import main
 
 ECHO = bytes([15 << 4 | 0x0C]) + b"hello"
 
@@ -32,7 +35,9 @@ def test_serves_until_ctrl_c_and_records(tmp_path):
     assert str(path) in out and len(logs.read(path)) > 0
 
 
-def test_bad_settings_are_one_line():
-    with start("hover", "--port", "0", "--fault", "loss=3") as process:
-        out, error = process.communicate(timeout=60)
-    assert process.returncode == 2 and error.count("\n") == 1 and "loss=0.3" in error
+def test_bad_settings_are_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["airtouch", "sitl", "hover", "--port", "0", "--fault", "loss=3"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    error = capsys.readouterr().err
+    assert ended.value.code == 2 and error.count("\n") == 1 and "loss=0.3" in error

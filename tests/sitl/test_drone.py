@@ -2,12 +2,15 @@
 
 import math
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from airtouch import logs
+from airtouch.detector import best
 from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.sitl import Server
 from airtouch.sitl.drone import CRASHED, LOCKED, PRE_FLIGHT
 from airtouch.sitl.packet import COMMANDER, CONSOLE, GENERIC, LOCALIZATION, PLATFORM, SUPERVISOR
@@ -155,11 +158,36 @@ def test_the_flight_is_recorded(tmp_path):
         Server("hover", port=0, record=path)
 
 
+def test_the_app_finds_what_the_detector_finds_in_the_log(bench):
+    """What flies, fed by the estimator, against `best` on the recorded flight."""
+    craft = bench("paper-4cm", flight=1, ai_deck=False)
+    plan, rows, edges = craft.server.plan, [], []
+    height, end = plan.values["cruise"], plan.world.box[0][2] + 1.0
+
+    def fly(seconds):
+        for _ in range(round(100 * seconds)):
+            before = craft.drone.app.read("edges")
+            craft.firmware.tick()
+            rows.append(craft.drone.row.copy())
+            if craft.drone.app.read("edges") > before:
+                edges.append((len(rows) - 1, craft.drone.app.read("edge")))
+
+    fly(0.5)
+    craft.high_level("<BBff?f", 7, 0, height, 0.0, False, 2.0)
+    fly(6.0)
+    craft.high_level("<BBBBfffff", 12, 0, 0, 1, end, 0.0, height, 0.0, end / 0.3)
+    fly(end / 0.3 + 2.0)
+    table = np.array(rows)
+    log = FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, {"source": "virtual", "acc_frame": "body"})
+    found = best.run(log).edges
+    assert len(found) >= 2
+    assert [("entry", "exit")[kind - 1] for _, kind in edges] == [edge.kind for edge in found]
+    assert max(abs(at - edge.sample) for (at, _), edge in zip(edges, found)) <= 10
+
+
 @pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]}, {"faults": ["rain=1"]},
                                    {"faults": ["disconnect=3"]}, {"record": "/nowhere/at/all.csv"}])
 def test_wrong_settings_are_named(wrong):
-    from pathlib import Path
-
     settings = {"port": 0, **wrong}
     if "record" in settings:
         settings["record"] = Path(settings["record"])

@@ -30,6 +30,7 @@ from airtouch.vehicle import Vehicle
 HOST, PORT = "127.0.0.1", 19850  #: where cflib looks for virtual drones
 GREETING = f"SYS: virtual Crazyflie, AirTouch {__version__}"
 MOST_BEHIND_S = 0.5  #: a machine that is slower than this loses time, not samples
+MOST_AT_ONCE = 200  #: datagrams that are read before the next row is flown
 LINK_TIMEOUT_S = 1.0  #: the firmware forgets its log blocks when the link is down for so long
 
 
@@ -134,7 +135,7 @@ class Server:
 
     def _receive(self) -> None:
         """Everything that has come in goes onto the line."""
-        while True:
+        for _ in range(MOST_AT_ONCE):  # a flood must not stop the flight
             try:
                 datagram, peer = self._socket.recvfrom(2048)
             except BlockingIOError:
