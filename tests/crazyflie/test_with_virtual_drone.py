@@ -97,7 +97,7 @@ def test_thirty_percent_packet_loss_of_everything(hop, cache, tmp_path):
         try:
             ready = collect.make_ready(drone, plan, lambda _: None)
             rng = np.random.default_rng(5)
-            virtual._up, virtual._down = (Line([parse("loss=0.3")], rng) for _ in range(2))  # the radio gets bad now
+            virtual._up, virtual._down = (Line([parse("loss=0.3,all")], rng) for _ in range(2))  # the radio gets bad now
             outcome = collect.fly(drone, ready, mission.load(hop), plan, 1, stop=threading.Event(), say=lambda _: None)
         finally:
             drone.close()
@@ -109,7 +109,7 @@ def test_thirty_percent_packet_loss_of_everything(hop, cache, tmp_path):
 
 
 def test_a_connection_is_made_through_losses(hop, cache):
-    with serve(hop, port=0, speed=SPEED, faults=("loss=0.1",)) as virtual:
+    with serve(hop, port=0, speed=SPEED, faults=("loss=0.1,all",)) as virtual:
         drone = Drone(virtual.uri, cache)
         try:
             drone.start(blocks.MOTION)
@@ -216,7 +216,7 @@ def test_a_gap8_that_never_answers_is_told_by_monitor(hop, cache):
 
 
 def test_monitor_counts_losses_and_runs_the_detector_here(hop, cache):
-    with serve(hop, port=0, speed=SPEED, faults=("loss=0.3,streams",)) as virtual:
+    with serve(hop, port=0, speed=SPEED, faults=("loss=0.3",)) as virtual:
         shown = run("monitor", "--uri", virtual.uri, "--duration", "1.5", "--cache", cache, "--host-detector")
     share = float(re.findall(r"([\d.]+) % lost", shown.output)[-1])
     assert shown.exit_code == 0 and 20 < share < 40 and "(best on the host)" in shown.output, shown.output

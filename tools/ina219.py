@@ -1,0 +1,161 @@
+"""Logs of an INA219: time, bus voltage and current as CSV, and mean power with its interval."""
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+
+UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0, "mv": 1e-3, "v": 1.0, "ma": 1e-3, "ua": 1e-6, "a": 1.0}
+QUANTITIES = {"time": ("time", "t", "millis", "timestamp"), "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
+              "amperes": ("current", "amperes", "i"), "stage": ("stage", "phase", "module")}
+USUAL = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
+MOST_BAD = 0.05  #: share of lines that may be unreadable (a serial line loses characters)
+MOST_V, MOST_A = 26.0, 3.2  #: the INA219's range
+GAP = 20.0  #: periods without a line that are no part of the energy
+BLOCK_S = 1.0  #: over which noise is taken as one piece
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A log: time (s), volts and amperes, each (n,), stage of each line, and what was wrong with it."""
+
+    time_s: np.ndarray
+    volts: np.ndarray
+    amperes: np.ndarray
+    stage: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Power:
+    """Mean power (mW) with the half width of its 95 % interval, energy (mJ), seconds and lines."""
+
+    mw: float
+    half_mw: float
+    mj: float
+    seconds: float
+    lines: int
+
+
+def parse(text: str, source: str) -> Trace:
+    """A log from its text. Raises AirTouchError with file, line and remedy.
+
+    Comments, empty lines, repeated headers, a last line that is cut off and a few damaged ones are passed over
+    and counted. Separators are , ; or tab; with ; and tab a comma may stand for the decimal point.
+    """
+    lines = [(i, line.strip()) for i, line in enumerate(text.lstrip("\ufeff").splitlines(), 1)]
+    lines = [(i, line) for i, line in lines if line and not line.startswith("#")]
+    if not lines:
+        raise AirTouchError(f"{source}: no data in it; log again")
+    separator = next((s for s in "\t;" if s in lines[0][1]), ",")
+    first = _cells(lines[0][1], separator)
+    header = first if _number(first[0]) is None else None
+    columns = _columns(header, source, lines[0][0]) if header else {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3),
+                                                                    "stage": (3, 1.0)}
+    rows, stages, bad = [], [], []
+    for i, line in lines[1:] if header else lines:
+        cells = _cells(line, separator)
+        if cells == header:
+            continue
+        row = [_number(cells[at].replace(",", ".")) if at < len(cells) else None
+               for at, _ in (columns[q] for q in ("time", "volts", "amperes"))]
+        if None in row or not _possible(row, columns):
+            bad.append(i)
+            continue
+        rows.append([v * columns[q][1] for v, q in zip(row, ("time", "volts", "amperes"), strict=True)])
+        at = columns.get("stage", (len(cells), 1.0))[0]
+        stages.append(cells[at] if at < len(cells) else "")
+    if len(bad) > max(MOST_BAD * (len(rows) + len(bad)), 1):
+        raise AirTouchError(f"{source}:{bad[0]}: {len(bad)} of {len(rows) + len(bad)} lines are no time, voltage (0 to "
+                            f"{MOST_V:g} V) and current (to {MOST_A:g} A); check the columns and their units")
+    if len(rows) < 2:
+        raise AirTouchError(f"{source}: {len(rows)} usable lines; log for some seconds")
+    notes = [f"{source}: {len(bad)} damaged lines passed over, the first is {bad[0]}"] if bad else []
+    table = np.array(rows)
+    return Trace(table[:, 0], table[:, 1], table[:, 2], tuple(stages), tuple(notes))
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, quoting=csv.QUOTE_NONE))]
+
+
+def _number(cell: str) -> float | None:
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _possible(row: list[float], columns: dict[str, tuple[int, float]]) -> bool:
+    return 0.0 <= row[1] * columns["volts"][1] <= MOST_V and abs(row[2] * columns["amperes"][1]) <= MOST_A
+
+
+def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, float]]:
+    """Quantity -> (column, factor to SI) from names like time_ms, "Bus Voltage (V)", current_mA."""
+    found: dict[str, tuple[int, float]] = {}
+    for at, name in enumerate(header):
+        words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
+        unit = next((w for w in words[1:][::-1] if w in UNITS), None)
+        for quantity, known in QUANTITIES.items():
+            if quantity not in found and words and (words[0] in known or words[0] in ("bus",) and quantity == "volts"):
+                found[quantity] = (at, UNITS[unit] if unit else USUAL.get(words[0], 1.0))
+                break
+    missing = [q for q in ("time", "volts", "amperes") if q not in found]
+    if missing:
+        raise AirTouchError(f"{source}:{line}: no column for {', '.join(missing)} in {', '.join(header)!r}; "
+                            "name them time_ms, bus_V, current_mA")
+    return found
+
+
+def power(trace: Trace, where: np.ndarray | None = None) -> Power:
+    """Mean power over the lines where `where` is true, by trapezoids between lines that follow each other.
+
+    Stretches without lines (more than 20 periods), and the step back of a clock that was reset, are left out. The
+    interval is that of means over blocks of one second.
+    """
+    watts = trace.volts * trace.amperes
+    steps = np.diff(trace.time_s)
+    rising = steps[steps > 0]
+    period = float(np.median(rising)) if len(rising) else 0.0
+    joined = (steps > 0) & (steps <= max(GAP * period, 1e-9))
+    if where is not None:
+        joined &= where[1:] & where[:-1]
+    seconds = float(steps[joined].sum())
+    if seconds <= 0.0:
+        return Power(math.nan, math.nan, 0.0, 0.0, 0)
+    pieces = steps * (watts[1:] + watts[:-1]) / 2.0
+    joules = float(pieces[joined].sum())
+    block = (np.cumsum(np.where(joined, steps, 0.0))[joined] / BLOCK_S).astype(int)
+    spans = np.bincount(block, steps[joined])
+    means = (np.bincount(block, pieces[joined]) / np.maximum(spans, 1e-12))[spans > 0.5 * BLOCK_S]
+    half = 1.96 * float(means.std(ddof=1)) / math.sqrt(len(means)) if len(means) > 1 else math.nan
+    return Power(1e3 * joules / seconds, 1e3 * half, 1e3 * joules, seconds, int(joined.sum()) + 1)
+
+
+def by_stage(trace: Trace, known: Sequence[str]) -> dict[str, Power]:
+    """Power of each stage that a log names in its own column: those of `known` in their order, then others by name."""
+    names = np.array([canonical(name, known) for name in trace.stage])
+    order = list(dict.fromkeys([*(s for s in known if s in names), *sorted(set(names) - {""})]))
+    return {name: power(trace, names == name) for name in order}
+
+
+def canonical(name: str, known: Sequence[str]) -> str:
+    """The known name of a stage, however it is written; any other as it is."""
+    plain = {re.sub(r"[^a-z0-9]", "", s.lower()): s for s in known}
+    return plain.get(re.sub(r"[^a-z0-9]", "", name.lower()), name)
+
+
+def added(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
+    """Stage -> (mW that it adds to the one before it, half width of the 95 % interval); the first is whole."""
+    result, before = {}, None
+    for name, found in stages.items():
+        half = found.half_mw if before is None else math.hypot(found.half_mw, before.half_mw)
+        result[name] = (found.mw - (before.mw if before else 0.0), half)
+        before = found
+    return result

@@ -1,0 +1,167 @@
+"""The paper's Table 1, measured: power of each stage from the logs of an INA219, beside the paper's figures.
+
+    python tools/power.py measure run.csv                       # stages named in the log's own column
+    python tools/power.py measure baseline=a.csv FC-FE=b.csv CCS-FF=c.csv filter=d.csv network=e.csv
+    python tools/power.py estimate                              # no meter: from counted instructions
+
+A log has time, bus voltage and current in any order, told by the header (time_ms, bus_V, current_mA); without a
+header they are milliseconds, volts, milliamperes, as tools/power/ina219_logger.ino writes them. Each stage is
+switched on beside those before it, so its power is what it adds. See host/docs/power.md.
+"""
+
+import math
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+from ina219 import Power, added, by_stage, canonical, parse, power
+
+from airtouch.detector.stream.recipe import STRIDE
+from airtouch.errors import AirTouchError
+
+#: stage -> the paper's figure, mW (Table 1), in the order in which stages are switched on
+PAPER_MW = {"baseline": 78.0, "FC-FE": 6.0, "CCS-FF": 2.0, "filter": 2.0, "network": 33.0}
+PAPER_TOTAL_MW = 121.0
+NAMES = {"baseline": "Basic drone module power", "FC-FE": "Fluctuation Components Feature Extraction",
+         "CCS-FF": "Cascaded Cross-Spectrum Feature Fusion", "filter": "Double Phase Physical Filter",
+         "network": "Physical Knowledge-aided Network"}
+STEP_HZ = 100.0
+ROOT = Path(__file__).resolve().parent.parent
+
+def table(stages: dict[str, Power]) -> str:
+    """Table 1: what each stage adds, its energy a step, and the paper's figure."""
+    lines = [f"{'':44} {'measured, mW':>22} {'a step, uJ':>11} {'paper, mW':>10} {'n, s':>14}"]
+    for name, (mw, half) in added(stages).items():
+        interval = f"{mw:8.1f} [{mw - half:.1f}, {mw + half:.1f}]" if math.isfinite(half) else f"{mw:8.1f}"
+        a_step = "" if name == "baseline" else f"{1e3 * mw / STEP_HZ:.0f}"
+        paper = f"{PAPER_MW[name]:.0f}" if name in PAPER_MW else ""
+        s = stages[name]
+        lines.append(f"{NAMES.get(name, name):44} {interval:>22} {a_step:>11} {paper:>10} {s.lines:>7}, {s.seconds:5.1f}")
+    total = list(stages.values())[-1]
+    lines.append(f"{'Total':44} {total.mw:8.1f} [{total.mw - total.half_mw:.1f}, {total.mw + total.half_mw:.1f}]"
+                 f"{'':>14} {PAPER_TOTAL_MW:>7.0f}")
+    return "\n".join(lines)
+
+
+# Without a meter.
+
+#: mA that a busy STM32F405 at 168 MHz draws over a sleeping one. crazyflie-firmware, src/modules/src/system.c,
+#: vApplicationIdleHook: sleeping "currently saves about 20mA"; that is an average over a processor that also
+#: works, so the full difference is larger: twice that where it works half of the time.
+STM32_MA = (20.0, 40.0)
+STM32_HZ = 168e6
+STM32_CPI = (1.0, 2.0)  #: cycles an instruction; assumed: flash waits, loads and divisions make more than one
+BATTERY_V = 3.7  #: behind a linear regulator the battery gives the same current
+#: joules a MAC on the GAP8, everything on its board included: PULP-DroNet, 41 MMAC a frame at 6 frames/s with 64 mW
+#: (Palossi et al., IEEE IoT Journal 2019)
+GAP8_J_PER_MAC = 64e-3 / (6 * 41e6)
+#: stage -> kernels of the budget that run in every step
+KERNELS = {"FC-FE": ("band_power",), "CCS-FF": ("cross_spectrum",), "filter": ("disturbance_force", "fr_cfar")}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a stage needs at 100 steps a second: low and high mW, and what of (instructions or MAC a step)."""
+
+    low_mw: float
+    high_mw: float
+    counted: float
+    unit: str
+
+
+def stm32_mw(instructions: float) -> tuple[float, float]:
+    """Low and high mW at the battery of so many instructions a step, 100 steps a second."""
+    return tuple(1e3 * instructions * STEP_HZ * cpi / STM32_HZ * 1e-3 * ma * BATTERY_V
+                 for cpi, ma in zip(STM32_CPI, STM32_MA, strict=True))
+
+
+def instructions(budget: dict, kernel: str) -> float:
+    """Mean instructions a step of a kernel on the Cortex-M4. Raises AirTouchError where the budget lacks it."""
+    try:
+        return float(budget["cortex-m4"][kernel]["instructions_mean"])
+    except (KeyError, TypeError, ValueError):
+        raise AirTouchError(f"the budget has no instructions_mean for cortex-m4.{kernel}; count again with "
+                            "python -m tools.emulator.count") from None
+
+
+def estimate(budget: dict, macs: dict[str, float]) -> dict[str, Estimate]:
+    """Stages of the table from counts: kernels of the budget on the STM32, networks (name -> MAC a step) on the GAP8."""
+    found = {stage: sum(instructions(budget, k) for k in kernels) for stage, kernels in KERNELS.items()}
+    result = {stage: Estimate(*stm32_mw(count), count, "instructions") for stage, count in found.items()}
+    for name, count in macs.items():
+        mw = 1e3 * count * STEP_HZ * GAP8_J_PER_MAC
+        result[f"network, {name} on the GAP8"] = Estimate(mw, mw, count, "MAC")
+    # the network and its decoder run on every STRIDE-th sample, and the budget counts those
+    count = instructions(budget, "motion_channels") + sum(instructions(budget, k) for k in ("stream_int8", "edge_decoder")) / STRIDE
+    result["network, best on the STM32 instead"] = Estimate(*stm32_mw(count), count, "instructions")
+    return result
+
+
+def network_macs() -> dict[str, float]:
+    """Multiplications a step of the shipped networks."""
+    from airtouch.detector import best, paper
+    from airtouch.reference.int8_network import multiplications
+
+    return {"paper": float(multiplications(paper.load(None).int8)), "best": best.load(None).int8.multiplications / STRIDE}
+
+
+def estimate_table(found: dict[str, Estimate]) -> str:
+    """The estimate as text, labelled as one in every line."""
+    lines = [f"{'ESTIMATE, nothing was measured':44} {'mW':>14} {'a step':>22} {'paper, mW (measured)':>21}"]
+    for name, e in found.items():
+        shown = f"{e.low_mw:.2f} to {e.high_mw:.2f}" if e.high_mw > e.low_mw else f"{e.low_mw:.2f}"
+        paper = PAPER_MW.get(name.split(",")[0])
+        lines.append(f"{NAMES.get(name, name):44} {shown:>14} {e.counted:>9.0f} {e.unit:12} "
+                     f"{'' if paper is None else f'{paper:.0f}':>21}")
+    return "\n".join([*lines, "ESTIMATE: counted instructions (tests/emulation/budget.toml) x 1 to 2 cycles x 20 to 40 mA at 168 MHz x "
+                      f"{BATTERY_V:g} V; MAC x {1e12 * GAP8_J_PER_MAC:.0f} pJ. Sources and limits: host/docs/power.md"])
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """The paper's Table 1 from INA219 logs, or an estimate of it."""
+
+
+@main.command()
+@click.argument("logs", nargs=-1, required=True)
+def measure(logs: tuple[str, ...]) -> None:
+    """LOGS: one file with a column of stages, or STAGE=FILE for each stage in the order in which they were added."""
+    stages: dict[str, Power] = {}
+    notes: list[str] = []
+    for text in logs:
+        name, equals, file = text.partition("=")
+        path = Path(file if equals else text)
+        try:
+            trace = parse(path.read_text(encoding="utf-8", errors="replace"), str(path))
+        except OSError as error:
+            raise AirTouchError(f"{path}: cannot be read: {error.strerror}") from None
+        notes += trace.notes
+        found = {canonical(name, tuple(PAPER_MW)): power(trace)} if equals else by_stage(trace, tuple(PAPER_MW))
+        if not found:
+            raise AirTouchError(f"{path}: no column of stages; give STAGE=FILE for each stage")
+        stages |= found
+    click.echo(table(stages))
+    click.echo("in brackets 95 % intervals, from means over blocks of 1 s; a step is 10 ms")
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
+
+
+@main.command("estimate")
+@click.option("--budget", type=click.Path(path_type=Path), default=ROOT / "tests" / "emulation" / "budget.toml",
+              help="Counted instructions of each kernel.")
+def estimate_command(budget: Path) -> None:
+    """Without a meter: counted instructions times energy per instruction."""
+    try:
+        counts = tomllib.loads(budget.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise AirTouchError(f"{budget}: cannot be read as a budget: {error}") from None
+    click.echo(estimate_table(estimate(counts, network_macs())))
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except AirTouchError as error:
+        sys.exit(f"power: {error}")
