@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from airtouch.detector import archive, export, model_file
+from airtouch.detector import archive, export, model_file, paper_stream
 from airtouch.detector.stream import model as stream_model
 from airtouch.kernels.network import parameter_bytes
 
@@ -18,11 +18,11 @@ from airtouch.kernels.network import parameter_bytes
               help="Write nothing; refuse a folder that is stale or foreign.")
 @click.option("--force", is_flag=True, help="Replace files that differ.")
 def command(model: Path | None, out: Path, only_check: bool, force: bool) -> None:
-    """Write MODEL (.npz; both shipped ones if left out) as C: weights, shapes, scales, golden vectors.
+    """Write MODEL (.npz; all shipped ones if left out) as C: weights, shapes, scales, golden vectors.
 
     With --check: exit code 2 and the reason where the folder is not what MODEL exports to.
     """
-    for trained in ([_load(model)] if model else [model_file.load(), stream_model.load()]):
+    for trained in ([_load(model)] if model else [model_file.load(), paper_stream.load(None), stream_model.load()]):
         name = model.name if model else ""
         if only_check:
             export.check(trained, out, name)

@@ -21,8 +21,8 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.int8_network import stream_multiplications
 
 STRIDE = 4  #: samples to one answer: what the two pools make together, so that no row is computed in vain
-SPARSITY = 0.95
-CONV_SPARSITY = 0.75
+SPARSITY = 0.96
+CONV_SPARSITY = 0.8
 
 
 def run(log: FlightLog, model: Model | None = None) -> Trace:
