@@ -75,19 +75,21 @@ class Held:
 
 
 def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[FlightLog] = (), *,
-            progress: Callable[[str], None] = lambda _: None, run: Callable = map) -> Measurement:
+            calibrated: bool = True, progress: Callable[[str], None] = lambda _: None,
+            run: Callable = map) -> Measurement:
     """Hold flights against the vehicle's model and map what is left.
 
     Flights that cannot be used are left out with their reason; raises AirTouchError when
     none is left. Works from accelerations and motor commands; `cannot` says what more
     channels would show. Where `flights` reads them as it goes, one is in memory at a time.
+    calibrated: whether the vehicle is also calibrated on the baseline, for the second arm;
     run: what maps a function over flights, in place of `map`, to spread the work.
     """
     left_out: list[str] = []
     nominal = list(usable(baseline, vehicle, left_out))
     studies, fitted = [calibrate.declared(vehicle, nominal)], None
     notes = differences(studies[0], nominal)
-    if nominal:
+    if nominal and calibrated:
         progress("calibration")
         study, fitted = calibrate.calibrated(vehicle, nominal)
         studies.append(study)

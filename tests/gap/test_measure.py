@@ -1,0 +1,104 @@
+"""Measuring the gap of whole flights: what is injected is found, with few channels too."""
+
+import json
+
+import numpy as np
+import pytest
+import short_flights
+
+from airtouch import logs, vehicle
+from airtouch.gap.flight import ready
+from airtouch.gap.gap_map import significant
+from airtouch.gap.measure import measure
+from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
+from airtouch.logs.segments import KINDS
+
+VEHICLE = vehicle.load("crazyflie-2.1-flow")
+
+
+@pytest.fixture(scope="module")
+def flown():
+    return short_flights.fly(3)
+
+
+def no_constant(name):
+    raise ValueError(name)
+
+
+def pushed(log, size, kind):
+    """The log with a forward force of `size` m/s^2 more in one phase."""
+    phase = ready(log, VEHICLE).phase
+    pad = np.zeros(len(log))
+    pad[:len(phase)] = size * (phase[:len(log)] == KINDS.index(kind))
+    return log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + pad})
+
+
+def test_json_holds_the_largest_cells_and_the_whole_map(flown):
+    found = measure(flown, VEHICLE)
+    table = json.loads(json.dumps(found.plain(), allow_nan=False), parse_constant=no_constant)
+    assert {"where", "map", "gap", "floor_from", "cannot", "notes", "flights", "vehicle", "spectra", "left_out"} <= set(table)
+    assert len(table["where"]) >= 10 and len(table["flights"]) == 3
+    for cell in table["where"]:
+        assert {"channel", "band_hz", "phase", "gap", "floor", "unit", "low", "high", "words"} <= set(cell)
+        assert cell["low"] <= cell["gap"] <= cell["high"] and cell["floor"] > 0.0
+    assert table["gap"]["before"] > 1.0
+
+
+def test_a_push_over_the_platform_is_found_there(flown):
+    before = measure(flown, VEHICLE)
+    after = measure([pushed(log, 3.0, "over platform") for log in flown], VEHICLE)
+    key = ("force_x", (0.0, 0.5), "over platform", "all")
+    one, two = (next(c for c in m.map.cells if (c.channel, c.band_hz, c.phase, c.regime) == key)
+                for m in (before, after))
+    assert not significant(one) or one.gap < 0.5
+    assert significant(two) and two.gap == pytest.approx(3.0, rel=0.2)
+    assert any((c.channel, c.phase, c.band_hz[0]) == ("force_x", "over platform", 0.0) for c in after.where)
+
+
+def test_imu_and_motors_are_enough(flown):
+    full, bare = measure(flown, VEHICLE), measure(
+        [FlightLog({k: log[k] for k in (*ACC, *GYRO, *PWM)}, {"source": log.source}) for log in flown], VEHICLE)
+    channels = {c.channel for c in bare.map.cells}
+    assert {"force_z", "torque_x", "torque_z"} <= channels == {c.channel for c in full.map.cells}
+    assert {"no down range", "no velocity"} <= {line.split(":")[0] for line in bare.cannot}
+    assert full.cannot == ()
+
+
+def test_without_a_gyro_torque_is_known_at_low_frequency_alone(flown):
+    found = measure([FlightLog({k: v for k, v in log.columns.items() if k not in GYRO}, dict(log.meta))
+                     for log in flown], VEHICLE)
+    assert {c.band_hz for c in found.map.cells if c.channel.startswith("torque")} == {(0.0, 0.5)}
+    assert any("no gyro" in line for line in found.cannot)
+
+
+def test_any_map_may_spread_the_work_and_progress_is_told(flown):
+    seen, asked = [], []
+
+    def backwards(function, items):
+        items = list(items)
+        asked.append(len(items))
+        return reversed([function(i) for i in reversed(items)])
+
+    one = measure(flown, VEHICLE, progress=seen.append)
+    assert measure(flown, VEHICLE, run=backwards).plain() == one.plain()
+    assert asked == [3] and seen == list(one.flights)
+
+
+def test_nominal_flights_have_little_gap_to_one_another(flown):
+    found = measure(flown[:1], VEHICLE, flown[1:], calibrated=False)
+    assert found.gap["before"] < 2.5
+    assert np.mean([significant(c) for c in found.map.cells if c.regime == "all"]) < 0.1
+    assert set(found.spectra["roll"]) == {"flown", "nominal"}
+
+
+@pytest.mark.parametrize("name", ["crazypad/pad_cut_propeller_M3_3mm_3mm_41mm_E8_log00.csv.gz",
+                                  "airtouch/imu_data_0103-1435.csv.gz", "peers/case_05.csv.gz"])
+def test_recorded_flights_of_every_kind(flights, name):
+    path = flights / name
+    if not path.is_file():
+        pytest.skip(f"{name} is not there")
+    log = logs.read(path)
+    found = measure([log], vehicle.load("crazyflie-2.1"))
+    assert found.where and found.map.cells
+    assert (any("no gyro" in line for line in found.cannot)) == (not log.has(*GYRO))
+    assert log.has(*ACC) or log.has(*ACC_WORLD)
