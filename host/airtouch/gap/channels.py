@@ -1,7 +1,8 @@
 """The gap's channels: what was measured minus what the model says, sample by sample.
 
 Replay view: specific force (3), angular acceleration (3), and the gyro's mean (3). Twin
-view: the controller's command (4) minus what the nominal controller would have given.
+view: the controller's command (4), filtered to have the spectrum of nominal flights where
+the effects in the model are all that changed it.
 """
 
 from collections.abc import Sequence
@@ -9,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.control import Controller
 from airtouch.gap.flight import PERIOD_S, Flight
+from airtouch.gap.twin import Twin
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
@@ -34,15 +35,15 @@ CHANNELS = (
     *(Channel(f"force_{a}", "m/s^2") for a in "xyz"),
     *(Channel(f"torque_{a}", "rad/s^2") for a in "xyz"),
     *(Channel(f"rate_{a}", "rad/s", 0.0, 0.3) for a in "xyz"),
-    Channel("command_thrust", "PWM", 0.6, 30.0, "twin"),
-    *(Channel(f"command_{a}", "PWM", 0.6, 30.0, "twin") for a in ("roll", "pitch", "yaw")),
+    Channel("command_thrust", "N", 0.6, 30.0, "twin"),
+    *(Channel(f"command_{a}", "N", 0.6, 30.0, "twin") for a in ("roll", "pitch", "yaw")),
 )
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)
 
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
-             controller: Controller | None = None, seed: int = 0) -> np.ndarray:
+             controller: Twin | None = None, seed: int = 0) -> np.ndarray:
     """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
 
     `active`: effects that the model has. On the ground with motors off the model is a
@@ -72,5 +73,5 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
         out[-1, TORQUE] = 0.0
         out[:, RATE] = flight.rates - row["gyro_bias"]
     if controller is not None:
-        out[:, COMMAND] = controller.surprise(flight, row)
+        out[:, COMMAND] = controller.commands_without(flight, active)
     return out

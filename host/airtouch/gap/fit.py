@@ -14,16 +14,18 @@ from scipy.optimize import minimize_scalar
 
 from airtouch.gap import random_effects
 from airtouch.gap.candidates import CLOCK, MEAN, SPECTRUM, Term
-from airtouch.gap.channels import COUNT, residual
-from airtouch.gap.control import Controller
+from airtouch.gap.channels import COMMAND, COUNT, residual
 from airtouch.gap.flight import Flight
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, Floor, blocks, judged, starts
+from airtouch.gap.twin import COMMAND_ONLY, Twin
+from airtouch.gap.twin_view import TwinView
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 ITERATIONS = 8
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
+GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
 FREEDOM = 12.0  #: of the Student-like tail at most
 
 
@@ -33,7 +35,7 @@ class Study:
 
     vehicle: Vehicle
     calibration: tuple[Active, ...]
-    controller: Controller | None
+    controller: Twin | None
     floor: Floor
 
 
@@ -84,7 +86,11 @@ class Problem:
 
     def __init__(self, data: Data, part: Part) -> None:
         self.data, self.part = data, part
+        self._constant: list[tuple[np.ndarray, float]] | None = None
         self.keep = {r: judged(r) for r in (AIR, REST)}
+        for keep in self.keep.values():
+            keep[:, COMMAND] = False  # the twin view judges them
+        self.twin = TwinView(data.study.controller, data.flights, data.first, part.pieces)
         self.power = self._gather([{r: np.broadcast_to(data.study.floor.power[r], s[r].shape) for r in s}
                                    for s in data.base]).real
         self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
@@ -98,6 +104,14 @@ class Problem:
         counts = data.study.floor.blocks
         nu = [np.full(self._size(p), np.clip(3.0 * counts[p[1]], 2.0, FREEDOM)) for p in part.pieces]
         self.freedom = np.concatenate(nu) if nu else np.zeros(0)
+        self.own = len(self.base)  #: elements of the replay view; those of the twin view follow
+        twin = self.twin
+        self.power = np.concatenate([self.power, twin.floor])
+        self.base = np.concatenate([self.base, twin.values])
+        self.known = np.concatenate([self.known, np.ones(len(twin), bool)])
+        self.channel = np.concatenate([self.channel, twin.channel]).astype(int)
+        self.flight = np.concatenate([self.flight, twin.flight]).astype(int)
+        self.freedom = np.concatenate([self.freedom, twin.freedom])
 
     def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
         return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
@@ -108,10 +122,26 @@ class Problem:
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """Spectra with effects in the model, flattened."""
-        return np.where(self.known, self._gather(spectra(self.data, active)), 0.0)
+        seen = [a for a in active if a.effect.name not in COMMAND_ONLY]
+        if not seen:
+            return self.base
+        return np.where(self.known, self._with_twin(self._gather(spectra(self.data, seen)), self.twin.values), 0.0)
+
+    def _with_twin(self, own: np.ndarray, twin: np.ndarray | float = 0.0) -> np.ndarray:
+        return np.concatenate([own, np.broadcast_to(twin, len(self.twin))])
+
+    def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+        """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
+        power, cost = self.twin.power(active, wide)
+        return np.concatenate([np.zeros(self.own), power - self.twin.floor]), cost
 
     def constant(self) -> list[tuple[np.ndarray, float]]:
         """Spectra of a unit offset in each of the OFFSETS channels of each flight, with its prior's deviation."""
+        if self._constant is None:
+            self._constant = self._constants()
+        return self._constant
+
+    def _constants(self) -> list[tuple[np.ndarray, float]]:
         columns = []
         tell = self.data.study.floor.offset
         for i, flight in enumerate(self.data.flights):
@@ -122,14 +152,14 @@ class Problem:
                 ones[~flight.on_ground, c] = 1.0
                 made = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
                          for r in f} for j, f in enumerate(self.data.first)]
-                columns.append((self._gather(made), float(tell[c])))
+                columns.append((self._with_twin(self._gather(made)), float(tell[c])))
         return columns
 
     def random_power(self, terms: Sequence[Term]) -> np.ndarray:
         """PSD that random effects add, flattened."""
         total = np.zeros(len(self.base))
         for term in terms:
-            total += self._gather(random_effects.power(self.data, term)).real
+            total += self._with_twin(self._gather(random_effects.power(self.data, term)).real)
         return total
 
     def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
@@ -143,18 +173,31 @@ class Problem:
         return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + (nu + 1.0) * np.log1p(e / nu)), 0.0)
 
 
-def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None = None) -> Fit:
-    """Fit effects to the blocks of `part`; what is left is judged elsewhere."""
-    problem = Problem(data, part)
+def problem_of(data: Data, part: Part) -> Problem:
+    """The flattened blocks of a part, made once."""
+    kept = data.__dict__.setdefault("_problems", {})
+    if id(part) not in kept:
+        kept[id(part)] = (part, Problem(data, part))
+    return kept[id(part)][1]
+
+
+def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None = None,
+        prior: np.ndarray | float = PRIOR_UNITS) -> Fit:
+    """Fit effects to the blocks of `part`; what is left is judged elsewhere.
+
+    prior: standard deviation of the scaled parameters of mean effects around neutral.
+    """
+    problem = problem_of(data, part)
     terms = tuple(terms)
     mean = tuple(t for t in terms if t.kind == MEAN)
     random = [t for t in terms if t.kind == SPECTRUM]
-    x = _start(mean) if start is None else start
+    x = _start(problem, mean) if start is None else start
     added = problem.random_power(random) if random else 0.0
     offsets, covariance = np.zeros(0), np.zeros((0, 0))
     for _ in range(2 if mean and random else 1):
-        x, offsets, covariance, values = _gauss_newton(problem, mean, x, added)
-        random = [_strength(problem, random, i, values) for i in range(len(random))]
+        x, offsets, covariance, values = _gauss_newton(problem, mean, x, added, prior, bool(random))
+        told, cost = problem.commanded(_active(mean, x), bool(random))
+        random = [_strength(problem, random, i, values, told) for i in range(len(random))]
         added = problem.random_power(random) if random else 0.0
     fitted, place = [], 0
     chosen = iter(random)
@@ -164,32 +207,52 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
             place += len(t.free)
         else:
             fitted.append(next(chosen) if t.kind == SPECTRUM else t)
-    gained = problem.likelihood(values, added)
+    gained = problem.likelihood(values, added + told) - cost
     return Fit(tuple(fitted), x, covariance, offsets, gained)
 
 
 def judge(data: Data, part: Part, terms: Sequence[Term]) -> float:
     """Log likelihood of blocks under effects fitted elsewhere; offsets between flights found anew."""
-    problem = Problem(data, part)
-    added = problem.random_power([t for t in terms if t.kind == SPECTRUM])
-    values = problem.values([t.active() for t in terms if t.kind == MEAN]) \
-        if any(t.kind == MEAN for t in terms) else problem.base
-    values, penalty = _without_offsets(problem, values, added)
-    return problem.likelihood(values, added) - penalty
+    problem = problem_of(data, part)
+    random = [t for t in terms if t.kind == SPECTRUM]
+    active = [t.active() for t in terms if t.kind == MEAN]
+    told, cost = problem.commanded(active, bool(random))
+    added = problem.random_power(random) + told
+    values, penalty = _without_offsets(problem, problem.values(active), added)
+    return problem.likelihood(values, added) - penalty - cost
 
 
 def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, np.ndarray, np.ndarray]:
     """The problem, what is left (flattened, offsets taken off) and the power that it should have."""
-    problem = Problem(data, part)
-    added = problem.random_power([t for t in terms if t.kind == SPECTRUM])
+    problem = problem_of(data, part)
+    random = [t for t in terms if t.kind == SPECTRUM]
     active = [t.active() for t in terms if t.kind == MEAN]
-    values = problem.values(active) if active else problem.base
-    values, _ = _without_offsets(problem, values, added)
+    added = problem.random_power(random) + problem.commanded(active, bool(random))[0]
+    values, _ = _without_offsets(problem, problem.values(active), added)
     return problem, values, problem.power + added
 
 
-def _start(mean: Sequence[Term]) -> np.ndarray:
-    return np.concatenate([np.full(len(t.free), 0.05) for t in mean]) if mean else np.zeros(0)
+def _start(problem: Problem, mean: Sequence[Term]) -> np.ndarray:
+    """Close to neutral; effects of the commands alone where their likelihood is highest on a coarse grid."""
+    x = np.concatenate([np.full(len(t.free), 0.05) for t in mean]) if mean else np.zeros(0)
+    place = 0
+    for t in mean:
+        here = range(place, place + len(t.free))
+        place += len(t.free)
+        if t.name not in COMMAND_ONLY or not len(problem.twin):
+            continue
+        low, high = _limits(mean)
+        best = -np.inf
+        start = x.copy()
+        for i in here:
+            for amount in GRID:
+                moved = start.copy()
+                moved[i] = np.clip(amount, low[i], high[i])
+                told, cost = problem.commanded(_active(mean, moved))
+                found = problem.likelihood(problem.base, told) - cost
+                if found > best:
+                    best, x = found, moved
+    return x
 
 
 def _active(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
@@ -213,49 +276,82 @@ def _weights(problem: Problem, values: np.ndarray, added: np.ndarray | float) ->
 
 
 def _solve(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
-           at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Step of ridge regression that lowers values + sum(step * column), and the covariance."""
+           at: np.ndarray, twin: tuple[np.ndarray, np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Step of ridge regression that lowers values + sum(step * column), and the covariance.
+
+    twin: gradient and information of the likelihood from the commands' spectra.
+    """
     j = np.array(columns)
     wj = j.conj() * weights
     normal = 2.0 * (wj @ j.T).real + np.diag(1.0 / prior ** 2)
     slope = -2.0 * (wj @ values).real - at / prior ** 2
+    if twin is not None:
+        slope, normal = slope + twin[0], normal + twin[1]
     covariance = np.linalg.pinv(normal, hermitian=True)
     return covariance @ slope, covariance
 
 
+def _bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
+                  x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
+                  twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """A step that leaves parameters at a bound there when it would take them past it."""
+    at, n = np.concatenate([x, offsets]), len(x)
+    free = np.ones(len(at), bool)
+    covariance = np.zeros((n, n))
+    gradient, information = np.zeros(len(at)), np.zeros((len(at), len(at)))
+    gradient[:n], information[:n, :n] = twin
+    for _ in range(n + 1):
+        change = np.zeros(len(at))
+        where = np.flatnonzero(free)
+        change[where], full = _solve([columns[i] for i in where], prior[where], values, weights, at[where],
+                                     (gradient[where], information[np.ix_(where, where)]))
+        stuck = np.zeros(len(at), bool)
+        stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
+        if not stuck.any():
+            inside = where[where < n]
+            covariance[np.ix_(inside, inside)] = full[:len(inside), :len(inside)]
+            break
+        free &= ~stuck
+    return change, covariance
+
+
 def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
+                  spread: np.ndarray | float, wide: bool,
                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Scaled parameters, offsets, covariance of the parameters, and what is left."""
     constants = problem.constant()
     low, high = _limits(mean)
     x = np.clip(x, low, high)
     offsets = np.zeros(len(constants))
-    prior = np.concatenate([np.full(len(x), PRIOR_UNITS), [p for _, p in constants]])
+    prior = np.concatenate([np.broadcast_to(spread, len(x)), [p for _, p in constants]])
     push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
     raw = problem.values(_active(mean, x)) if mean else problem.base
     values = raw - push(offsets)
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
         return x, offsets, covariance, values
-    cost = _cost(problem, values, added, x, offsets, prior)
+    told, price = problem.commanded(_active(mean, x), wide)
+    cost = price + _cost(problem, values, added + told, x, offsets, prior)
     for _ in range(ITERATIONS):
-        columns = []
+        columns, others = [], []
         for i in range(len(x)):
             step = 0.02 if x[i] + 0.02 <= high[i] else -0.02
             moved = x.copy()
             moved[i] += step
-            columns.append((problem.values(_active(mean, moved)) - raw) / step)
+            others.append((_active(mean, moved), step))
+            columns.append((problem.values(others[-1][0]) - raw) / step)
         columns += [-c for c, _ in constants]
-        change, full = _solve(columns, prior, values, _weights(problem, values, added),
-                              np.concatenate([x, offsets]))
-        covariance = full[:len(x), :len(x)]
+        change, covariance = _bounded_step(
+            columns, prior, values, _weights(problem, values, added + told), x, offsets, low, high,
+            problem.twin.slopes(_active(mean, x), others, wide))
         scale, better = 1.0, False
         while scale > 0.05:
             new_x = np.clip(x + scale * change[:len(x)], low, high)
             new_o = offsets + scale * change[len(x):]
             new_raw = problem.values(_active(mean, new_x)) if mean else problem.base
             new_values = new_raw - push(new_o)
-            new_cost = _cost(problem, new_values, added, new_x, new_o, prior)
+            new_told, price = problem.commanded(_active(mean, new_x), wide)
+            new_cost = price + _cost(problem, new_values, added + new_told, new_x, new_o, prior)
             if new_cost < cost - 1e-9:
                 better = True
                 break
@@ -263,7 +359,7 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
         if not better:
             break
         gain, cost = cost - new_cost, new_cost
-        x, offsets, raw, values = new_x, new_o, new_raw, new_values
+        x, offsets, raw, values, told = new_x, new_o, new_raw, new_values, new_told
         if gain < 0.01:
             break
     return x, offsets, covariance, values
@@ -288,10 +384,11 @@ def _without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | f
     return left, 0.5 * float(((found / prior) ** 2).sum())
 
 
-def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray) -> Term:
+def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray,
+              told: np.ndarray) -> Term:
     """A random effect's strength of highest likelihood, the others as they are."""
     term = random[which]
-    others = problem.random_power([t for i, t in enumerate(random) if i != which])
+    others = told + problem.random_power([t for i, t in enumerate(random) if i != which])
     low, high = term.bounds()
     unit = problem.random_power([term.fitted(np.ones(len(term.free)))])
     if not unit.any():

@@ -1,0 +1,214 @@
+"""Twin view: the closed loop seen in the power spectra of the commands.
+
+What the controller is told is driven by noise that no log holds, so commands cannot be
+predicted sample by sample; their spectra can. Flights declared nominal give the spectra
+of level flight and, through `loop_model`, the controller and its noise; a hypothesis
+then multiplies them by the ratio of the modelled spectra with and without it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import minimize
+from scipy.signal import butter, sosfiltfilt
+
+from airtouch.gap.flight import PERIOD_S, Flight
+from airtouch.gap.loop_model import AXES, Controller, firmware, spectra
+from airtouch.logs.segments import KINDS
+from airtouch.simulation.effects import Active
+from airtouch.simulation.flight import prepare
+from airtouch.vehicle import Vehicle
+
+LENGTH = 128  #: samples of a block
+BAND_HZ = (1.5, 40.0)  #: below it set-points, which no log holds, move the commands
+HIGHPASS_HZ = 0.6
+MIX = 0.25 * np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]], dtype=np.float64)
+EDGE_S = (0.1, 0.4)  #: left out before and after a change of phase at an edge, take-off or landing
+PLATFORM = KINDS.index("over platform")
+STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
+FEWEST = 6  #: blocks of nominal flights, for a twin view
+SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
+SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
+#: fields of the plant by which effects change the loop
+FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "height_gain",
+          "motor_rise", "motor_fall", "inertia", "mass", "gain")
+#: effects that change the commands alone: replayed motor commands hold nothing of them
+COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
+
+
+@dataclass(frozen=True)
+class Twin:
+    """The nominal loops: a controller, noise strengths (sources,) and floor (bins,) for each of AXES.
+
+    floor: PSD of the commands, N^2/Hz, of `blocks` blocks; known: axes whose model fits.
+    """
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    controllers: tuple[Controller, ...]
+    by_firmware: bool
+    strengths: tuple[np.ndarray, ...]
+    floor: np.ndarray
+    blocks: int
+
+    def ratio(self, active: Sequence[Active]) -> np.ndarray:
+        """Expected power of the commands over that of nominal flights, (bins, AXES)."""
+        row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
+        key = tuple(np.round(np.concatenate([np.ravel(row[k]) for k in FIELDS]), 12))
+        kept = self.__dict__.setdefault("_kept", {})
+        if key not in kept:
+            if len(kept) > 500:
+                kept.clear()
+            kept[key] = self._power(row) / self._nominal()
+        return kept[key]
+
+    def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
+        """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""
+        told = commands(flight, self.vehicle)
+        ratio = self.ratio(active)
+        if np.all(ratio == 1.0):
+            return told
+        f = np.fft.rfftfreq(len(told), PERIOD_S)
+        spectrum = np.fft.rfft(told, axis=0)
+        for i in range(len(AXES)):
+            spectrum[:, i] /= np.sqrt(np.interp(f, frequencies(), ratio[:, i]))
+        return np.fft.irfft(spectrum, len(told), axis=0)
+
+    def _nominal(self) -> np.ndarray:
+        if "_base" not in self.__dict__:
+            self.__dict__["_base"] = self._power(prepare(self.vehicle, self.calibration)[0][0])
+        return self.__dict__["_base"]
+
+    def _power(self, row: Any) -> np.ndarray:
+        f = frequencies()
+        made = []
+        for i, axis in enumerate(AXES):
+            controller = firmware(row, axis) if self.by_firmware else self.controllers[i]
+            made.append(self.strengths[i] @ spectra(controller, row, axis, f))
+        return np.stack(made, axis=1)
+
+
+def frequencies() -> np.ndarray:
+    """Hz of the bins that are judged."""
+    return _every()[_kept()]
+
+
+def _every() -> np.ndarray:
+    return np.fft.rfftfreq(LENGTH, PERIOD_S)
+
+
+def _kept() -> np.ndarray:
+    return (_every() >= BAND_HZ[0]) & (_every() <= BAND_HZ[1])
+
+
+def highpassed(values: np.ndarray) -> np.ndarray:
+    """What changes faster than HIGHPASS_HZ, (n,) or (n, c)."""
+    low = butter(2, HIGHPASS_HZ * 2.0 * PERIOD_S, output="sos")
+    return values - sosfiltfilt(low, values, axis=0, padlen=min(60, len(values) - 2))
+
+
+def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
+    """Collective, roll, pitch and yaw commands (n, 4), N per motor, above HIGHPASS_HZ."""
+    kept = flight.memory.get("commands")
+    if kept is None:
+        kept = flight.memory["commands"] = highpassed(vehicle.thrust(flight.pwm) @ MIX.T)
+    return kept
+
+
+def steady(flight: Flight) -> np.ndarray:
+    """Samples (n,) of level flight away from edges, take-off and landing."""
+    inside = np.isin(flight.phase, STEADY) & (flight.usable | flight.lost)
+    part = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
+    before, after = (int(x / PERIOD_S) for x in EDGE_S)
+    for k in np.flatnonzero(np.diff(part)) + 1:
+        inside[max(k - before, 0):k + after] = False
+    return inside
+
+
+def starts(flight: Flight) -> np.ndarray:
+    """First samples of the blocks, half overlapping."""
+    bad = np.cumsum(np.concatenate([[0], ~steady(flight)]))
+    found, k = [], 0
+    while k + LENGTH <= len(flight):
+        if bad[k + LENGTH] == bad[k]:
+            found.append(k)
+            k += LENGTH // 2
+        else:
+            k += 1
+    return np.array(found, int)
+
+
+def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+    """First samples and spectra (blocks, bins, AXES) of the commands, N/sqrt(Hz)."""
+    kept = flight.memory.get("twin")
+    if kept is None:
+        first = starts(flight)
+        window = np.hanning(LENGTH + 1)[:-1]
+        scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
+        told = commands(flight, vehicle)[:, :len(AXES)]
+        cut = told[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
+        made = np.fft.rfft(cut * window[:, None], axis=1)[:, _kept()] * scale
+        kept = flight.memory["twin"] = (first, made)
+    return kept
+
+
+def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> Twin | None:
+    """Controller, noise and floor of flights declared nominal; None where they have too few blocks."""
+    every = np.concatenate([block_spectra(f, vehicle)[1] for f in flights]) if flights else np.zeros((0, 1, 3))
+    if len(every) < FEWEST:
+        return None
+    power = (np.abs(every) ** 2).mean(axis=0)
+    row = prepare(vehicle, calibration)[0][0]
+    documented = [_fit(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
+    found = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
+    weight = 0.5 * len(every)
+    by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
+    chosen = documented if by_firmware else found
+    twin = Twin(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
+                tuple(c[0] for c in chosen), power, len(every))
+    model = twin._nominal()
+    return replace(twin, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
+
+
+def _fit(controller: Controller, row: Any, axis: str, power: np.ndarray,
+         steps: int = 300) -> tuple[np.ndarray, float, Controller]:
+    """Noise strengths of highest Whittle likelihood, its negative per block, and the controller."""
+    shapes = spectra(controller, row, axis, frequencies())
+    scale = power.mean() / shapes.mean(axis=1)
+    shapes = shapes * scale[:, None]
+    a = np.full(len(shapes), 1.0 / len(shapes))
+    for _ in range(steps):  # multiplicative updates for the Itakura-Saito divergence
+        model = a @ shapes
+        a = np.maximum(a * np.sqrt((shapes @ (power / model ** 2)) / (shapes @ (1.0 / model))), 1e-9)
+    e = power / (a @ shapes)
+    return a * scale, float((e - np.log(e) - 1.0).sum()), controller
+
+
+def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, Controller]:
+    """A cascade's gains found from the shape of the spectrum, near those that vehicles of its size have."""
+    usual = firmware(row, axis)
+    middle = np.log([usual.gain, usual.angle, max(usual.velocity, 1e-3)])
+    spread = np.array([0.7, 0.4, 0.5])
+    free = 2 if axis == "thrust" else 3
+
+    def controller(x: np.ndarray) -> Controller:
+        values = np.exp(middle + spread * np.concatenate([x, np.zeros(3 - len(x))]))
+        return Controller(values[0], values[1], values[2] if free == 3 else 0.0)
+
+    def cost(x: np.ndarray) -> float:
+        return 8.0 * _fit(controller(x), row, axis, power, 40)[1] + 0.5 * float(x @ x)
+
+    corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in (-1.0, 0.5)]
+    best = min((minimize(cost, x[0], method="Nelder-Mead", options={
+        "initial_simplex": x, "maxfev": 80, "xatol": 0.03, "fatol": 0.02}) for x in corners), key=lambda r: r.fun)
+    return _fit(controller(best.x), row, axis, power)
+
+
+def shapes() -> np.ndarray:
+    """Smooth shapes (SHAPES, bins) over the logarithm of frequency: level, slope, slow waves."""
+    x = np.log(frequencies())
+    x = (x - x[0]) / (x[-1] - x[0])
+    return np.array([np.cos(np.pi * k * x) for k in range(SHAPES)])

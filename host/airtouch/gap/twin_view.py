@@ -1,0 +1,123 @@
+"""Likelihood of the commands' spectra under a hypothesis: the twin view's part of a fit.
+
+A hypothesis multiplies the floor by a ratio. What the floor may be wrong by (few nominal
+flights, other air on other days) is a few smooth shapes of its logarithm, each with a
+prior, found anew for every flight and axis.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.flight import Flight
+from airtouch.gap.spectra import LENGTH as AIR_LENGTH
+from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT
+from airtouch.gap.twin import AXES, LENGTH, SHAPES, SPREAD, Twin, block_spectra, frequencies, shapes
+from airtouch.simulation.effects import Active
+
+FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
+FREEDOM = 20.0
+ROUNDS = 4
+WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold
+NOTHING = np.zeros(0)
+
+
+class TwinView:
+    """Blocks of the commands of some flights: values (elements,) with their floor, ratio and slopes."""
+
+    def __init__(self, twin: Twin | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
+                 pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
+        self.twin, self.kept = twin, {}
+        self.spectra: list[np.ndarray] = []
+        self.flights: list[int] = []
+        if twin is not None:
+            for i, regime, chosen in pieces:
+                if regime != AIR or not chosen.any():
+                    continue
+                begin, every = block_spectra(flights[i], twin.vehicle)
+                middle = first[i][AIR] + AIR_LENGTH[AIR] // 2
+                nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1) if len(begin) else []
+                mine = every[chosen[nearest]] if len(begin) else every
+                if len(mine):
+                    self.spectra.append(mine)
+                    self.flights.append(i)
+            self.shapes = shapes()
+            self.spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1))
+        flat = [s.ravel() for s in self.spectra]
+        self.values = np.concatenate(flat) if flat else NOTHING.astype(complex)
+        self.floor = self._spread_out(lambda i: twin.floor) if flat else NOTHING
+        axis = np.arange(len(AXES)) + FIRST_CHANNEL
+        self.channel = self._spread_out(lambda i: np.broadcast_to(axis, _shape(self.spectra[i])))
+        self.frequency = self._spread_out(lambda i: np.repeat(frequencies()[:, None], len(AXES), axis=1))
+        self.flight = self._spread_out(lambda i: np.full(_shape(self.spectra[i]), self.flights[i]))
+        self.freedom = np.full(len(self.values), FREEDOM)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def _spread_out(self, table_of: Any) -> np.ndarray:
+        """A table (bins, axes) for each flight, once for each of its blocks, flattened."""
+        made = [np.broadcast_to(table_of(i), s.shape).ravel() for i, s in enumerate(self.spectra)]
+        return np.concatenate(made) if made else NOTHING
+
+    def power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+        """Expected power (elements,), the floor's own uncertainty found anew, and what that costs."""
+        if not len(self):
+            return NOTHING, 0.0
+        ratio = self.twin.ratio(active)
+        key = (ratio.tobytes(), wide)
+        if key not in self.kept:
+            if len(self.kept) > 300:
+                self.kept.clear()
+            made, cost = [], 0.0
+            for s in self.spectra:
+                wrong, price, _ = self._shift(s, ratio, wide)
+                cost += price
+                made.append(np.broadcast_to(self.twin.floor * ratio * np.exp(wrong), s.shape).ravel())
+            self.kept[key] = (np.concatenate(made), cost)
+        return self.kept[key]
+
+    def slopes(self, active: Sequence[Active], moved: Sequence[tuple[Sequence[Active], float]],
+               wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient (k,) and information (k, k) of the likelihood for k parameters.
+
+        moved: for each the hypothesis with it moved, and by how much.
+        """
+        k = len(moved)
+        gradient, information = np.zeros(k), np.zeros((k, k))
+        if not len(self):
+            return gradient, information
+        ratio = self.twin.ratio(active)
+        rise = np.array([np.log(self.twin.ratio(m) / ratio) / step for m, step in moved])
+        if not rise.any():
+            return gradient, information
+        for s in self.spectra:
+            _, _, (push, count, covariance) = self._shift(s, ratio, wide)
+            for a in range(len(AXES)):
+                j = rise[:, :, a]
+                gradient += j @ push[:, a]
+                cross = count * j @ self.shapes.T
+                information += count * j @ j.T - cross @ covariance @ cross.T
+        return gradient, information
+
+    def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, tuple]:
+        """Log of the floor's correction (bins, axes), its cost, and what `slopes` needs."""
+        e0 = np.abs(s) ** 2 / (self.twin.floor * ratio)
+        spread = self.spread * (WIDE if wide else 1.0)
+        count = OVERLAP_WEIGHT * len(s)
+        normal = count * self.shapes @ self.shapes.T + np.diag(1.0 / spread ** 2)
+        covariance = np.linalg.inv(normal)
+        amount = np.zeros((SHAPES, len(AXES)))
+        for _ in range(ROUNDS):
+            e = e0 * np.exp(-self.shapes.T @ amount)
+            push = OVERLAP_WEIGHT * ((FREEDOM + 1.0) * e / (FREEDOM + e) - 1.0).sum(axis=0)
+            amount += covariance @ (self.shapes @ push - amount / spread[:, None] ** 2)
+        cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
+        cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
+        return self.shapes.T @ amount, cost, (push, count, covariance)
+
+
+def _shape(spectra: np.ndarray) -> tuple[int, int]:
+    """Bins and axes of spectra (blocks, bins, axes)."""
+    return spectra.shape[1], spectra.shape[2]
