@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sample_guard.h"
+#include "start_up_math.h"
 
 #define BIN_TOLERANCE 1e-3f
 #define HALF_PI 1.57079632679489662f
@@ -39,8 +40,12 @@ static void twiddle(uint32_t i, uint32_t n, float *cosine, float *sine) {
   const uint32_t rest = 4 * i - quadrant * n;
   const bool swap = 2 * rest > n;
   const float angle = HALF_PI * (float)(swap ? n - rest : rest) / (float)n;
-  const float c = swap ? sinf(angle) : cosf(angle);
-  const float s = swap ? cosf(angle) : sinf(angle);
+  float c, s;
+  if (swap) {
+    sineCosine(angle, &c, &s);
+  } else {
+    sineCosine(angle, &s, &c);
+  }
   const bool odd = (quadrant & 1u) != 0;
   const float x = odd ? s : c;
   const float y = odd ? c : s;

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sample_guard.h"
+#include "start_up_math.h"
 
 /** Beyond so many time constants e^-t is less than half a unit in the last place of 1. */
 #define SETTLED 20.0f
@@ -50,29 +51,9 @@ void zScoreWindow(const float *features, uint16_t window, uint16_t columns, floa
   }
 }
 
-/** 1 - e^-x for x > 0: a series, then doublings of x. No library's rounding is in it. */
-static float decayRate(float x) {
-  if (!(x < SETTLED)) {
-    return 1.0f;
-  }
-  int doublings = 0;
-  for (; x > 0.5f; x *= 0.5f) {
-    doublings++;
-  }
-  float rest = 1.0f;
-  for (int i = 9; i >= 3; i--) {
-    rest = 1.0f - x / (float)i * rest;
-  }
-  float rate = x - 0.5f * x * x * rest;
-  for (; doublings > 0; doublings--) {
-    rate *= 2.0f - rate;
-  }
-  return rate;
-}
-
 void exponentialMeanInit(exponentialMean_t *self, float timeConstant) {
   memset(self, 0, sizeof(*self));
-  self->rate = decayRate(1.0f / timeConstant);
+  self->rate = -exponentialLessOne(-1.0f / timeConstant);
   const float settle = SETTLED * timeConstant;
   self->settle = settle < LONGEST_SETTLE ? (uint32_t)settle + 1u : (uint32_t)LONGEST_SETTLE;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "sample_guard.h"
+#include "start_up_math.h"
 
 #define POWER_LIMIT 1e30f
 #define MAX_CELLS 32767u
@@ -13,12 +14,12 @@ bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, flo
                 size_t floats) {
   memset(self, 0, sizeof(*self));
   const uint32_t lag = (uint32_t)leadingWindow + guardCells;
-  if (leadingWindow == 0 || lag > MAX_CELLS || floats < lag || !(pFa > 0.0f && pFa < 1.0f)) {
+  if (leadingWindow == 0 || lag > MAX_CELLS || floats < lag || !(pFa >= FLT_MIN && pFa < 1.0f)) {
     return false;
   }
   self->leadingWindow = leadingWindow;
   self->lag = (uint16_t)lag;
-  self->factor = expm1f(-logf(pFa) / (float)leadingWindow);
+  self->factor = exponentialLessOne(-naturalLogarithm(pFa) / (float)leadingWindow);
   self->ring = storage;
   frCfarReset(self);
   return true;

@@ -27,7 +27,7 @@ LIBC = Path(__file__).resolve().parent / "libc"
 
 #: As the desktop library is compiled: without contraction a multiply-add rounds twice on both.
 FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Wdouble-promotion", "-Werror",
-         "-fno-asynchronous-unwind-tables", "-fomit-frame-pointer", "-g0")
+         "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-fomit-frame-pointer", "-g0")
 _ZIG_FLAGS = ("-fhosted", "-fno-sanitize=undefined", "-fno-stack-protector")
 
 

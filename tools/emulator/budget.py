@@ -1,0 +1,23 @@
+"""What each kernel may cost on each core: tests/emulation/budget.toml, and what of it is exceeded."""
+
+import tomllib
+from dataclasses import fields
+from pathlib import Path
+
+from tools.emulator.build import ROOT
+from tools.emulator.flight_code import Cost
+
+PATH = ROOT / "tests" / "emulation" / "budget.toml"
+
+
+def load(core: str, path: Path = PATH) -> dict[str, Cost]:
+    """Kernel -> what it may cost at most."""
+    with open(path, "rb") as file:
+        table = tomllib.load(file)
+    return {kernel: Cost(**limits) for kernel, limits in table[core].items()}
+
+
+def excess(name: str, cost: Cost, limit: Cost) -> list[str]:
+    """A sentence for each number over its limit."""
+    pairs = [(f.name, getattr(cost, f.name), getattr(limit, f.name)) for f in fields(Cost)]
+    return [f"{name}: {what} is {is_:,.0f}, the budget {may:,.0f}" for what, is_, may in pairs if is_ > may]
