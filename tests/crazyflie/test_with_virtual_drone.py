@@ -109,7 +109,7 @@ def test_thirty_percent_packet_loss_of_everything(hop, cache, tmp_path):
 
 
 def test_a_connection_is_made_through_losses(hop, cache):
-    with serve(hop, port=0, speed=SPEED, faults=("loss=0.1,all",)) as virtual:
+    with serve(hop, port=0, speed=SPEED, faults=("loss=0.05,all",)) as virtual:
         drone = Drone(virtual.uri, cache)
         try:
             drone.start(blocks.MOTION)

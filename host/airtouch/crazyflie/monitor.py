@@ -50,7 +50,6 @@ class Monitor:
     _before_ms: int | None = None
     _edges: int | None = None
     _arrivals: deque = field(default_factory=deque)
-    _drops: deque = field(default_factory=deque)
 
     def take(self, samples: list[Sample]) -> None:
         """New packets. Raises Restarted when the drone's clock started anew."""

@@ -1,0 +1,101 @@
+"""The board behind `monitor`: edges from packets, with and without losses, and from the app's counter."""
+
+import time
+
+import numpy as np
+import pytest
+
+from airtouch.crazyflie import app_log, blocks
+from airtouch.crazyflie.board import Board
+from airtouch.crazyflie.drone import Sample
+from airtouch.crazyflie.host_detector import HostDetector
+from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.monitor import Monitor
+from airtouch.detector import best
+from airtouch.logs.flight_log import ACC_WORLD, FlightLog
+from airtouch.simulation import batch
+
+G = 9.81
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return batch.simulate("paper-4cm")[0]
+
+
+def compressed(roll, pitch, yaw):
+    """Bitcraze's 32 bits of an attitude near level: w is the largest component."""
+    x, y, z = 0.5 * roll, 0.5 * pitch, 0.5 * yaw
+    word = 3
+    for component in (x, y, z):
+        word = word << 10 | (component < 0) << 9 | min(int(511 * abs(component) * np.sqrt(2) + 0.5), 511)
+    return word
+
+
+def packets(log, loss=0.0, seed=0):
+    """The flight's packets as the firmware would send them, some of them lost."""
+    rng = np.random.default_rng(seed)
+    for k in range(len(log)):
+        row = {name: log[name][k] for name in log.columns}
+        stamp, arrival = (2**24 - 5000 + 10 * k) % 2**24, 0.01 * k
+        fast = {f"acc.{a}": float(np.float16(row[f"acc_{a}_mps2"] / G)) for a in "xyz"}
+        fast |= {f"gyro.{a}": float(np.float16(np.degrees(row[f"gyro_{a}_radps"]))) for a in "xyz"}
+        fast |= {f"motor.m{i}": int(row[f"m{i}_pwm"]) for i in range(1, 5)}
+        fast |= {"range.zrange": int(1000 * np.nan_to_num(row["zrange_m"])), "pm.vbat": 3.9}
+        slow = dict.fromkeys(blocks.STATE.names, 0) | {f"stateEstimateZ.{a}": int(1000 * row[f"{a}_m"]) for a in "xyz"}
+        slow["stateEstimateZ.quat"] = compressed(row["roll_rad"], row["pitch_rad"], row["yaw_rad"])
+        if k % 5 == 0 and rng.random() >= loss:
+            yield Sample(blocks.STATE.name, stamp, arrival, slow)
+        if rng.random() >= loss:
+            yield Sample(blocks.MOTION.name, stamp, arrival, fast)
+
+
+def watch(log, **how):
+    monitor = Monitor(Board("test", "best", best.lag_s(None)), Intake(blocks.STATE), HostDetector())
+    waiting = []
+    for sample in packets(log, **how):
+        waiting.append(sample)
+        if len(waiting) == 7:
+            monitor.take(waiting)
+            waiting = []
+    monitor.take(waiting)
+    return monitor
+
+
+def test_edges_are_felt_where_the_log_feels_them(flight):
+    monitor = watch(flight)
+    body = FlightLog({n: v for n, v in flight.columns.items() if n not in ACC_WORLD}, flight.meta)
+    expected = best.run(body).edges  # of body accelerations and attitude at 100 Hz, uncompressed
+    assert [f.kind for f in monitor.board.felt] == [e.kind for e in expected] and len(expected) == 2
+    for felt, edge in zip(monitor.board.felt, expected, strict=True):
+        assert felt.at_s == pytest.approx(edge.sample / 100, abs=0.1)
+        at = int(round(100 * (felt.at_s - monitor.board.lag_s)))
+        assert felt.x_m == pytest.approx(flight["x_m"][at], abs=0.06)
+    assert monitor.intake.lost == 0 and monitor.detector.taken == len(flight)
+
+
+def test_losses_move_them_little_for_the_clock_stays_true(flight):
+    whole, holed = watch(flight), watch(flight, loss=0.3)
+    assert holed.detector.taken == pytest.approx(len(flight), abs=8)
+    assert [f.kind for f in holed.board.felt] == [f.kind for f in whole.board.felt]
+    for felt, expected in zip(holed.board.felt, whole.board.felt, strict=True):
+        assert felt.at_s == pytest.approx(expected.at_s, abs=0.25)
+    holed.intake.last_arrival_s = time.monotonic()
+    holed.refresh(0.004)
+    assert holed.board.link.lost == pytest.approx(0.3, abs=0.03) and "round trip 4 ms" in str(holed.board.link)
+
+
+def test_the_apps_own_edges_are_shown_once_each_at_their_time():
+    said = []
+    monitor = Monitor(Board("test", "app"), Intake(None), None, said.append)
+    motion = dict.fromkeys(blocks.MOTION.names, 0.0)
+    app = dict.fromkeys(app_log.WANTED.names, 0) | {"airtouch.prob": 0.9, "airtouch.detector": 2}
+    for k in range(300):
+        app |= {"airtouch.steps": k}
+        if k == 137:
+            app |= {"airtouch.edges": 1, "airtouch.edge": 1, "airtouch.edgeStep": 137}
+        monitor.take([Sample(blocks.MOTION.name, 10 * k, 0.01 * k, motion)])
+        if k % 5 == 0:
+            monitor.take([Sample(app_log.WANTED.name, 10 * k, 0.01 * k, dict(app))])
+    assert [(f.kind, pytest.approx(f.at_s, abs=0.011)) for f in said] == [("entry", 1.37)]
+    assert monitor.board.detector == "best on the GAP8" and monitor.board.status.startswith("app 0 us")
