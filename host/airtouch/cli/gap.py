@@ -85,7 +85,7 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
 @command.command("diagnose", cls=Greedy)
 @_shared
 @click.option("--without", multiple=True, metavar="EFFECT", help="Leave a candidate out; may be given again.")
-@click.option("--effects-file", "effect_files", multiple=True, metavar="FILE",
+@click.option("--effects-file", "--effect-file", "effect_files", multiple=True, metavar="FILE",
               help="Python file with effects of your own; may be given again.")
 @click.option("--each", is_flag=True, help="Every flight is a case of its own.")
 def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],

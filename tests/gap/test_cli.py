@@ -1,0 +1,107 @@
+"""`airtouch gap` from the outside: files, folders, patterns, JSON, report, exit codes."""
+
+import json
+import math
+
+import pytest
+import short_flights
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli.gap import command
+from airtouch.cli.gap_input import Flights, files_of, vehicle_of
+from airtouch.errors import AirTouchError
+
+VERDICTS = ("effect", "none", "unknown")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two simulated flights with a forward push that no baseline flight has, and two without."""
+    made = tmp_path_factory.mktemp("gap")
+    for i, log in enumerate(short_flights.fly(4)):
+        if i < 2:
+            log = log.with_columns({"acc_x_mps2": log["acc_x_mps2"] + 0.8})
+        logs.write(log, made / f"{'real' if i < 2 else 'nominal'}_{i}.csv.gz")
+    (made / "manifest.csv").write_text("file,effect\n")
+    (made / "notes.md").write_text("not a log")
+    return made
+
+
+def run(*arguments):
+    return CliRunner().invoke(command, [str(a) for a in arguments])
+
+
+def no_constant(name):
+    raise ValueError(name)
+
+
+def test_measure_writes_json_and_report(folder, tmp_path):
+    out, page = tmp_path / "out.json", tmp_path / "out.html"
+    result = run("measure", f"{folder}/real_*", "--json", out, "--report", page)
+    assert result.exit_code == 0, result.output
+    table = json.loads(out.read_text(), parse_constant=no_constant)
+    assert len(table["flights"]) == 2 and len(table["where"]) >= 10 and "2 flights against crazyflie" in result.output
+    assert all({"channel", "band_hz", "phase", "gap", "floor", "unit"} <= set(c) for c in table["where"])
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    again = run("measure", f"{folder}/real_*", "--json", out)
+    assert isinstance(again.exception, AirTouchError) and "--force" in str(again.exception)
+    assert run("measure", f"{folder}/real_0*", "--json", out, "--force").exit_code == 0
+
+
+def test_folders_files_and_patterns(folder):
+    names = [p.name for p in files_of([str(folder)])]
+    assert names == ["nominal_2.csv.gz", "nominal_3.csv.gz", "real_0.csv.gz", "real_1.csv.gz"]
+    assert len(files_of([f"{folder}/real_0.csv.gz", f"{folder}/real*"])) == 2
+    with pytest.raises(AirTouchError, match="no such flight log"):
+        files_of([f"{folder}/nothing*"])
+
+
+def test_baseline_takes_every_file_up_to_the_next_option(folder, tmp_path):
+    out = tmp_path / "out.json"
+    result = run("diagnose", folder / "real_0.csv.gz", folder / "real_1.csv.gz", "--baseline",
+                 folder / "nominal_2.csv.gz", folder / "nominal_3.csv.gz", "--json", out,
+                 "--without", "flow_scale", "--without", "range_step")
+    assert result.exit_code == 0, result.output
+    table = json.loads(out.read_text(), parse_constant=no_constant)
+    assert table["verdict"] in VERDICTS and len(table["flights"]) == 2
+    assert {"effects", "ranking", "indistinguishable", "where", "gap", "advice"} <= set(table)
+    assert math.isclose(sum(r["probability"] for r in table["ranking"]), 1.0, abs_tol=1e-3)
+    names = [r["name"] for r in table["ranking"]]
+    assert {"none", "unknown", "imu_bias"} <= set(names) and not {"flow_scale", "range_step"} & set(names)
+    assert [r["probability"] for r in table["ranking"]] == sorted((r["probability"] for r in table["ranking"]),
+                                                                  reverse=True)
+    assert set(table["gap"]) >= {"before", "after", "floor"}
+    assert "Ranking" in result.output
+
+
+def test_an_unknown_effect_or_vehicle_is_an_error(folder):
+    real = folder / "real_0.csv.gz"
+    for arguments, words in ((("--without", "magic"), "no effect 'magic'"), (("--vehicle", "x.toml"), "x.toml"),
+                             (("--effects-file", "x.py"), "x.py"), (("--dask", "tcp://127.0.0.1:1"), "dask")):
+        result = run("diagnose", real, *arguments, "--each")
+        assert isinstance(result.exception, AirTouchError) and words in str(result.exception), result.output
+
+
+def test_a_log_that_cannot_be_read_is_left_out(folder, tmp_path):
+    (tmp_path / "bad.csv").write_text("")
+    result = run("measure", folder / "real_0.csv.gz", tmp_path / "bad.csv")
+    assert result.exit_code == 0 and "bad.csv: the file is empty" in result.output
+    alone = run("measure", tmp_path / "bad.csv")
+    assert isinstance(alone.exception, AirTouchError) and "the file is empty" in str(alone.exception)
+
+
+def test_the_log_names_the_vehicle(folder, tmp_path, capsys):
+    log = logs.read(folder / "real_0.csv.gz")
+    for said, name in (("crazyflie-2.1", "crazyflie-2.1"), ("mine", "crazyflie-2.1-flow"), ("", "crazyflie-2.1-flow")):
+        path = tmp_path / f"{said or 'none'}.csv"
+        logs.write(log.with_columns({}, vehicle=said), path)
+        assert vehicle_of(None, Flights([str(path)])).name == name
+        assert ("'mine'" in capsys.readouterr().err) == (said == "mine")
+    assert vehicle_of("crazyflie-2.1", Flights([str(path)])).name == "crazyflie-2.1"
+
+
+def test_help_lists_the_commands():
+    result = run("--help")
+    assert all(name in result.output for name in ("measure", "diagnose", "blind"))
+    assert "make" in run("blind", "--help").output
