@@ -10,8 +10,8 @@ from airtouch.sitl import Server, serve
 from airtouch.sitl.packet import MOST_DATA, Packet, parse
 
 ECHO = bytes([15 << 4 | 0x0C]) + b"are you there"
-PACKETS = st.lists(st.tuples(st.integers(0, 15), st.integers(0, 3), st.integers(0, 15), st.binary(max_size=MOST_DATA)),
-                   min_size=1, max_size=20)
+PACKETS = st.lists(st.tuples(st.integers(0, 15), st.integers(0, 3), st.integers(0, 15),
+                             st.binary(max_size=MOST_DATA)), min_size=1, max_size=20)
 server = None
 
 

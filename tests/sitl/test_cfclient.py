@@ -54,7 +54,8 @@ cf.close_link()
 
 def test_headless_client_log_configurations_and_log_files(tmp_path):
     pytest.importorskip("cfclient")
-    environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"}
+    environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path),
+                   "QT_QPA_PLATFORM": "offscreen"}
     with serve("hover", port=0, without=["gust"]) as virtual:
         done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri], env=environment, timeout=60,
                               capture_output=True, text=True)

@@ -12,7 +12,8 @@ MOTION = {**{f"acc.{a}": "FP16" for a in "xyz"}, **{f"gyro.{a}": "FP16" for a in
 TYPES = {"acc.x": "float", "gyro.z": "float", "gyro.xRaw": "int16_t", "stateEstimate.qw": "float",
          "stateEstimateZ.az": "int16_t", "stateEstimateZ.quat": "uint32_t", "motor.m4": "uint16_t",
          "motor.m1req": "int32_t", "range.zrange": "uint16_t", "range.up": "uint16_t", "pm.vbat": "float",
-         "pm.state": "int8_t", "supervisor.info": "uint16_t", "stabilizer.yaw": "float", "kalman.varPX": "float",
+         "pm.state": "int8_t", "supervisor.info": "uint16_t", "stabilizer.yaw": "float",
+         "kalman.varPX": "float",
          "airtouch.prob": "float", "airtouch.edges": "uint16_t", "airtouch.health": "uint16_t"}
 
 
@@ -24,8 +25,9 @@ def test_connect_tables_parameters_and_ten_seconds_at_100_hz(cflib, tmp_path):
         for name, kind in TYPES.items():
             assert cf.log.toc.get_element_by_complete_name(name).ctype == kind, name
         assert len(cf.log.toc.toc) == len({v.group for v in virtual.firmware.log.toc.items})
-        for name, value in {"deck.bcFlow2": 1, "deck.bcMultiranger": 1, "deck.bcAI": 1, "commander.enHighLevel": 0,
-                            "airtouch.detector": 2, "stabilizer.estimator": 2}.items():
+        for name, value in {"deck.bcFlow2": 1, "deck.bcMultiranger": 1, "deck.bcAI": 1,
+                            "commander.enHighLevel": 0, "airtouch.detector": 2,
+                            "stabilizer.estimator": 2}.items():
             assert int(cf.param.get_value(name)) == value, name
         # a parameter is set, and one out of range is put right by the app
         cf.param.set_value("airtouch.pFa", 1e-3)
@@ -80,8 +82,9 @@ def test_clients_come_and_go(cflib, tmp_path):
                 wait_for(lambda rows=rows: len(rows) > 5)
                 said = []
                 cf.console.receivedChar.add_callback(said.append)
-                virtual.firmware.say("hello, a long line on the console of the drone")
-                wait_for(lambda said=said: "hello, a long line on the console of the drone\n" in "".join(said))
+                line = "hello, a long line on the console of the drone"
+                virtual.firmware.say(line)
+                wait_for(lambda said=said: line + "\n" in "".join(said))
         with connected(virtual.uri) as cf:
             wait_for(lambda: cf.link_statistics.latency.latency > 0.0)
             assert "Can fly" in cf.supervisor.read_state_list()
@@ -101,8 +104,9 @@ def test_sweep_over_a_platform_is_felt(cflib):
         plan, rows = virtual.plan, []
         start, _, end, _ = plan.world.box[0]
         height = plan.values["cruise"]
-        log_block(cf, "edges", 10, {"stateEstimate.x": "float", "range.zrange": "uint16_t", "airtouch.edges": "uint16_t",
-                                    "airtouch.edge": "uint8_t", "airtouch.health": "uint16_t"}, rows)
+        log_block(cf, "edges", 10, {"stateEstimate.x": "float", "range.zrange": "uint16_t",
+                                    "airtouch.edges": "uint16_t", "airtouch.edge": "uint8_t",
+                                    "airtouch.health": "uint16_t"}, rows)
         fly = cf.high_level_commander
 
         def let_fly(seconds):

@@ -14,14 +14,15 @@ ECHO = bytes([15 << 4 | 0x0C]) + b"hello"
 
 
 def start(*arguments):
-    return subprocess.Popen([sys.executable, "-c", "from airtouch.cli import main; main()", "sitl", *arguments],
+    program = "from airtouch.cli import main; main()"
+    return subprocess.Popen([sys.executable, "-c", program, "sitl", *arguments],
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def test_serves_until_ctrl_c_and_records(tmp_path):
     path = tmp_path / "flight.csv"
-    with start("hover", "--port", "0", "--effect", "wind:x=0.3m/s", "--without", "gust", "--fault", "late=1ms",
-               "--record", str(path)) as process:
+    with start("hover", "--port", "0", "--effect", "wind:x=0.3m/s", "--without", "gust",
+               "--fault", "late=1ms", "--record", str(path)) as process:
         uri = process.stdout.readline().split(": ")[0]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
             client.settimeout(10.0)

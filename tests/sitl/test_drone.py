@@ -178,15 +178,17 @@ def test_the_app_finds_what_the_detector_finds_in_the_log(bench):
     craft.high_level("<BBBBfffff", 12, 0, 0, 1, end, 0.0, height, 0.0, end / 0.3)
     fly(end / 0.3 + 2.0)
     table = np.array(rows)
-    log = FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, {"source": "virtual", "acc_frame": "body"})
+    columns = {c: table[:, i] for i, c in enumerate(COLUMNS)}
+    log = FlightLog(columns, {"source": "virtual", "acc_frame": "body"})
     found = best.run(log).edges
     assert len(found) >= 2
     assert [("entry", "exit")[kind - 1] for _, kind in edges] == [edge.kind for edge in found]
     assert max(abs(at - edge.sample) for (at, _), edge in zip(edges, found)) <= 10
 
 
-@pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]}, {"faults": ["rain=1"]},
-                                   {"faults": ["disconnect=3"]}, {"record": "/nowhere/at/all.csv"}])
+@pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]},
+                                   {"faults": ["rain=1"]}, {"faults": ["disconnect=3"]},
+                                   {"record": "/nowhere/at/all.csv"}])
 def test_wrong_settings_are_named(wrong):
     settings = {"port": 0, **wrong}
     if "record" in settings:

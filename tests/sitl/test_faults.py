@@ -119,7 +119,8 @@ def test_late_packets_are_seen_by_cflib(cflib):
 
 def test_the_drone_flies_on_while_the_link_is_down(cflib):
     speed = 5.0
-    with serve("hover", port=0, speed=speed, faults=["disconnect=3,5s"]) as virtual, connected(virtual.uri) as cf:
+    with (serve("hover", port=0, speed=speed, faults=["disconnect=3,5s"]) as virtual,
+          connected(virtual.uri) as cf):
         rows, after = [], []
         log_block(cf, "one", 10, {"stateEstimate.z": "float"}, rows)
         wait_for(lambda: rows)
@@ -128,7 +129,8 @@ def test_the_drone_flies_on_while_the_link_is_down(cflib):
         wait_for(lambda: virtual.drone.now_s > took_off + 8.5)
         assert rows[-1][0] == pytest.approx(1000 * (took_off + 3.0), abs=100)
         assert virtual.drone.motors_on and virtual.drone.height_over_floor == pytest.approx(0.5, abs=0.15)
-        log_block(cf, "again", 10, {"stateEstimate.z": "float"}, after)  # as after a radio's break: blocks are gone
+        # the blocks are gone, as after a radio's break
+        log_block(cf, "again", 10, {"stateEstimate.z": "float"}, after)
         wait_for(lambda: len(after) > 20)
         cf.high_level_commander.land(0.0, 1.0)
         wait_for(lambda: not virtual.drone.motors_on and virtual.drone.height_over_floor < 0.03)

@@ -66,18 +66,21 @@ def test_a_quarter_spiral_stays_on_its_circle(sideways, clockwise):
     planner.command(struct.pack("<BBff?f", 7, 0, 0.5, 0.0, False, 1.0), 0.0)
     planner.goal(2.0)
     angle, radius = np.pi / 2, 0.6
-    planner.command(struct.pack("<BBBBfffff", 11, 0, sideways, clockwise, angle, radius, radius, 0.1, 4.0), 2.0)
+    spiral = struct.pack("<BBBBfffff", 11, 0, sideways, clockwise, angle, radius, radius, 0.1, 4.0)
+    assert planner.command(spiral, 2.0) == 0
     assert planner.state == FLYING
     place, speed = flown(planner, 2.0, 4.01)
     centre = np.array([[0.0, radius], [0.0, -radius]][clockwise] if not sideways
                       else [[-radius, 0.0], [radius, 0.0]][clockwise])
-    np.testing.assert_allclose(np.linalg.norm(place[:, :2] - centre, axis=1), radius, atol=6e-3)  # jerk 0 at both ends
+    # not quite a circle: the jerk is 0 at both ends
+    np.testing.assert_allclose(np.linalg.norm(place[:, :2] - centre, axis=1), radius, atol=6e-3)
     np.testing.assert_allclose(np.linalg.norm(speed[10:-10, :2], axis=1), radius * angle / 4.0, rtol=0.05)
     assert place[-1, 2] == pytest.approx(0.6)
     assert planner.goal(6.0).yaw == pytest.approx([angle, -angle][clockwise])
 
 
-@pytest.mark.parametrize("data", [b"", b"\x07", b"\x63" + bytes(20), struct.pack("<BBff?f", 7, 0, np.nan, 0, False, 1),
+@pytest.mark.parametrize("data", [b"", b"\x07", b"\x63" + bytes(20),
+                                  struct.pack("<BBff?f", 7, 0, np.nan, 0, False, 1),
                                   struct.pack("<BBff?f", 7, 0, 1.0, 0, False, np.inf)])
 def test_commands_that_make_no_sense_are_refused(data):
     planner = Planner()

@@ -26,9 +26,10 @@ def variable(bench, name, kind):
 
 def test_the_app_has_the_names_and_types_of_the_firmware():
     text = APP.read_text()
-    logs = re.findall(r"LOG_ADD(?:_BY_FUNCTION)?\(LOG_(\w+), (\w+), &(?:core\.log\.(\w+)(?:\[(\d)\])?|\w+)\)", text)
+    field = r"core\.log\.(\w+)(?:\[(\d)\])?"
+    logs = re.findall(rf"LOG_ADD(?:_BY_FUNCTION)?\(LOG_(\w+), (\w+), &(?:{field}|\w+)\)", text)
     assert {name: kind for kind, name, _, _ in logs} == {
-        name: "FLOAT" if kind == "float" else kind.removesuffix("_t").upper() for name, (kind, _, _) in app.LOGS.items()}
+        name: kind.removesuffix("_t").upper() for name, (kind, _, _) in app.LOGS.items()}
     assert {name: (field, int(element or -1)) for _, name, field, element in logs if field} == {
         name: (field, element) for name, (_, field, element) in app.LOGS.items() if name != "health"}
     params = re.findall(r"PARAM_ADD\(PARAM_(\w+), (\w+), &wanted\.(\w+)\)", text)
@@ -81,7 +82,7 @@ def test_blocks_run_at_their_period(bench):
     sent = [p for p in craft.fly(1.0) if p.port == LOG]
     stamps = {n: [int.from_bytes(p.data[1:4], "little") for p in sent if p.data[0] == n] for n in (1, 2, 3)}
     assert [len(stamps[n]) for n in (1, 2, 3)] == [100, 20, 50]
-    assert set(np.diff(stamps[1])) == {10} and set(np.diff(stamps[2])) == {50} and set(np.diff(stamps[3])) == {20}
+    assert [set(np.diff(stamps[n])) for n in (1, 2, 3)] == [{10}, {50}, {20}]
     assert struct.unpack("<f", sent[0].data[4:])[0] == pytest.approx(1.0, abs=0.2)
     craft.log(STOP, 1)
     craft.log(DELETE, 2)
@@ -131,14 +132,16 @@ def test_parameters_and_their_errors(bench):
     assert craft.take(PARAM, 3, bytes([7]) + number("pm.lowVoltage"))[0].data[3:] == b"\0\1"
     written = number("pm.lowVoltage") + struct.pack("<f", 3.4)
     assert craft.take(PARAM, 2, written)[0].data == written
-    assert craft.take(PARAM, 3, bytes([8]) + number("pm.lowVoltage"))[0].data[3:] == b"\0" + struct.pack("<f", 3.2)
+    default = craft.take(PARAM, 3, bytes([8]) + number("pm.lowVoltage"))[0].data[3:]
+    assert default == b"\0" + struct.pack("<f", 3.2)
     assert craft.take(PARAM, 3, bytes([3]) + number("pm.lowVoltage"))[0].data[3:] == b"\0"  # stored
     state = craft.take(PARAM, 3, bytes([4]) + number("pm.lowVoltage"))[0].data[3:]
     assert state == b"\1" + struct.pack("<ff", 3.2, 3.4)
     assert craft.take(PARAM, 3, bytes([5]) + number("pm.lowVoltage"))[0].data[3:] == b"\0"  # cleared
     by_name = b"pm\0lowVoltage\0"
     for kind, value, code in ((6, struct.pack("<f", 3.3), 0), (8, b"\1", errno.EINVAL)):
-        assert craft.take(PARAM, 3, b"\0" + by_name + bytes([kind]) + value)[0].data == b"\0" + by_name + bytes([code])
+        answer, = craft.take(PARAM, 3, b"\0" + by_name + bytes([kind]) + value)
+        assert answer.data == b"\0" + by_name + bytes([code])
     assert craft.firmware.param.values["pm.lowVoltage"] == pytest.approx(3.3)
     assert craft.take(PARAM, 3, b"\0pm\0nothing\0\6" + bytes(4))[0].data[-1] == errno.ENOENT
     assert craft.take(PARAM, 3, b"\0deck\0bcAI\0\x08\1")[0].data[-1] == errno.EACCES

@@ -8,7 +8,8 @@ import click
 
 @click.command("sitl")
 @click.argument("scenario", default="paper-9cm")
-@click.option("--port", default=19850, show_default=True, help="UDP port; cflib scans 19850 to 19859. 0: any free one.")
+@click.option("--port", default=19850, show_default=True,
+              help="UDP port; cflib scans 19850 to 19859. 0: any free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option("--speed", default=1.0, show_default=True, help="Drone seconds a second.")
 @click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Name or .toml file.")
@@ -18,10 +19,11 @@ import click
 @click.option("--seed", default=0, show_default=True, help="Of everything that is drawn.")
 @click.option("--flight", default=0, show_default=True, help="Which flight of the scenario is drawn.")
 @click.option("--fault", "faults", multiple=True, metavar="FAULT",
-              help="loss=0.3, late=50ms, disconnect=T,5s, gap8-reset=T, gap8-silent=T, low-battery=T; T: s after "
-                   "take-off, or start.")
+              help="loss=0.3, late=50ms, disconnect=T,5s, gap8-reset=T, gap8-silent=T, low-battery=T; T: s "
+                   "after take-off, or start.")
 @click.option("--no-ai-deck", is_flag=True, help="Without a GAP8: the STM32 alone.")
-@click.option("--record", type=click.Path(path_type=Path, dir_okay=False), help="Write the true flight log here.")
+@click.option("--record", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write the true flight log here.")
 @click.option("--force", is_flag=True, help="Replace the file of --record.")
 def command(scenario: str, port: int, host: str, speed: float, vehicle: str, chosen: tuple[str, ...],
             without: tuple[str, ...], seed: int, flight: int, faults: tuple[str, ...], no_ai_deck: bool,
@@ -34,8 +36,8 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
     from airtouch.sitl import Server
 
     server = Server(scenario, port=port, host=host, speed=speed, vehicle=vehicle,
-                    effects=[effects.parse(text) for text in chosen], without=without, seed=seed, flight=flight,
-                    faults=faults, ai_deck=not no_ai_deck, record=record, force=force)
+                    effects=[effects.parse(text) for text in chosen], without=without, seed=seed,
+                    flight=flight, faults=faults, ai_deck=not no_ai_deck, record=record, force=force)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.stop())
     click.echo(f"{server.uri}: {scenario}, {vehicle}; Ctrl-C ends it")
@@ -43,4 +45,5 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
     if record:
         click.echo(f"{server.drone.now_s:.0f} s of flight log in {record}")
     if server.slept_s > 0.1:
-        click.echo(f"airtouch: this machine was {server.slept_s:.1f} s too slow for --speed {speed:g}", err=True)
+        click.echo(f"airtouch: this machine was {server.slept_s:.1f} s too slow for --speed {speed:g}",
+                   err=True)

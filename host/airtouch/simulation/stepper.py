@@ -48,13 +48,15 @@ class Stepper:
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int,
                  active: Sequence[Active]) -> None:
-        """As the flight of that number is drawn. Raises AirTouchError for a vehicle that cannot lift itself."""
+        """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself."""
         if hover_pwm(vehicle) > MOST_HOVER_PWM:
-            raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM {hover_pwm(vehicle):.0f}")
+            raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
+                                f"{hover_pwm(vehicle):.0f}")
         self.plant, acting = prepare(vehicle, active)
         self.world, self.room = plan.world, plan.room
         self.used = len(acting)
-        self.functions = tuple(handle(a.effect.wrench) for a in acting) + (handle(_nothing),) * (loop.SLOTS - len(acting))
+        idle = loop.SLOTS - len(acting)
+        self.functions = tuple(handle(a.effect.wrench) for a in acting) + (handle(_nothing),) * idle
         self.parameters = np.zeros((loop.SLOTS, PARAMETERS))
         self.effect_streams = np.zeros((loop.SLOTS, 1), np.uint64)
         seen: dict[str, int] = {}
@@ -71,7 +73,8 @@ class Stepper:
         kept.begin(self.plant, w.corners, w.first, w.surface, w.box, setpoint, self.streams[3], self.memory)
 
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:
-        """Fly on by len(table) rows into table (rows, 33), set-points (rows, 8): how it ended, rows filled."""
+        """Fly on by len(table) rows into table (rows, 33): how it ended, rows filled. setpoints (rows, 8)."""
         w = self.world
-        return loop.fly(self.plant, w.corners, w.first, w.surface, w.box, self.room, setpoints, self.functions,
-                        self.used, self.parameters, self.effect_streams, self.streams, self.memory, table)
+        return loop.fly(self.plant, w.corners, w.first, w.surface, w.box, self.room, setpoints,
+                        self.functions, self.used, self.parameters, self.effect_streams, self.streams,
+                        self.memory, table)

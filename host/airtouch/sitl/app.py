@@ -15,11 +15,13 @@ BOOT_S = 1.5  #: the GAP8, after it lost power
 LOGS: dict[str, tuple[str, str, int]] = {
     "fAcc": ("float", "feature", 0), "fGyro": ("float", "feature", 1), "fMotor": ("float", "feature", 2),
     "fwx": ("float", "force", 0), "fwy": ("float", "force", 1), "fwz": ("float", "force", 2),
-    "cell": ("float", "cfarPower", -1), "thresh": ("float", "threshold", -1), "alert": ("uint8_t", "alert", -1),
+    "cell": ("float", "cfarPower", -1), "thresh": ("float", "threshold", -1),
+    "alert": ("uint8_t", "alert", -1),
     "prob": ("float", "probability", -1), "lOver": ("float", "logit", 0), "lEntry": ("float", "logit", 1),
     "lExit": ("float", "logit", 2), "edges": ("uint16_t", "edges", -1), "edge": ("uint8_t", "edge", -1),
     "edgeStep": ("uint32_t", "edgeSample", -1), "over": ("uint8_t", "over", -1),
-    "steps": ("uint32_t", "samples", -1), "health": ("uint16_t", "health", -1), "load": ("uint16_t", "load", -1),
+    "steps": ("uint32_t", "samples", -1), "health": ("uint16_t", "health", -1),
+    "load": ("uint16_t", "load", -1),
     "loadMax": ("uint16_t", "loadMax", -1), "late": ("uint16_t", "late", -1),
     "detector": ("uint8_t", "detector", -1), "link": ("uint8_t", "link", -1), "lag": ("uint16_t", "lag", -1),
     "answers": ("uint32_t", "answers", -1), "dropped": ("uint32_t", "dropped", -1),
@@ -29,9 +31,9 @@ LOGS: dict[str, tuple[str, str, int]] = {
 }
 #: parameter -> field of appParams_t
 PARAMS = {
-    "enable": "enable", "detector": "detector", "filter": "filter", "bandMid": "bandMid", "bandWidth": "bandWidth",
-    "pFa": "pFa", "probIn": "probabilityIn", "probOut": "probabilityOut", "scoreIn": "scoreIn",
-    "scoreOut": "scoreOut",
+    "enable": "enable", "detector": "detector", "filter": "filter", "bandMid": "bandMid",
+    "bandWidth": "bandWidth", "pFa": "pFa", "probIn": "probabilityIn", "probOut": "probabilityOut",
+    "scoreIn": "scoreIn", "scoreOut": "scoreOut",
 }
 BYTES = ("enable", "detector", "filter")  #: parameters of type uint8_t, the others are float
 
@@ -75,7 +77,10 @@ class App:
 
     def step(self, now_s: float, acc_world: Sequence[float], gyro: Sequence[float], pwm: Sequence[float],
              vbat_v: float, attitude: Sequence[float]) -> str:
-        """One sample: m/s^2 with gravity, rad/s, PWM, quaternion x, y, z, w. The kind of an edge, or "none"."""
+        """One sample: m/s^2 with gravity, rad/s, PWM, quaternion x, y, z, w.
+
+        Returns the kind of the edge that is reported now, "none" mostly.
+        """
         edge = self._core.step(acc_world, gyro, pwm, vbat_v=vbat_v, attitude=attitude)
         answering = self._gap8 is not None and not self.gap8_silent and now_s >= self._booted_s
         for sent in self._core.packets():

@@ -1,5 +1,6 @@
-"""Whose set-points count: high-level planner, low-level packets, and the watchdog (commander.c, supervisor.c).
+"""Whose set-points count: high-level planner, low-level packets, and the watchdog.
 
+As crazyflie-firmware 2026.08 (commander.c, crtp_commander_generic.c, crtp_commander_rpyt.c, supervisor.c).
 A set-point here is one row of the simulator (simulation.controller): mode, place, velocity,
 yaw and motors. Packets that give rates (yaw rate, climb) are integrated row by row.
 """
@@ -17,8 +18,8 @@ LEVEL_OUT_S, SHUT_DOWN_S = 0.5, 2.0  #: without a new set-point
 MOST_CLIMB_M = 0.5  #: height set-points of climb rates stay this near to the drone
 MOST_TILT_DEG = 30.0
 LEAST_THRUST, MOST_THRUST = 1000, 60000
-(STOP, OLD_VELOCITY, OLD_Z_DISTANCE, CPPM, ALT_HOLD, OLD_HOVER, FULL_STATE, POSITION, VELOCITY, Z_DISTANCE, HOVER,
- MANUAL) = range(12)
+(STOP, OLD_VELOCITY, OLD_Z_DISTANCE, CPPM, ALT_HOLD, OLD_HOVER, FULL_STATE, POSITION, VELOCITY, Z_DISTANCE,
+ HOVER, MANUAL) = range(12)
 FOUR = struct.Struct("<ffff")
 
 
@@ -53,10 +54,11 @@ class Commander:
             self._thrust_locked = True
         if thrust == 0:
             self._thrust_locked = False
+        climb = (thrust - 32767.0) / 32767.0
         if self.pos_hold and self.alt_hold:
-            self._low_level(VELOCITY, (pitch / 30.0, roll / 30.0, (thrust - 32767.0) / 32767.0, -yaw), t, estimate)
+            self._low_level(VELOCITY, (pitch / 30.0, roll / 30.0, climb, -yaw), t, estimate)
         elif self.alt_hold:
-            self._low_level(ALT_HOLD, (roll, pitch, -yaw, (thrust - 32767.0) / 32767.0), t, estimate)
+            self._low_level(ALT_HOLD, (roll, pitch, -yaw, climb), t, estimate)
         else:
             push = 0 if self._thrust_locked or thrust < LEAST_THRUST else min(thrust, MOST_THRUST)
             self._low_level(MANUAL, (roll, pitch, -yaw, float(push)), t, estimate)
@@ -102,7 +104,7 @@ class Commander:
         if goal is None:
             self.planner.tell(estimate[6:9], estimate[3:6], estimate[2])
             return row
-        row[c.MODE], row[c.X:c.Z + 1], row[c.VX], row[c.VY] = 1.0, goal.position, goal.velocity[0], goal.velocity[1]
+        row[c.MODE], row[c.X:c.Z + 1], row[c.VX:c.VY + 1] = c.HOLD, goal.position, goal.velocity[:2]
         row[c.YAW], row[c.MOTORS] = goal.yaw, 1.0
         return row
 
@@ -135,7 +137,8 @@ class Commander:
             row[c.MODE], row[c.X], row[c.Y] = c.HOLD, a, b
         elif kind in (VELOCITY, HOVER):
             turn = estimate[2] if kind == HOVER else 0.0
-            row[c.VX], row[c.VY] = math.cos(turn) * a - math.sin(turn) * b, math.sin(turn) * a + math.cos(turn) * b
+            row[c.VX] = math.cos(turn) * a - math.sin(turn) * b
+            row[c.VY] = math.sin(turn) * a + math.cos(turn) * b
         else:
             row[c.MODE] = c.TILT_THRUST if kind == MANUAL else c.TILT
             row[c.VX] = min(max(a, -MOST_TILT_DEG), MOST_TILT_DEG)

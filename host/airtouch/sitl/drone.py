@@ -90,9 +90,9 @@ class Drone:
     def info(self) -> int:
         """supervisor.info."""
         planner, ready = self.commander.planner, self.state == PRE_FLIGHT and not self.emergency
-        bits = [ready, ready, True, ready, self.is_flying and ready, self.state == CRASHED, self.state == LOCKED,
-                self.state == CRASHED, planner.state in (FLYING, LANDING), planner.finished(self.now_s),
-                planner.state == DISABLED]
+        bits = [ready, ready, True, ready, self.is_flying and ready, self.state == CRASHED,
+                self.state == LOCKED, self.state == CRASHED, planner.state in (FLYING, LANDING),
+                planner.finished(self.now_s), planner.state == DISABLED]
         return sum(bool(bit) << i for i, bit in enumerate(bits))
 
     def stop(self) -> None:
@@ -107,7 +107,7 @@ class Drone:
         return self.state == PRE_FLIGHT
 
     def restart(self) -> None:
-        """As when its button is pressed: forget set-points, locks and crashes; the flight goes on in place."""
+        """As when its button is pressed: set-points, locks and crashes are forgotten."""
         self.commander.reset()
         self.state, self.emergency = PRE_FLIGHT, False
 

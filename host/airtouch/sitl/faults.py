@@ -24,8 +24,9 @@ from airtouch.errors import AirTouchError
 from airtouch.sitl import packet as crtp
 from airtouch.sitl.packet import Packet
 
-KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms", "disconnect": "when and how long, as disconnect=3,5s",
-         "gap8-reset": "when, as gap8-reset=3", "gap8-silent": "when, as gap8-silent=3",
+KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms",
+         "disconnect": "when and how long, as disconnect=3,5s", "gap8-reset": "when, as gap8-reset=3",
+         "gap8-silent": "when, as gap8-silent=3",
          "low-battery": "when, as low-battery=3"}
 ALL = "all"
 

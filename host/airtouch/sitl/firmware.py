@@ -42,7 +42,8 @@ class Firmware:
         self.drone.step()
         self.printed, self.drone.messages = self.drone.messages, []
         text = "".join(line + "\n" for line in self.printed).encode()
-        console = [Packet(crtp.CONSOLE, 0, text[i:i + crtp.MOST_DATA]) for i in range(0, len(text), crtp.MOST_DATA)]
+        pieces = (text[i:i + crtp.MOST_DATA] for i in range(0, len(text), crtp.MOST_DATA))
+        console = [Packet(crtp.CONSOLE, 0, piece) for piece in pieces]
         return console + self.log.due(self.drone.now_ms)
 
     def take(self, packet: Packet) -> list[Packet]:
@@ -103,7 +104,9 @@ class Firmware:
             answer = self._request(command)
         elif channel == 1:
             self._stop_command(command)
-        return [] if answer is None else [Packet(crtp.SUPERVISOR, channel, bytes([command | RESPONSE]) + answer)]
+        if answer is None:
+            return []
+        return [Packet(crtp.SUPERVISOR, channel, bytes([command | RESPONSE]) + answer)]
 
     def _stop_command(self, command: int | None) -> None:
         if command == EMERGENCY:

@@ -13,7 +13,8 @@ TOC_CHANNEL, CONTROL_CHANNEL, DATA_CHANNEL = 0, 1, 2
 DELETE, START, STOP, RESET, CREATE_V2, APPEND_V2, START_V2 = 2, 3, 4, 5, 6, 7, 8
 MOST_BLOCKS, MOST_VARIABLES, MOST_BYTES = 16, 128, 26
 MEMORY_VARIABLE = 0xFFFF
-CODES = {"uint8_t": 1, "uint16_t": 2, "uint32_t": 3, "int8_t": 4, "int16_t": 5, "int32_t": 6, "float": 7, "FP16": 8}
+CODES = {"uint8_t": 1, "uint16_t": 2, "uint32_t": 3, "int8_t": 4, "int16_t": 5, "int32_t": 6, "float": 7,
+         "FP16": 8}
 FORMATS = {1: "B", 2: "H", 3: "I", 4: "b", 5: "h", 6: "i", 7: "f", 8: "e"}
 LENGTHS = {code: struct.calcsize("<" + letter) for code, letter in FORMATS.items()}
 TICK_MS = 10  #: the simulator's row
@@ -54,7 +55,8 @@ class LogService:
         if packet.channel != CONTROL_CHANNEL or not packet.data:
             return []
         data = packet.data + b"\0" * max(0, 4 - len(packet.data))
-        return [Packet(LOG, CONTROL_CHANNEL, bytes([data[0], data[1], self._control(data, len(packet.data), now_ms)]))]
+        code = self._control(data, len(packet.data), now_ms)
+        return [Packet(LOG, CONTROL_CHANNEL, bytes([data[0], data[1], code]))]
 
     def _control(self, data: bytes, size: int, now_ms: int) -> int:
         command, number = data[0], data[1]

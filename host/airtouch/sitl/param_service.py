@@ -42,7 +42,8 @@ class ParamService:
     The answer to a write repeats what was written, as in the firmware; reading gives what is in force.
     """
 
-    def __init__(self, parameters: Sequence[Parameter], changed: Callable[[str, float], dict[str, float]]) -> None:
+    def __init__(self, parameters: Sequence[Parameter],
+                 changed: Callable[[str, float], dict[str, float]]) -> None:
         self.toc = Toc([p.item() for p in parameters], 0xFF)
         self._parameters = tuple(parameters)
         self._changed = changed
@@ -74,8 +75,9 @@ class ParamService:
         return struct.calcsize(FORMATS[self.toc.items[number].kind & KIND])
 
     def _bytes(self, number: int, value: float | None = None) -> bytes:
-        name = self._parameters[number].name
-        return struct.pack(FORMATS[self.toc.items[number].kind & KIND], self.values[name] if value is None else value)
+        if value is None:
+            value = self.values[self._parameters[number].name]
+        return struct.pack(FORMATS[self.toc.items[number].kind & KIND], value)
 
     def _write(self, number: int, data: bytes) -> None:
         name = self._parameters[number].name

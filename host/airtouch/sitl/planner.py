@@ -14,11 +14,14 @@ import numpy as np
 
 SET_GROUP, TAKEOFF, LAND, STOP, GO_TO = 0, 1, 2, 3, 4
 TAKEOFF_2, LAND_2, TAKEOFF_V, LAND_V, SPIRAL, GO_TO_2 = 7, 8, 9, 10, 11, 12
-FORMATS = {SET_GROUP: "<B", TAKEOFF: "<Bff", LAND: "<Bff", STOP: "<B", GO_TO: "<BBfffff", TAKEOFF_2: "<Bff?f",
-           LAND_2: "<Bff?f", TAKEOFF_V: "<Bf?f?f", LAND_V: "<Bf?f?f", SPIRAL: "<BBBfffff", GO_TO_2: "<BBBfffff"}
+FORMATS = {SET_GROUP: "<B", TAKEOFF: "<Bff", LAND: "<Bff", STOP: "<B", GO_TO: "<BBfffff",
+           TAKEOFF_2: "<Bff?f", LAND_2: "<Bff?f", TAKEOFF_V: "<Bf?f?f", LAND_V: "<Bf?f?f",
+           SPIRAL: "<BBBfffff", GO_TO_2: "<BBBfffff"}
 IDLE, FLYING, LANDING, DISABLED = "idle", "flying", "landing", "disabled"
 LEAST_DURATION_S = 0.05
-_ENDS = np.linalg.inv(np.array([[1, 1, 1, 1], [4, 5, 6, 7], [12, 20, 30, 42], [24, 60, 120, 210]], dtype=float))
+#: value and derivatives of s^4 .. s^7 at s = 1, inverted
+_ENDS = np.linalg.inv([[1.0, 1.0, 1.0, 1.0], [4.0, 5.0, 6.0, 7.0], [12.0, 20.0, 30.0, 42.0],
+                       [24.0, 60.0, 120.0, 210.0]])
 
 
 @dataclass(frozen=True)
@@ -32,8 +35,9 @@ class Goal:
     yaw_rate: float
 
 
-def polynomial(seconds: float, start: tuple[float, float, float], end: tuple[float, float, float]) -> np.ndarray:
-    """Coefficients (8,) in s = t / seconds from (value, rate, second rate) to another, jerk 0 at both ends."""
+def polynomial(seconds: float, start: tuple[float, float, float],
+               end: tuple[float, float, float]) -> np.ndarray:
+    """Coefficients (8,) in s = t / seconds from one (value, rate, second rate) to another, jerk 0 at both."""
     scale = np.array([1.0, seconds, seconds * seconds])
     p, v, a = np.asarray(start) * scale
     q, w, b = np.asarray(end) * scale
@@ -86,8 +90,9 @@ class Planner:
         moving = 0.0 if self.finished(t) else 1.0
         powers = s ** np.arange(8)
         value = self._pieces @ powers
-        rate = self._pieces[:, 1:] @ (np.arange(1, 8) * powers[:7]) / self._seconds * moving
-        second = self._pieces[:, 2:] @ (np.arange(2, 8) * np.arange(1, 7) * powers[:6]) / self._seconds**2 * moving
+        n = np.arange(1, 8)
+        rate = self._pieces[:, 1:] @ (n * powers[:7]) / self._seconds * moving
+        second = self._pieces[:, 2:] @ (n[1:] * n[:-1] * powers[:6]) / self._seconds**2 * moving
         return Goal(value[:3], rate[:3], second[:3], float(value[3]), float(rate[3]))
 
     def command(self, data: bytes, t: float) -> int:
@@ -142,8 +147,8 @@ class Planner:
             speed = values[4] if values[4] > 0.0 else self.landing_mps if down else self.takeoff_mps
             seconds = abs(height - here.position[2]) / speed
         to = np.array([here.position[0], here.position[1], height])
-        return self._plan(t, seconds, self._rest(here.position, here.yaw), self._rest(to, turn(here.yaw, yaw)),
-                          LANDING if down else FLYING)
+        start, end = self._rest(here.position, here.yaw), self._rest(to, turn(here.yaw, yaw))
+        return self._plan(t, seconds, start, end, LANDING if down else FLYING)
 
     def _go(self, t: float, relative: int, linear: int, x: float, y: float, z: float, yaw: float,
             seconds: float) -> int:
@@ -158,8 +163,8 @@ class Planner:
             end = Goal(to, speed, np.zeros(3), end.yaw, rate)
         return self._plan(t, seconds, start, end, FLYING)
 
-    def _spiral(self, t: float, sideways: int, clockwise: int, angle: float, r0: float, r1: float, ascent: float,
-                seconds: float) -> int:
+    def _spiral(self, t: float, sideways: int, clockwise: int, angle: float, r0: float, r1: float,
+                ascent: float, seconds: float) -> int:
         """An arc about a centre beside (or ahead of) the drone, from radius r0 to r1."""
         seconds = max(seconds, LEAST_DURATION_S)
         angle, r0, r1 = min(max(angle, -2 * math.pi), 2 * math.pi), max(r0, 0.0), max(r1, 0.0)

@@ -12,7 +12,7 @@ DECIMALS = 6
 
 
 class Recorder:
-    """`add` each row (33,), `write` at the end. Raises AirTouchError at once for a file that is there already."""
+    """`add` each row (33,), `write` at the end. AirTouchError at once for a file that is there already."""
 
     def __init__(self, path: Path, scenario: str, vehicle: str, seed: int, flight: int, force: bool) -> None:
         if path.exists() and not force:
@@ -33,5 +33,6 @@ class Recorder:
         if not self._rows:
             return
         table = np.round(np.array(self._rows), DECIMALS)
-        log = FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, {"source": self._path.name, **self._meta})
+        meta = {"source": self._path.name, **self._meta}
+        log = FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, meta)
         logs.write(log, self._path, force=self._force)

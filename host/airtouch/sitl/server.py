@@ -45,9 +45,9 @@ class Server:
 
     def __init__(self, scenario: scenarios.Scenario | str | Path = "paper-9cm", *, port: int = PORT,
                  host: str = HOST, speed: float = 1.0, faults: Sequence[Fault | str] = (),
-                 vehicle: Vehicle | str | Path | None = None, effects: Chosen = (), without: Sequence[str] = (),
-                 seed: int = 0, flight: int = 0, ai_deck: bool = True, record: Path | None = None,
-                 force: bool = False) -> None:
+                 vehicle: Vehicle | str | Path | None = None, effects: Chosen = (),
+                 without: Sequence[str] = (), seed: int = 0, flight: int = 0, ai_deck: bool = True,
+                 record: Path | None = None, force: bool = False) -> None:
         if not 0.0 < speed <= 100.0:
             raise AirTouchError("speed must be above 0 and at most 100")
         scene = scenario if isinstance(scenario, scenarios.Scenario) else scenarios.load(scenario)
@@ -149,7 +149,8 @@ class Server:
     def _exchange(self, now_s: float) -> None:
         """Take what has arrived, answer it, send what is due."""
         for packet, peer in self._up.ready(now_s):
-            if peer != self.client and (self.client is None or packet.port == crtp.LOG) and not crtp.is_null(packet):
+            takes_over = self.client is None or packet.port == crtp.LOG
+            if peer != self.client and takes_over and not crtp.is_null(packet):
                 self._welcome(peer)
             for answer in self.firmware.take(packet):
                 self._down.put(answer, peer, now_s)

@@ -28,7 +28,7 @@ class Item:
 
 
 class Toc:
-    """Items in their order. `shown` is what of the type byte a client gets; `extra` follows the info answer."""
+    """Items in their order. shown: what of the type byte a client gets; extra: follows the info answer."""
 
     def __init__(self, items: Sequence[Item], shown: int, extra: bytes = b"") -> None:
         self.items, self._shown, self._extra = tuple(items), shown, extra

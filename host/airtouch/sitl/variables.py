@@ -44,7 +44,8 @@ def log_variables(drone: Drone) -> Variables:
 
     add("acc", "x y z", "float", lambda d, i: d.row[loop.ACC + i] / G)
     add("gyro", "x y z", "float", lambda d, i: math.degrees(d.row[loop.GYRO + i]))
-    add("gyro", "xRaw yRaw zRaw", "int16_t", lambda d, i: round(math.degrees(d.row[loop.GYRO + i]) / GYRO_LSB_DEG))
+    add("gyro", "xRaw yRaw zRaw", "int16_t",
+        lambda d, i: round(math.degrees(d.row[loop.GYRO + i]) / GYRO_LSB_DEG))
     add("stateEstimate", "x y z", "float", lambda d, i: d.estimate[6 + i])
     add("stateEstimate", "vx vy vz", "float", lambda d, i: d.estimate[3 + i])
     add("stateEstimate", "ax ay az", "float", lambda d, i: d.row[loop.ACC_WORLD + i] / G - (i == 2))
@@ -96,10 +97,11 @@ def reader(table: Variables, items: list[Item], drone: Drone) -> Callable[[int],
 
 def parameters(drone: Drone, ai_deck: bool) -> list[Parameter]:
     """The PARAM groups. Those that the simulator does not act upon are kept, and no more."""
-    decks = {"bcFlow2": 1, "bcMultiranger": 1, "bcAI": int(ai_deck), "bcFlow": 0, "bcZRanger": 0, "bcZRanger2": 0,
-             "bcLighthouse4": 0, "bcDWM1000": 0, "bcLedRing": 0, "bcUSD": 0, "bcBuzzer": 0, "bcLoco": 0}
+    decks = dict.fromkeys(("bcFlow2", "bcMultiranger"), 1) | {"bcAI": int(ai_deck)} | dict.fromkeys(
+        ("bcFlow", "bcZRanger", "bcZRanger2", "bcLighthouse4", "bcDWM1000", "bcLedRing", "bcUSD"), 0)
     return [
-        *(Parameter(f"deck.{name}", "uint8_t", there, read_only=True, core=True) for name, there in decks.items()),
+        *(Parameter(f"deck.{name}", "uint8_t", there, read_only=True, core=True)
+          for name, there in decks.items()),
         Parameter("commander.enHighLevel", "uint8_t", 0, core=True),
         Parameter("hlCommander.vtoff", "float", 0.5, core=True),
         Parameter("hlCommander.vland", "float", 0.5, core=True),
