@@ -15,8 +15,10 @@
 // Inlined whatever the compiler thinks of it, so that USUAL_BINS is a constant there.
 #if defined(__GNUC__)
 #define INLINED static inline __attribute__((always_inline))
+#define UNROLLED _Pragma("GCC unroll 7")
 #else
 #define INLINED static inline
+#define UNROLLED
 #endif
 
 uint16_t bandPowerBins(float sampleRateHz, uint16_t window, float lowHz, float highHz, uint16_t *firstBin) {
@@ -143,6 +145,7 @@ static void endBlock(bandSum_t *sum, uint16_t bins) {
 
 /** Adds to the sums of each bin of a channel what has changed in the window and what is new in the block. */
 INLINED void addSample(bandSum_t *recent, const float *twiddle, uint16_t bins, float change, float level) {
+  UNROLLED
   for (uint16_t b = 0; b < bins; b++) {
     const float cosine = twiddle[2 * b];
     const float sine = twiddle[2 * b + 1];
@@ -199,6 +202,7 @@ INLINED float channelPower(const bandSum_t *sum, const bandSum_t *recent, const 
   float re0 = 0.0f, im0 = 0.0f;            // the bin before this one
   float reSlope0 = 0.0f, imSlope0 = 0.0f;  // and its difference from the one before that
   float power = 0.0f, last = 0.0f;
+  UNROLLED
   for (uint16_t b = 0; b < bins; b++) {
     const float cosine = twiddle[2 * b];
     const float sine = twiddle[2 * b + 1];

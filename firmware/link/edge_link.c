@@ -15,14 +15,15 @@ typedef struct {
 } reader_t;
 
 uint16_t edgeLinkCrc(const uint8_t *bytes, uint16_t length) {
-  uint16_t crc = 0xffff;
+  // The remainders of the sixteen values of four bits.
+  static const uint16_t remainder[16] = {0x0000, 0x1021, 0x2042, 0x3063, 0x4084, 0x50a5, 0x60c6, 0x70e7,
+                                         0x8108, 0x9129, 0xa14a, 0xb16b, 0xc18c, 0xd1ad, 0xe1ce, 0xf1ef};
+  uint32_t crc = 0xffff;
   for (uint16_t i = 0; i < length; i++) {
-    crc = (uint16_t)(crc ^ (bytes[i] << 8));
-    for (int bit = 0; bit < 8; bit++) {
-      crc = (uint16_t)(crc & 0x8000 ? (crc << 1) ^ 0x1021 : crc << 1);
-    }
+    crc = (crc << 4) ^ remainder[((crc >> 12) ^ (bytes[i] >> 4)) & 15u];
+    crc = (crc << 4) ^ remainder[((crc >> 12) ^ bytes[i]) & 15u];
   }
-  return crc;
+  return (uint16_t)crc;
 }
 
 static void put(writer_t *to, uint32_t value, int bytes) {

@@ -1,0 +1,178 @@
+"""The STM32 app as the Crazyflie runs it: cross-compiled, emulated, and its names beside those of the virtual drone."""
+
+import os
+import re
+import shutil
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle as vehicles
+from airtouch.detector.channels import level_acceleration
+from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
+from airtouch.kernels.library import ffi
+from airtouch.logs.flight_log import GYRO, PWM
+from airtouch.simulation import scenario
+from airtouch.simulation.flight import fly
+from airtouch.sitl import app as sitl
+from tools.emulator import build
+from tools.emulator.elf import Elf
+from tools.emulator.machine import Machine
+
+ROOT = Path(__file__).parents[2]
+APP = ROOT / "firmware" / "app" / "src"
+GLUE = (APP / "airtouch_app.c").read_text()
+KERNELS = ("band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
+           "fr_cfar", "motion_channels", "stream_detector")
+SOURCES = [*(APP / f"app_{name}.c" for name in ("core", "level", "params")),
+           *(ROOT / "firmware" / "link" / f"{name}.c" for name in ("edge_link", "link_sender")),
+           *(ROOT / "firmware" / "kernels" / f"{name}.c" for name in KERNELS),
+           *(ROOT / "gap8" / "kernels" / f"{name}.c" for name in ("dense_int8", "sparse_dense_int8", "stream_int8")),
+           *(ROOT / "gap8" / "model" / f"airtouch_{name}.c" for name in ("model", "stream"))]
+INCLUDES = [APP, *(ROOT / folder for folder in ("firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model"))]
+RAM_BUDGET = 20_480  # bytes of appCore_t
+STACK_BUDGET = 1_000  # bytes below appMain's own
+#: instructions of a step on average, link included: 16800 are 1 % of the 168 MHz core at 100 Hz
+INSTRUCTION_BUDGET = {"cfar": 8_400, "best": 42_000, "best-gap8": 12_000, "paper-gap8": 12_000}
+SYMBOLS = """
+#include "app_core.h"
+const unsigned appCoreBytes = sizeof(appCore_t), appLogAt = __builtin_offsetof(appCore_t, log);
+"""
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    if not build.compilers("cortex-m4"):
+        pytest.skip("no cross compiler: pip install ziglang")
+    extra = tmp_path_factory.mktemp("symbols") / "symbols.c"
+    extra.write_text(SYMBOLS)
+    return build.build([*SOURCES, extra], "cortex-m4", include=INCLUDES, optimise="-Os")
+
+
+class Emulated:
+    """The app's core on a Cortex-M4F."""
+
+    def __init__(self, program, detector):
+        self.machine = machine = Machine(program.elf)
+        self.bytes, log_at = (struct.unpack("<I", machine.read(n, 4))[0] for n in ("appCoreBytes", "appLogAt"))
+        self.core, self.packet = machine.allocate(self.bytes), machine.allocate(98)
+        self.sample, self.params = machine.allocate(ffi.sizeof("appSample_t")), machine.allocate(64)
+        self.log_at = self.core + log_at
+        machine.call("appParamsDefaults", self.params)
+        machine.write(self.params + 1, bytes([detector]))
+        self.first = machine.call("appCoreInit", self.core, self.params, 1, 7).instructions
+        self.instructions = []
+
+    def step(self, acc, gyro, pwm, gap8):
+        """One step with its packets, and the answers of a GAP8; the log after it."""
+        machine, count = self.machine, 0
+        machine.write(self.sample, struct.pack("<3f3f4f5fI", *acc, *gyro, *pwm, *(np.nan,) * 5, 0))
+        count += machine.call("appCoreStep", self.core, self.sample).instructions
+        for _ in range(2):
+            called = machine.call("appCoreOutgoing", self.core, self.packet)
+            count += called.instructions
+            if called.value == 0:
+                break
+            count += machine.call("appCoreSent", self.core, 1).instructions
+            reply = gap8.take(machine.read(self.packet, called.value))
+            machine.write(self.packet, reply)
+            count += machine.call("appCoreReceive", self.core, self.packet, len(reply)).instructions
+        self.instructions.append(count)
+        return ffi.from_buffer("appLog_t *", machine.read(self.log_at, ffi.sizeof("appLog_t")))
+
+
+@pytest.fixture(scope="module")
+def signals():
+    log = fly(scenario.load("paper-4cm"), vehicles.load(), seed=3)
+    return level_acceleration(log), log.stack(GYRO), log.stack(PWM)
+
+
+@pytest.mark.parametrize("detector", range(4), ids=DETECTORS)
+def test_the_core_runs_on_a_cortex_m4_within_its_budget(program, signals, detector):
+    emulated, desktop = Emulated(program, detector), AppCore({"detector": detector}, have_gap8=True, nonce=7)
+    one, other = Gap8Core(), Gap8Core()
+    for acc, gyro, pwm in zip(*(s[600:1300] for s in signals)):
+        log = emulated.step(np.float32(acc), np.float32(gyro), np.float32(pwm), one)
+        desktop.step(acc, gyro, pwm)
+        for packet in desktop.packets():
+            desktop.receive(other.take(packet))
+    expected = desktop.log
+    assert list(log.logit) == list(expected.logit) and log.edges == expected.edges
+    for name in ("feature", "force", "cfarPower", "threshold"):
+        np.testing.assert_allclose(np.array(getattr(log, name) if name[0] in "ct" else list(getattr(log, name))),
+                                   np.array(getattr(expected, name) if name[0] in "ct" else list(getattr(expected, name))),
+                                   rtol=1e-4)
+    steady = np.array(emulated.instructions[300:])
+    stack = emulated.machine.stack_used()
+    print(f"{DETECTORS[detector]}: {steady.mean():.0f} instructions a step, {steady.max()} at worst, start "
+          f"{emulated.first}; core {emulated.bytes} bytes, stack {stack} bytes")
+    assert steady.mean() <= INSTRUCTION_BUDGET[DETECTORS[detector]]
+    assert emulated.bytes <= RAM_BUDGET and stack <= STACK_BUDGET
+
+
+def undefined(path):
+    """Names that an object file needs from elsewhere."""
+    data = path.read_bytes()
+    at, (size, count) = struct.unpack_from("<I", data, 32)[0], struct.unpack_from("<HH", data, 46)
+    sections = [struct.unpack_from("<10I", data, at + i * size) for i in range(count)]
+    table = next(s for s in sections if s[1] == 2)
+    strings = sections[table[6]][4]
+    names = set()
+    for entry in range(table[4], table[4] + table[5], 16):
+        name, _, _, _, _, section = struct.unpack_from("<IIIBBH", data, entry)
+        if section == 0 and name:
+            names.add(data[strings + name:data.index(b"\0", strings + name)].decode())
+    return names
+
+
+def test_no_double_and_no_heap_in_the_cross_compiled_core(program):
+    called = set().union(*(undefined(program.objects[source.name]) for source in SOURCES))
+    assert "expf" in called
+    assert not {name for name in called if name.startswith("__aeabi_d") or "2d" in name or "alloc" in name}
+    assert not {name for name in called if name.startswith("__aeabi_f")}, "single precision must be the processor's own"
+
+
+def test_log_and_parameter_names_are_those_of_the_virtual_drone():
+    kinds = {"LOG_FLOAT": "float", "LOG_UINT8": "uint8_t", "LOG_UINT16": "uint16_t", "LOG_UINT32": "uint32_t"}
+    logs = re.findall(r"LOG_ADD(?:_BY_FUNCTION)?\((\w+), (\w+), &(?:core\.log\.)?(\w+)(?:\[(\d)\])?\)", GLUE)
+    found = {name: (kinds[kind], "health" if field == "healthLogger" else field, int(at or -1))
+             for kind, name, field, at in logs}
+    assert found == sitl.LOGS
+    fields = dict(ffi.typeof("appLog_t").fields)
+    for kind, field, at in found.values():
+        inner = fields[field].type
+        assert (inner.item if at >= 0 else inner).cname == kind
+    params = {name: field for _, name, field in re.findall(r"PARAM_ADD\((\w+), (\w+), &wanted\.(\w+)\)", GLUE)}
+    assert params == sitl.PARAMS
+    assert {field for _, field, _ in found.values()} == set(fields)
+    assert set(params.values()) == {name for name, _ in ffi.typeof("appParams_t").fields}
+
+
+def test_the_build_lists_every_source_that_the_core_needs():
+    text = (APP / "Kbuild").read_text()
+    built = {Path(name).stem for name in re.findall(r"[\w./]+\.o", text)}
+    assert {source.stem for source in SOURCES} <= built
+
+
+@pytest.mark.parametrize("make, words", [([], "say where the firmware's sources are"),
+                                         (["CRAZYFLIE_BASE=/"], "is no checkout of bitcraze/crazyflie-firmware"),
+                                         (["CRAZYFLIE_BASE={bare}"], "lacks its submodules")])
+def test_make_firmware_says_what_is_missing(make, words, tmp_path):
+    (tmp_path / "tools/make").mkdir(parents=True)
+    (tmp_path / "tools/make/oot.mk").touch()
+    environment = {k: v for k, v in os.environ.items() if k != "CRAZYFLIE_BASE"}
+    run = subprocess.run(["make", "-C", ROOT, "firmware", *(m.format(bare=tmp_path) for m in make)],
+                         capture_output=True, text=True, env=environment)
+    assert run.returncode != 0 and words in run.stderr
+
+
+@pytest.mark.slow
+def test_the_image_links_with_the_firmware():
+    base = os.environ.get("CRAZYFLIE_BASE")
+    if not base or shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc")
+    run = subprocess.run(["make", "-C", ROOT, "firmware", f"CRAZYFLIE_BASE={base}"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[-3000:]
