@@ -6,11 +6,12 @@ An effect that this table does not know (a user's own) has every parameter with 
 value free, and counts as random when two seeds give two forces.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from airtouch.gap.result import Quantity
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
 
@@ -35,6 +36,7 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "battery_sag": tuple({"charge": x} for x in (0.95, 0.6)),
 }
 _FIXED = {"ground_effect": {"turbulence": 0.0}}
+COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
 #: names for one thing in the logs at hand, with what would tell them apart
 TWINS = (
     (frozenset({"mass", "thrust_coefficient"}),
@@ -51,6 +53,7 @@ class Term:
     kind: str
     free: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
+    companion: bool = False  #: in the model because another effect implies it; not reported itself
 
     @property
     def name(self) -> str:
@@ -79,6 +82,27 @@ class Term:
             high.append((p.high - _neutral(p)) / unit(p))
         return np.array(low), np.array(high)
 
+    def scaled(self, values: Mapping[str, float]) -> np.ndarray:
+        """The scaled parameters of given values."""
+        return np.array([(values[n] - _neutral(self._parameter(n))) / self.step(n) for n in self.free])
+
+    def step(self, name: str) -> float:
+        """The natural step of a parameter."""
+        return unit(self._parameter(name))
+
+    def quantities(self, scaled: np.ndarray, covariance: np.ndarray | None = None) -> dict[str, Quantity]:
+        """Every parameter with its unit, the free ones with their 90 % interval."""
+        values, out = self.at(scaled), {}
+        for p in self.effect.parameters:
+            if p.name not in self.free:
+                out[p.name] = Quantity(values[p.name], unit=p.unit)
+                continue
+            i = self.free.index(p.name)
+            half = 0.0 if covariance is None else 1.645 * float(np.sqrt(max(covariance[i, i], 0.0))) * unit(p)
+            out[p.name] = Quantity(values[p.name], max(values[p.name] - half, p.low),
+                                   min(values[p.name] + half, p.high), p.unit)
+        return out
+
     def _parameter(self, name: str):
         return next(p for p in self.effect.parameters if p.name == name)
 
@@ -102,9 +126,19 @@ def terms(name: str) -> list[Term]:
     return [Term(effect, kind, free, base | variant) for variant in _VARIANTS.get(name, ({},))]
 
 
-def every(without: tuple[str, ...] = ()) -> dict[str, list[Term]]:
-    """All effects of the registry as hypotheses, in its order."""
-    return {name: terms(name) for name in EFFECTS if name not in without}
+def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
+    """All effects of the registry as hypotheses, in its order: for each its variants.
+
+    Moving air acts through the rotors' drag, and drag that acts on the air's velocity acts
+    on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
+    """
+    without = set(without)
+    out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    for name in COMPANIONS:
+        if name in out:
+            drag = [replace(t, companion=True) for t in terms(COMPANIONS[name])]
+            out[name] += [(*v, *drag) for v in out[name]]
+    return out
 
 
 def twins_of(name: str) -> tuple[frozenset[str], str] | None:

@@ -26,6 +26,7 @@ OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to fl
 ITERATIONS = 8
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
+COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
 FREEDOM = 12.0  #: of the Student-like tail at most
 
 
@@ -323,7 +324,9 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     low, high = _limits(mean)
     x = np.clip(x, low, high)
     offsets = np.zeros(len(constants))
-    prior = np.concatenate([np.broadcast_to(spread, len(x)), [p for _, p in constants]])
+    close = np.array([t.name in COMMAND_ONLY for t in mean for _ in t.free], bool)
+    spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
+    prior = np.concatenate([spread, [p for _, p in constants]])
     push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
     raw = problem.values(_active(mean, x)) if mean else problem.base
     values = raw - push(offsets)

@@ -1,0 +1,135 @@
+"""The vehicle's parameters from flights declared nominal.
+
+"System identification can manufacture agreement": a diagnosis is therefore made in two
+arms, with the vehicle as declared and as calibrated here. Only the vehicle is calibrated
+(rotors, lag, delay, inertia, drag, IMU), never its surroundings, each with a prior.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap import twin
+from airtouch.gap.candidates import Term, terms
+from airtouch.gap.channels import COUNT, residual
+from airtouch.gap.fit import Data, Part, Study, fit
+from airtouch.gap.flight import Flight
+from airtouch.gap.result import Quantity
+from airtouch.gap.spectra import Floor, floor_of, sensor_power, starts, AIR, REST
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+#: effect, its variant, and the prior's standard deviation of each free parameter in its own unit
+PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
+    *(("weak_motor", {"rotor": i}, {"thrust_loss": 0.1}) for i in (1, 2, 3, 4)),
+    ("motor_lag", {}, {"factor": 0.5}),
+    ("actuator_delay", {}, {"delay": 0.005}),
+    ("inertia", {}, {"fraction": 0.3}),
+    ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
+    ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
+)
+SENSITIVE = 3.0  #: baseline flights whose offsets differ by more than this many deviations are named
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Fitted effects that make the declared vehicle the nominal one; intervals are 90 %."""
+
+    active: tuple[Active, ...]
+    parameters: dict[str, Quantity]
+    notes: tuple[str, ...]
+
+
+def declared(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
+    """The study with the vehicle as its file declares it."""
+    return _study(vehicle, (), flights)
+
+
+def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Calibration]:
+    """Fit the vehicle to nominal flights, then measure the floor that is left."""
+    study = declared(vehicle, flights)
+    chosen, prior = _terms()
+    for _ in range(2):
+        data = Data(study, flights)
+        whole = whole_of(data)
+        start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
+        found = fit(Data(replace(study, calibration=(), controller=None), flights), whole, chosen, start, prior)
+        study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
+    return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
+                              tuple(_inconsistent(study, flights)))
+
+
+def whole_of(data: Data) -> Part:
+    """Every block of every flight."""
+    return Part(tuple((i, r, np.ones(len(f[r]), bool)) for i, f in enumerate(data.first) for r in (AIR, REST)
+                      if len(f[r])))
+
+
+def sensor_noise(vehicle: Vehicle) -> np.ndarray:
+    """White noise (COUNT,) that the vehicle's sensors are declared to have, rms at 100 Hz."""
+    gyro = np.full(3, vehicle.gyro_noise_rms_radps)
+    return np.concatenate([np.full(3, vehicle.acc_noise_rms_mps2), gyro, gyro, np.zeros(COUNT - 9)])
+
+
+def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[Flight]) -> Study:
+    least = sensor_noise(vehicle)
+    if not flights:
+        power = {r: 2.0 * sensor_power(least, r) for r in (AIR, REST)}
+        for table in power.values():
+            table[:, 9:] = 1e12
+            table[:, 6:9] = 1e6
+        return Study(vehicle, calibration, None, Floor(power, {AIR: 8, REST: 8}, np.zeros(COUNT), 0.0, 0.0))
+    law = twin.identify(flights, vehicle, calibration)
+    left = [residual(f, vehicle, calibration, law) for f in flights]
+    return Study(vehicle, calibration, law, floor_of(flights, left, least))
+
+
+def _terms() -> tuple[list[Term], np.ndarray]:
+    chosen, prior = [], []
+    for name, variant, spread in PRIORS:
+        term = next(t for t in terms(name) if all(t.values[k] == v for k, v in variant.items()))
+        chosen.append(term)
+        for p in term.free:
+            prior.append(spread[p] / term.step(p))
+    return chosen, np.array(prior)
+
+
+def _scaled(term: Term, calibration: Sequence[Active]) -> np.ndarray:
+    for a in calibration:
+        if a.effect.name == term.name and all(a.values[k] == v for k, v in term.values.items()
+                                              if k not in term.free):
+            return term.scaled(a.values)
+    return np.zeros(len(term.free))
+
+
+def _quantities(chosen: Sequence[Term], scaled: np.ndarray, covariance: np.ndarray) -> dict[str, Quantity]:
+    out, place = {}, 0
+    for term in chosen:
+        part = slice(place, place + len(term.free))
+        place += len(term.free)
+        variant = f" {int(term.values['rotor'])}" if term.name == "weak_motor" else ""
+        for key, q in term.quantities(scaled[part], covariance[part, part]).items():
+            if key in term.free:
+                out[f"{term.name}{variant} {key}"] = q
+    return out
+
+
+def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:
+    """Which nominal flights differ from the rest by more than chance and how much."""
+    if len(flights) < 3:
+        return []
+    notes = []
+    names = ("forward force", "sideways force", "lift", "roll torque", "pitch torque", "yaw torque")
+    means = np.array([residual(f, study.vehicle, study.calibration)[(f.phase > 0) & f.usable][:, :6].mean(axis=0)
+                      for f in flights])
+    spread = 1.4826 * np.median(np.abs(means - np.median(means, axis=0)), axis=0)
+    for f, row in zip(flights, means, strict=True):
+        far = np.abs(row - np.median(means, axis=0)) / np.maximum(spread, 1e-9)
+        i = int(np.argmax(far))
+        if far[i] > 2.0 * SENSITIVE:
+            notes.append(f"{f.name}: declared nominal, yet its {names[i]} is {far[i]:.0f} deviations from the others'")
+    return notes
+
+
+__all__ = ["Calibration", "calibrated", "declared", "sensor_noise", "starts", "whole_of"]

@@ -1,0 +1,93 @@
+"""A first look at every candidate: its first-order change of the spectra, fitted by least squares.
+
+One replay for each free parameter, shared by both halves of the data; candidates that do
+well here are then fitted in full.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch.gap.candidates import MEAN, Term
+from airtouch.gap.fit import Data, Part, Problem, _bounded_step, _limits, _weights, problem_of, spectra
+from airtouch.gap.fit import _without_offsets as without_offsets
+from airtouch.gap.twin import COMMAND_ONLY
+
+STEP = 0.25  #: of a parameter's natural step, at which the change is taken
+ROUNDS = 3
+
+
+@dataclass
+class Screen:
+    """Changes of the spectra by effect and parameter, made when first asked for."""
+
+    data: Data
+    kept: dict[tuple, list[dict[str, np.ndarray]]] = field(default_factory=dict)
+
+    def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
+        """Change of the flattened spectra per scaled parameter i of a term at neutral."""
+        fixed = tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
+        key = (term.name, term.free[i], fixed)
+        if key not in self.kept:
+            low, high = term.bounds()
+            x = np.zeros(len(term.free))
+            x[i] = STEP if STEP <= high[i] else -STEP
+            neutral = [term.active(np.zeros(len(term.free)))]
+            before = spectra(self.data, neutral) if _changes(term) else self.data.base
+            after = spectra(self.data, [term.active(x)])
+            self.kept[key] = [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
+                              for a, b in zip(after, before, strict=True)]
+        gathered = problem._gather(self.kept[key])
+        return np.where(problem.known, problem._with_twin(gathered), 0.0)
+
+
+def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray],
+                added: Sequence[np.ndarray], terms: Sequence[Term],
+                beside: Sequence[Term] = ()) -> tuple[float, list[np.ndarray]]:
+    """Held-out gain of mean effects to first order, and their scaled parameters on each half.
+
+    left, added: for each part what the effects chosen before leave, and the power that
+    random ones add. beside: those effects, free to give way a little.
+    """
+    mean = [t for t in terms if t.kind == MEAN and t.name not in COMMAND_ONLY]
+    other = [t for t in beside if t.kind == MEAN and t.name not in COMMAND_ONLY]
+    gain, found = 0.0, []
+    tables = []
+    for part in parts:
+        problem = problem_of(screen.data, part)
+        tables.append([screen.column(problem, t, i) for t in (*mean, *other) for i in range(len(t.free))])
+    n = sum(len(t.free) for t in mean)
+    low, high = _limits(mean) if mean else (np.zeros(0), np.zeros(0))
+    wide = np.full(len(tables[0]) - n, 1e6)
+    low, high = np.concatenate([low, -wide]), np.concatenate([high, wide])
+    for train, test in ((0, 1), (1, 0)):
+        problem = problem_of(screen.data, parts[train])
+        constants = problem.constant()
+        columns = [*tables[train], *(-c for c, _ in constants)]
+        prior = np.concatenate([np.full(len(tables[train]), 30.0), [p for _, p in constants]])
+        x, offsets = np.zeros(len(tables[train])), np.zeros(len(constants))
+        nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
+        values = left[train]
+        for _ in range(ROUNDS):
+            change, _ = _bounded_step(columns, prior, values, _weights(problem, values, added[train]),
+                                      x, offsets, low, high, nothing)
+            x = np.clip(x + change[:len(x)], low, high)
+            offsets = offsets + change[len(x):]
+            values = left[train] + sum(a * c for a, c in zip(np.concatenate([x, offsets]), columns, strict=True))
+        problem = problem_of(screen.data, parts[test])
+        moved = left[test] + sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(left[test])))
+        after, cost = without_offsets(problem, moved, added[test])
+        before, paid = without_offsets(problem, left[test], added[test])
+        gain += problem.likelihood(after, added[test]) - cost - problem.likelihood(before, added[test]) + paid
+        found.append(x[:n])
+    return gain, found
+
+
+def _changes(term: Term) -> bool:
+    """Whether an effect changes anything while its free parameters are neutral (a shape that is not)."""
+    return not all(p.neutral is not None or p.name in term.free for p in term.effect.parameters) \
+        and term.effect.settings is not None
+
+
+__all__ = ["Mapping", "Screen", "first_order"]

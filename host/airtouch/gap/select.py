@@ -1,0 +1,236 @@
+"""Which effect: every candidate fitted on some blocks and judged on others, one against another.
+
+Two halves of the flights (of the blocks, for a few flights) take turns at fitting and
+judging. `none` is the hypothesis of no effect. `unknown` is a free spectrum: any power in
+any channel and band. It costs many parameters, so a named effect that is right beats it;
+where it gains much on top of the best named effects, something is left that they do not explain.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.candidates import CLOCK, MEAN, Term
+from airtouch.gap.channels import COUNT
+from airtouch.gap.fit import Data, Fit, Part, Problem, fit, judge, left_over, problem_of
+from airtouch.gap.flight import PERIOD_S
+from airtouch.gap.screen import Screen, first_order
+from airtouch.gap.spectra import AIR, REST, frequencies
+from airtouch.gap.twin import COMMAND_ONLY
+
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
+GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
+LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
+LEAST_SHARE = 0.02  #: and as a share of what the effects before it have added
+UNKNOWN_GAIN = 25.0  #: of the free spectrum over the best named effects, for `unknown`
+UNKNOWN_SHARE = 0.2  #: and as a share of the free spectrum's gain over no effect
+MOST_EFFECTS = 3
+FULL = 5  #: candidates that are fitted in full, after a first look at all
+TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
+Hypothesis = tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A hypothesis with its gain in held-out log likelihood over no effect, and its fits of both halves."""
+
+    name: str
+    terms: Hypothesis
+    gain: float
+    fits: tuple[Fit, ...] = ()
+    full: bool = True  #: fitted in full, not to first order only
+
+
+@dataclass(frozen=True)
+class Selection:
+    """singles: the best variant of every candidate; steps: effects added one after another;
+
+    free_before, free_after: gain of the free spectrum over nothing and over the last step.
+    """
+
+    singles: Mapping[str, Judged]
+    steps: tuple[Judged, ...]
+    free_before: float
+    free_after: float
+
+    @property
+    def chosen(self) -> Judged | None:
+        """The effects named, as one hypothesis; None where none is."""
+        return self.steps[-1] if self.steps else None
+
+    @property
+    def explained(self) -> bool:
+        """Whether what is left is the floor, or close to it."""
+        return self.free_after < max(UNKNOWN_GAIN, UNKNOWN_SHARE * self.free_before)
+
+
+def halves(data: Data) -> tuple[Part, Part]:
+    """Two halves: by flight where there are four or more, else alternating groups of blocks."""
+    first, second = [], []
+    for i, f in enumerate(data.first):
+        for regime in (AIR, REST):
+            n = len(f[regime])
+            if not n:
+                continue
+            if len(data.flights) >= 4:
+                (first if i % 2 == 0 else second).append((i, regime, np.ones(n, bool)))
+            else:
+                even = (np.arange(n) // GROUP) % 2 == 0
+                first.append((i, regime, even))
+                second.append((i, regime, ~even))
+    return Part(tuple(first)), Part(tuple(second))
+
+
+def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
+           progress: Callable[[str], None] = lambda _: None) -> Selection:
+    """Judge every candidate, then add effects one by one while held-out data ask for them."""
+    parts = halves(data)
+    base = [judge(data, p, ()) for p in parts]
+    screen = Screen(data)
+    singles = _round(data, parts, base, screen, candidates, None, progress)
+    steps: list[Judged] = []
+    best = max(singles.values(), key=lambda j: j.gain, default=None)
+    while best is not None and len(steps) < MOST_EFFECTS:
+        before = steps[-1].gain if steps else 0.0
+        if best.gain - before < max(LEAST_GAIN, LEAST_SHARE * before):
+            break
+        steps.append(best)
+        if len(steps) < MOST_EFFECTS:
+            more = _round(data, parts, base, screen, candidates, best, progress)
+            best = max(more.values(), key=lambda j: j.gain, default=None)
+    return Selection(singles, tuple(steps), free_gain(data, parts, None),
+                     free_gain(data, parts, steps[-1] if steps else None))
+
+
+def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Screen,
+           candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
+           progress: Callable[[str], None]) -> dict[str, Judged]:
+    """Every candidate on top of what is chosen: a first look at all, the most promising in full."""
+    before = chosen.gain if chosen else 0.0
+    held = chosen.terms if chosen else ()
+    have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
+    left, added = [], []
+    for k, part in enumerate(parts):
+        problem, values, power = left_over(data, part, chosen.fits[1 - k].terms if chosen else ())
+        left.append(values)
+        added.append(power - problem.power)
+    looked, sure = [], []
+    for name, variants in candidates.items():
+        progress(name)
+        for terms in variants:
+            if any((t.name, t.values.get("rotor")) in have for t in terms):
+                continue
+            if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
+                gain, start = first_order(screen, parts, left, added, terms, held)
+                looked.append(Judged(name, (*held, *terms), before + gain, full=False))
+            else:
+                sure.append(_crossed(data, parts, base, name, held, terms, chosen))
+    looked.sort(key=lambda j: -j.gain)
+    worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * LEAST_GAIN)]
+    fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen) for j in worth]
+    best: dict[str, Judged] = {}
+    for j in (*sure, *fitted, *(j for j in looked if j not in worth)):
+        old = best.get(j.name)
+        need = LEAST_GAIN if old is not None and len(j.terms) > len(old.terms) else 0.0
+        if old is None or (j.full, j.gain) > (old.full, old.gain + need):
+            best[j.name] = j
+    return best
+
+
+def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str, held: Hypothesis,
+             terms: Hypothesis, chosen: Judged | None) -> Judged:
+    """Fit on each half, judge on the other."""
+    every = (*held, *terms)
+    timed = [t for t in terms if t.kind == CLOCK]
+    gain, fits = 0.0, []
+    if chosen and not [t for t in terms if t.kind != CLOCK]:
+        gain, fits = chosen.gain, list(chosen.fits)
+    else:
+        others = [t for t in every if t.kind != CLOCK]
+        gain += sum(clock_gain(data, t)[1] for t in held if t.kind == CLOCK)
+        for train, test in ((0, 1), (1, 0)):
+            found = fit(data, parts[train], others, _start(chosen, others, train))
+            gain += judge(data, parts[test], found.terms) - base[test] if others else 0.0
+            fits.append(found)
+    fitted = list(fits[0].terms) if fits else []
+    for t in (t for t in every if t.kind == CLOCK):
+        made, more = clock_gain(data, t)
+        fitted.append(made)
+        gain += more if t in timed else 0.0
+    return Judged(name, tuple(fitted), gain, tuple(fits))
+
+
+def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
+    """The parameters found before, and a little of every new effect; None to begin anew."""
+    if chosen is None or any(t.name in COMMAND_ONLY for t in terms):
+        return None
+    known = chosen.fits[train].scaled
+    size = sum(len(t.free) for t in terms if t.kind == MEAN)
+    return np.concatenate([known, np.full(size - len(known), 0.05)])
+
+
+def bands_of(problem: Problem) -> np.ndarray:
+    """A group number for each flattened value: view, regime, channel and band."""
+    groups = []
+    for _, regime, chosen in problem.part.pieces:
+        f = frequencies(regime)
+        band = np.digitize(f, BANDS_HZ) - 1
+        table = band[:, None] * COUNT + np.arange(COUNT) + (1000 if regime == REST else 0)
+        groups.append(np.tile(table[problem.keep[regime]], int(chosen.sum())))
+    twin = np.digitize(problem.twin.frequency, BANDS_HZ) * COUNT + problem.twin.channel + 2000 \
+        if len(problem.twin) else np.zeros(0)
+    return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
+
+
+def free_gain(data: Data, parts: Sequence[Part], chosen: Judged | None) -> float:
+    """Held-out log likelihood that a free spectrum adds to a hypothesis: what it does not explain."""
+    total = 0.0
+    for train, test in ((0, 1), (1, 0)):
+        terms = chosen.fits[train].terms if chosen and chosen.fits else ()
+        problem, values, power = left_over(data, parts[train], terms)
+        e = np.where(problem.known, np.abs(values) ** 2 / power, 0.0)
+        groups = bands_of(problem)
+        size = groups.max(initial=0) + 1
+        count = np.bincount(groups, problem.known, size)
+        mean = np.bincount(groups, e, size) / np.maximum(count, 1.0)
+        factor = np.where(count > 0, np.maximum(mean, 1.0), 1.0)
+        problem, values, power = left_over(data, parts[test], terms)
+        groups = np.minimum(bands_of(problem), size - 1)
+        with_free = problem.likelihood(values, power * factor[groups] - problem.power)
+        total += with_free - problem.likelihood(values, power - problem.power)
+    return total
+
+
+def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
+    """Effects on the logged times alone: jitter of their rms, or the share of lost samples."""
+    gain = 0.0
+    floor = data.study.floor
+    clock = np.concatenate([f.clock_s for f in data.flights])
+    lost = np.concatenate([f.lost for f in data.flights]).astype(float)
+    if term.name == "time_jitter":
+        usual, now = max(floor.clock_s, 2e-4), max(float(np.std(clock)), 1e-9)
+        extra = np.sqrt(max(now ** 2 - usual ** 2, 0.0))
+        n = len(clock) * PERIOD_S / 0.1  # arrival times hang together for a tenth of a second
+        if extra > 0.0:
+            gain = 0.5 * n * ((now / usual) ** 2 - 1.0 - 2.0 * np.log(now / usual))
+        return term.fitted(np.array([extra / term.step("rms")])), float(gain)
+    share, usual = float(lost.mean()), max(floor.lost, 1e-3)
+    if share > usual:
+        n = len(lost) / 2.0
+        gain = n * (share * np.log(share / usual) + (1.0 - share) * np.log((1.0 - share) / (1.0 - usual)))
+    return term.fitted(np.array([share / term.step("share")])), float(gain)
+
+
+def probabilities(selection: Selection) -> dict[str, float]:
+    """Of every single candidate, `none` and `unknown`; they sum to 1."""
+    names = list(selection.singles)
+    score = np.array([selection.singles[n].gain - LEAST_GAIN for n in names]
+                     + [0.0, selection.free_before - UNKNOWN_GAIN])
+    if selection.chosen is not None and selection.explained:
+        first = selection.steps[0].name
+        score[-1] = min(score[-1], score[names.index(first)] - 3.0 * TEMPERATURE)
+    elif selection.chosen is not None or selection.free_before > UNKNOWN_GAIN:
+        score[-1] = max(score[-1], score[:-2].max(initial=0.0) + 3.0 * TEMPERATURE)
+    weight = np.exp((score - score.max()) / TEMPERATURE)
+    return dict(zip([*names, "none", "unknown"], weight / weight.sum(), strict=True))
