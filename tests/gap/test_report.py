@@ -92,10 +92,10 @@ def test_pages_of_other_verdicts(flown, tmp_path, verdict, effects, words_there)
 
 def test_page_of_a_measurement(flown, tmp_path):
     path, found = tmp_path / "gap.html", measure(flown, VEHICLE)
-    gap_report.write_measurement(path, found, command="airtouch gap measure x")
+    gap_report.write_measurement(path, found, flown, VEHICLE, command="airtouch gap measure x")
     text, checker = checked(path)
     assert text.index("The gap is largest") < text.index("On the ground") < text.index("The largest cells")
-    assert len(checker.loaded) == 1 and "Which effect" not in text and "→" not in text
+    assert len(checker.loaded) == 3 and "Which effect" not in text and "→" not in text
 
 
 @pytest.mark.parametrize("name", list(EFFECTS))

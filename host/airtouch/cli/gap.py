@@ -77,8 +77,8 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     if report:
         from airtouch.report import gap_report
 
-        gap_report.write_measurement(report, found, command=_line("measure", real, baseline, vehicle_name),
-                                     force=force)
+        gap_report.write_measurement(report, found, flights, vehicle, force=force,
+                                     command=_line("measure", real, baseline, vehicle_name))
     _written(json_path, report)
 
 

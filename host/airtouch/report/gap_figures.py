@@ -72,7 +72,7 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Mapping[str, Any]]) -> byt
             ax.set_title(CHANNEL_WORDS[some["channel"]], loc="left")
             ax.set_ylabel(f"({some['unit']})²/Hz")
             ax.grid(alpha=0.2)
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+        _legend(figure, axes[0])
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
         return _png(figure)
 
@@ -91,7 +91,7 @@ def commands(made: Mapping[str, Any]) -> bytes:
             ax.set_title(f"{name} command", loc="left")
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)
-        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        _legend(figure, axes[0])
         _frequency_axis(axes, (2, 5, 10, 20, 40))
         return _png(figure)
 
@@ -101,6 +101,12 @@ def _png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=170)
     return buffer.getvalue()
+
+
+def _legend(figure: Figure, ax: Axes) -> None:
+    """One legend above all panes."""
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
 
 def _frequency_axis(axes: Sequence[Axes], ticks: Sequence[float]) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib import resources
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,14 @@ MOST_CELLS = 10  #: in a list
 MOST_FLIGHTS = 40  #: looked at for the figures; the diagnosis has seen them all
 
 
-def write_measurement(path: Path, found: measure.Measurement, *, command: str, force: bool = False) -> None:
-    """The page of `airtouch gap measure`: map, largest cells, spectra of the commands.
+def write_measurement(path: Path, found: measure.Measurement, flights: Iterable[FlightLog] = (),
+                      vehicle: Vehicle | None = None, *, command: str, force: bool = False) -> None:
+    """The page of `airtouch gap measure`: map, largest cells, signals and spectra.
 
-    Raises AirTouchError when the file exists, without `force`.
+    flights, vehicle: what was measured, for the pictures of its signals. Raises
+    AirTouchError when the file exists, without `force`.
     """
+    seen = list(measure.usable(islice(flights, MOST_FLIGHTS), vehicle, [])) if vehicle else []
     where = found.where
     answer = f"The gap is largest {in_words(where[0])}." if where else "No gap stands out of the floor."
     support = [f"Overall it is {found.gap['before']:.2g} times the floor" +
@@ -41,7 +45,8 @@ def write_measurement(path: Path, found: measure.Measurement, *, command: str, f
                 if "calibrated" in found.gap else ".")]
     page = _page(
         title="Gap between flights and simulator", answer=answer, support=support, made=found.map, where=where,
-        images=_command_image(found.spectra), calibration=gap_tables.named(found.calibration),
+        images=(_images(calibrate.declared(vehicle, ()), seen, [], where[0], where) if seen and where else [])
+        + _command_image(found.spectra), calibration=gap_tables.named(found.calibration),
         lists=[("What these logs cannot say", found.cannot), ("Notes", found.notes), ("Left out", found.left_out)],
         flights=_flights(found.flights, found.vehicle, found.baseline), command=command)
     write_bytes(page.encode(), path, force)
