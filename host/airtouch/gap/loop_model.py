@@ -74,8 +74,18 @@ def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     return total
 
 
-def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
-    s = 2j * np.pi * np.maximum(f, 0.05)
+def excess_phase(c: Controller, row: Any, axis: str) -> float:
+    """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable."""
+    f = np.geomspace(0.3, 45.0, 160)
+    loop = _open_loop(c, row, axis, f, 2j * np.pi * f)
+    turned, size = np.unwrap(np.angle(loop)), np.abs(loop)
+    turned += -2.0 * np.pi * np.ceil(turned[0] / (2.0 * np.pi))
+    last = np.flatnonzero(size > 1.0)
+    return float(-np.pi - turned[last[-1]]) if len(last) else -np.pi
+
+
+def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Plant, and the controller's rate (climb), angle (height), velocity paths, its filter, and all together."""
     hold = np.sinc(f * c.period_s) * np.exp(-0.5 * s * c.period_s)
     motor = np.exp(-s * float(row["actuator_delay"])) * hold * 0.5 * (
         1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
@@ -85,15 +95,9 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         k = float(row["height_gain"])
         climb = k * c.gain * (1.0 + c.integral / s)
         height = climb * c.angle * k * (1.0 + c.angle_integral / s)
-        plant = lift / float(row["mass"]) * motor / s
-        whole = (climb + height / s) * late
-        size = np.abs(1.0 / (1.0 + plant * whole)) ** 2
-        climbs = np.abs(climb + height / s) ** 2
-        return size * np.array([np.abs(climb) ** 2, climbs / np.maximum(f, 0.3) ** 2,
-                                climbs / np.maximum(f, 0.3) ** 4, np.abs(whole / s) ** 2])
+        return lift / float(row["mass"]) * motor / s, climb, height, 0.0 * s, late, (climb + height / s) * late
     i = AXES.index(axis) - 1
     arm = float(np.mean(np.abs(row["rotor_y" if i == 0 else "rotor_x"])))
-    plant = lift * arm / float(row["inertia"][i]) * motor / s
     k = c.gain * float(row["rate_gain"])
     change = c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
     rate = k * (1.0 + c.integral / s + change)
@@ -102,14 +106,28 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     velocity = angle * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
     filtered = late / _butterworth(s, c.lowpass_hz)
     whole = (rate + angle / s) * filtered + velocity * float(row["gravity"]) / s ** 2 * late
+    return lift * arm / float(row["inertia"][i]) * motor / s, rate, angle, velocity, filtered, whole
+
+
+def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> np.ndarray:
+    plant, *_, whole = _parts(c, row, axis, f, s)
+    return plant * whole
+
+
+def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    f = np.maximum(f, 0.05)
+    s, low = 2j * np.pi * f, np.maximum(f, 0.3)
+    plant, rate, angle, velocity, filtered, whole = _parts(c, row, axis, f, s)
     size = 1.0 / (1.0 + plant * whole)
+    if axis == "thrust":
+        climbs = np.abs((rate + angle / s) * size) ** 2
+        return np.array([np.abs(rate * size) ** 2, climbs / low ** 2, climbs / low ** 4,
+                         np.abs(whole / s * size) ** 2])
     share = kicked = np.ones_like(s)
-    if c.on_error:
-        kick = c.derivative * (1.0 - np.exp(-s * OUTER_S))
-        share = 1.0 + c.integral / s + change
-        kicked = 1.0 + c.integral / s + kick / c.period_s
+    if c.on_error:  # set-points of the outer loop come as steps; the log takes the sample on which they do
+        share = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
+        kicked = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * OUTER_S)) / c.period_s
     outer = np.abs(kicked / share - plant * whole * size) ** 2
-    low = np.maximum(f, 0.3)
     seen = [] if c.lowpass_hz else [np.abs(angle * size) ** 2]
     return np.array([np.abs((rate + angle / s) * filtered * size) ** 2, *seen,
                      outer * np.abs(velocity / low) ** 2, outer * np.abs(velocity / low ** 2) ** 2,

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.flight import PERIOD_S, Flight
-from airtouch.gap.loop_model import AXES, Controller, firmware, spectra
+from airtouch.gap.loop_model import AXES, Controller, excess_phase, firmware, spectra
 from airtouch.logs.segments import KINDS
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -29,6 +29,7 @@ MIX = 0.25 * np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1,
 EDGE_S = (0.1, 0.4)  #: left out before and after a change of phase at an edge, take-off or landing
 PLATFORM = KINDS.index("over platform")
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
+UNSTABLE = 30.0  #: nepers of power per rad of phase beyond stability
 FEWEST = 6  #: blocks of nominal flights, for a twin view
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
 SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
@@ -87,7 +88,9 @@ class Twin:
         made = []
         for i, axis in enumerate(AXES):
             controller = firmware(row, axis) if self.by_firmware else self.controllers[i]
-            made.append(self.strengths[i] @ spectra(controller, row, axis, f))
+            power = self.strengths[i] @ spectra(controller, row, axis, f)
+            beyond = excess_phase(controller, row, axis)
+            made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
         return np.stack(made, axis=1)
 
 
