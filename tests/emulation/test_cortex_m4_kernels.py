@@ -10,8 +10,10 @@ from airtouch.kernels.edge_pipeline import config_struct, pipeline_ram_bytes
 from airtouch.kernels.library import ffi, lib
 from airtouch.reference import EdgePipelineConfig
 from airtouch.vehicle import load
+
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
+
 from tools.emulator import budget
 from tools.emulator.build import compilers
 from tools.emulator.count import WHOLE, clean_flights, flight_samples, kernel_inputs, measure

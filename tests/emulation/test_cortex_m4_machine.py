@@ -6,8 +6,10 @@ import struct
 import pytest
 
 from airtouch.errors import AirTouchError
+
 pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
+
 from tools.emulator.build import build
 from tools.emulator.elf import Elf
 from tools.emulator.machine import EmulationError, Machine

@@ -47,19 +47,20 @@ def compilers(core: str) -> list[str]:
 
 def build(
     sources: Sequence[Path], core: str, *, include: Sequence[Path] = (), defines: Sequence[str] = (),
-    optimise: str = "-O2", compiler: str | None = None, cache: Path = CACHE,
+    optimise: str = "-O2", compiler: str | None = None, flags: Sequence[str] = (), cache: Path = CACHE,
 ) -> Program:
     """Compiles and links `sources` (no main, every function kept) for "cortex-m4" or "rv32imc".
 
-    include: folders of headers; defines: "NAME" or "NAME=VALUE"; compiler: "zig" or "gcc", by default
-    $AIRTOUCH_CROSS or zig where it is installed, whose version is pinned, so that counts can be compared.
+    include: folders of headers; defines: "NAME" or "NAME=VALUE"; flags: after all others; compiler: "zig" or
+    "gcc", by default $AIRTOUCH_CROSS or zig where it is installed, whose version is pinned, so that counts can be
+    compared.
     Raises AirTouchError with the compiler's words where the sources do not compile, and where there is no
     compiler.
     """
     target = _core(core)
     chosen = _compiler(core, compiler)
     sources, include = [Path(s).resolve() for s in sources], [Path(i).resolve() for i in include]
-    flags = [*FLAGS, optimise, *(f"-D{d}" for d in defines), *(f"-I{folder}" for folder in include)]
+    flags = [*FLAGS, optimise, *(f"-D{d}" for d in defines), *(f"-I{folder}" for folder in include), *flags]
     folder = cache / core / _digest(target, chosen, flags, sources, include)
     program = Program(folder / "program.elf", {s.name: folder / f"{s.stem}.o" for s in sources})
     if not program.elf.is_file():
