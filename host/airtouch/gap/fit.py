@@ -25,6 +25,7 @@ from airtouch.vehicle import Vehicle
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 ITERATIONS = 8
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
+LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
 FREEDOM = 12.0  #: of the Student-like tail at most
@@ -124,9 +125,8 @@ class Problem:
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """Spectra with effects in the model, flattened."""
         seen = [a for a in active if a.effect.name not in COMMAND_ONLY]
-        if not seen:
-            return self.base
-        return np.where(self.known, self._with_twin(self._gather(spectra(self.data, seen)), self.twin.values), 0.0)
+        own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
+        return np.where(self.known, self._with_twin(own, self.twin.moved(active)), 0.0)
 
     def _with_twin(self, own: np.ndarray, twin: np.ndarray | float = 0.0) -> np.ndarray:
         return np.concatenate([own, np.broadcast_to(twin, len(self.twin))])
@@ -200,6 +200,8 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
         told, cost = problem.commanded(_active(mean, x), bool(random))
         random = [_strength(problem, random, i, values, told) for i in range(len(random))]
         added = problem.random_power(random) if random else 0.0
+    if random:
+        told, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
     fitted, place = [], 0
     chosen = iter(random)
     for t in terms:
@@ -217,7 +219,7 @@ def judge(data: Data, part: Part, terms: Sequence[Term]) -> float:
     problem = problem_of(data, part)
     random = [t for t in terms if t.kind == SPECTRUM]
     active = [t.active() for t in terms if t.kind == MEAN]
-    told, cost = problem.commanded(active, bool(random))
+    told, cost = problem.commanded([*active, *(t.active() for t in random)], bool(random))
     added = problem.random_power(random) + told
     values, penalty = _without_offsets(problem, problem.values(active), added)
     return problem.likelihood(values, added) - penalty - cost
@@ -228,7 +230,8 @@ def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, n
     problem = problem_of(data, part)
     random = [t for t in terms if t.kind == SPECTRUM]
     active = [t.active() for t in terms if t.kind == MEAN]
-    added = problem.random_power(random) + problem.commanded(active, bool(random))[0]
+    told, _ = problem.commanded([*active, *(t.active() for t in random)], bool(random))
+    added = problem.random_power(random) + told
     values, _ = _without_offsets(problem, problem.values(active), added)
     return problem, values, problem.power + added
 
@@ -240,7 +243,7 @@ def _start(problem: Problem, mean: Sequence[Term]) -> np.ndarray:
     for t in mean:
         here = range(place, place + len(t.free))
         place += len(t.free)
-        if t.name not in COMMAND_ONLY or not len(problem.twin):
+        if t.name not in LOOP or not len(problem.twin):
             continue
         low, high = _limits(mean)
         best = -np.inf
@@ -324,7 +327,7 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     low, high = _limits(mean)
     x = np.clip(x, low, high)
     offsets = np.zeros(len(constants))
-    close = np.array([t.name in COMMAND_ONLY for t in mean for _ in t.free], bool)
+    close = np.array([t.name in LOOP for t in mean for _ in t.free], bool)
     spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
     prior = np.concatenate([spread, [p for _, p in constants]])
     push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))

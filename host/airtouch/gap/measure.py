@@ -114,7 +114,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         vehicle.name, maps[0], tuple(where(maps[0])), gap, maps[0].flights,
         tuple(f.name for f in nominal), fitted.parameters if fitted else {},
         _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]), tuple(notes),
-        _cannot([h.cannot for h in found]), tuple(left_out))
+        cannot_of([h.cannot for h in found]), tuple(left_out))
 
 
 def hold(studies: Sequence[Study], log: FlightLog) -> Held | str:
@@ -156,7 +156,7 @@ def differences(study: Study, nominal: Sequence[Flight]) -> list[str]:
             + "; the floor is that much higher"] if found else []
 
 
-def _cannot(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
+def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
 

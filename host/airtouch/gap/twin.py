@@ -15,6 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 from scipy.signal import butter, sosfiltfilt
 
+from airtouch.gap.edge_response import EdgeFloor, floor_of
 from airtouch.gap.flight import PERIOD_S, Flight
 from airtouch.gap.loop_model import AXES, Controller, excess_phase, firmware, spectra
 from airtouch.logs.segments import KINDS
@@ -35,7 +36,7 @@ SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flig
 SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
 #: fields of the plant by which effects change the loop
 FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "height_gain",
-          "motor_rise", "motor_fall", "inertia", "mass", "gain")
+          "motor_rise", "motor_fall", "inertia", "mass", "gain", "gyro_noise")
 #: effects that change the commands alone: replayed motor commands hold nothing of them
 COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
 
@@ -54,6 +55,7 @@ class Twin:
     strengths: tuple[np.ndarray, ...]
     floor: np.ndarray
     blocks: int
+    edges: EdgeFloor | None = None
 
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
@@ -78,6 +80,9 @@ class Twin:
             spectrum[:, i] /= np.sqrt(np.interp(f, frequencies(), ratio[:, i]))
         return np.fft.irfft(spectrum, len(told), axis=0)
 
+    def _gyro_noise(self) -> np.ndarray:
+        return np.maximum(prepare(self.vehicle, self.calibration)[0][0]["gyro_noise"], 1e-9)
+
     def _nominal(self) -> np.ndarray:
         if "_base" not in self.__dict__:
             self.__dict__["_base"] = self._power(prepare(self.vehicle, self.calibration)[0][0])
@@ -88,7 +93,10 @@ class Twin:
         made = []
         for i, axis in enumerate(AXES):
             controller = firmware(row, axis) if self.by_firmware else self.controllers[i]
-            power = self.strengths[i] @ spectra(controller, row, axis, f)
+            strengths = self.strengths[i].copy()
+            if self.by_firmware and axis != "thrust":
+                strengths[0] *= (float(row["gyro_noise"][i - 1]) / self._gyro_noise()[i - 1]) ** 2
+            power = strengths @ spectra(controller, row, axis, f)
             beyond = excess_phase(controller, row, axis)
             made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
         return np.stack(made, axis=1)
@@ -171,7 +179,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
     chosen = documented if by_firmware else found
     twin = Twin(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
-                tuple(c[0] for c in chosen), power, len(every))
+                tuple(c[0] for c in chosen), power, len(every), floor_of(flights, vehicle, calibration))
     model = twin._nominal()
     return replace(twin, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
 

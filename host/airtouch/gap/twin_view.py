@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch.gap import edge_response
 from airtouch.gap.flight import Flight
 from airtouch.gap.spectra import LENGTH as AIR_LENGTH
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT
@@ -18,6 +19,7 @@ from airtouch.simulation.effects import Active
 
 FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
 FREEDOM = 20.0
+EDGE_FREEDOM = 6.0
 ROUNDS = 4
 WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold
 NOTHING = np.zeros(0)
@@ -44,14 +46,27 @@ class TwinView:
                     self.flights.append(i)
             self.shapes = shapes()
             self.spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1))
+        self.edges = [] if twin is None or twin.edges is None else [
+            (flights[i], i, e) for i, regime, chosen in pieces if regime == AIR and chosen.any()
+            for e in edge_response.edges_of(flights[i])
+            if chosen[np.argmin(np.abs(first[i][AIR] + AIR_LENGTH[AIR] // 2 - e.sample))]]
         flat = [s.ravel() for s in self.spectra]
+        flat += [edge_response.whitened(twin.edges, f, e).astype(complex) for f, _, e in self.edges]
         self.values = np.concatenate(flat) if flat else NOTHING.astype(complex)
-        self.floor = self._spread_out(lambda i: twin.floor) if flat else NOTHING
+        self.floor = self._spread_out(lambda i: twin.floor)
         axis = np.arange(len(AXES)) + FIRST_CHANNEL
         self.channel = self._spread_out(lambda i: np.broadcast_to(axis, _shape(self.spectra[i])))
         self.frequency = self._spread_out(lambda i: np.repeat(frequencies()[:, None], len(AXES), axis=1))
         self.flight = self._spread_out(lambda i: np.full(_shape(self.spectra[i]), self.flights[i]))
         self.freedom = np.full(len(self.values), FREEDOM)
+        more = len(self.edges) * edge_response.COUNT
+        if more:
+            kind = np.repeat([FIRST_CHANNEL, FIRST_CHANNEL + 2, FIRST_CHANNEL], [n for _, n in edge_response.BINS])
+            self.floor = np.concatenate([self.floor, np.ones(more)])
+            self.channel = np.concatenate([self.channel, np.tile(kind, len(self.edges))])
+            self.frequency = np.concatenate([self.frequency, np.zeros(more)])
+            self.flight = np.concatenate([self.flight, np.repeat([i for _, i, _ in self.edges], edge_response.COUNT)])
+            self.freedom[-more:] = EDGE_FREEDOM
 
     def __len__(self) -> int:
         return len(self.values)
@@ -61,10 +76,21 @@ class TwinView:
         made = [np.broadcast_to(table_of(i), s.shape).ravel() for i, s in enumerate(self.spectra)]
         return np.concatenate(made) if made else NOTHING
 
+    def moved(self, active: Sequence[Active]) -> np.ndarray:
+        """Values (elements,) less what effects add to the responses at edges."""
+        if not self.edges or not any(a.effect.name in edge_response.SHOWN for a in active):
+            return self.values
+        out = self.values.copy()
+        at = len(out) - len(self.edges) * edge_response.COUNT
+        for flight, _, e in self.edges:
+            out[at:at + edge_response.COUNT] -= edge_response.expected(self.twin.edges, flight, e, active)
+            at += edge_response.COUNT
+        return out
+
     def power(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Expected power (elements,), the floor's own uncertainty found anew, and what that costs."""
-        if not len(self):
-            return NOTHING, 0.0
+        if not self.spectra:
+            return self.floor, 0.0
         ratio = self.twin.ratio(active)
         key = (ratio.tobytes(), wide)
         if key not in self.kept:
@@ -75,6 +101,7 @@ class TwinView:
                 wrong, price, _ = self._shift(s, ratio, wide)
                 cost += price
                 made.append(np.broadcast_to(self.twin.floor * ratio * np.exp(wrong), s.shape).ravel())
+            made.append(np.ones(len(self.edges) * edge_response.COUNT))
             self.kept[key] = (np.concatenate(made), cost)
         return self.kept[key]
 
@@ -86,7 +113,7 @@ class TwinView:
         """
         k = len(moved)
         gradient, information = np.zeros(k), np.zeros((k, k))
-        if not len(self):
+        if not self.spectra:
             return gradient, information
         ratio = self.twin.ratio(active)
         rise = np.array([np.log(self.twin.ratio(m) / ratio) / step for m, step in moved])

@@ -1,0 +1,194 @@
+"""Where, which, how far: the whole diagnosis of some flights."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.gap import advice as advices
+from airtouch.gap import calibrate, candidates, measure
+from airtouch.gap.candidates import CLOCK, Term
+from airtouch.gap.fit import Data, Study, fit
+from airtouch.gap.flight import Flight
+from airtouch.gap.gap_map import gap_map, where
+from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
+from airtouch.gap.select import LEAST_GAIN, UNKNOWN_GAIN, Judged, Selection, halves, probabilities, select
+from airtouch.gap.shrink import Shrink, shrink_of
+from airtouch.logs.flight_log import FlightLog
+from airtouch.vehicle import Vehicle
+
+MOST_SECONDS = 260.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
+CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
+WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
+
+
+def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
+             progress: Callable[[str], None] | None = None, without: Iterable[str] = ()) -> Diagnosis:
+    """Name the unmodelled effect that the flights have in common and how much of the gap it is.
+
+    flights: one or more; what they share is looked for. baseline: flights declared free of
+    unmodelled effects, on which the vehicle is calibrated and the floor is measured; without
+    them the floor is the sensors' declared noise and the twin view is left out. without:
+    names of effects to leave out. Raises AirTouchError when no flight can be used.
+    """
+    say = progress or (lambda _: None)
+    left_out: list[str] = []
+    nominal = list(measure.usable(baseline, vehicle, left_out))
+    seen = list(measure.usable(flights, vehicle, left_out))
+    if not seen:
+        raise AirTouchError(left_out[-1] if left_out else "no flight to diagnose")
+    say("calibration")
+    study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
+    some = _some(seen)
+    data = Data(study, some)
+    found = select(data, candidates.every(without), say)
+    say("how far")
+    parts = halves(data)
+    ranking, overall = _ranking(data, found)
+    effects = _effects(data, found)
+    verdict = _verdict(found)
+    named = [t for t in _terms(effects)] if verdict == "effect" else []
+    cells = where(gap_map(study, seen, nominal, named))
+    alike = _alike(found)
+    notes = [n for f in seen for n in f.notes] + left_out
+    notes += list(fitted.notes) if fitted else ["no baseline flights: the vehicle is taken as declared"]
+    notes += measure.differences(study, nominal)
+    if len(some) < len(seen):
+        notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
+    control = _control(data, parts, found) if verdict == "effect" else {}
+    return Diagnosis(
+        verdict, tuple(effects) if verdict == "effect" else (), tuple(ranking), alike, tuple(cells),
+        {"before": overall.before, "after": overall.after if verdict == "effect" else overall.before,
+         "floor": 1.0},
+        overall.share if verdict == "effect" else None, control,
+        advices.advice(verdict, [e.name for e in effects], alike, cells, seen, bool(nominal)),
+        _arms(vehicle, nominal, some, found, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
+        measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen))
+
+
+def _some(flights: Sequence[Flight]) -> list[Flight]:
+    """Evenly chosen flights of MOST_SECONDS together; all where there are no more."""
+    total = sum(len(f) for f in flights) * 0.01
+    keep = max(int(len(flights) * min(MOST_SECONDS / total, 1.0)), min(len(flights), 4))
+    return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
+
+
+def _verdict(found: Selection) -> str:
+    if found.chosen is None:
+        return "unknown" if found.free_before > UNKNOWN_GAIN else "none"
+    return "effect" if found.explained else "unknown"
+
+
+def _effects(data: Data, found: Selection) -> list[Found]:
+    """The effects chosen, fitted anew on all the data, with 90 % intervals."""
+    if found.chosen is None:
+        return []
+    others = [t for t in found.chosen.terms if t.kind != CLOCK]
+    whole = calibrate.whole_of(data)
+    fitted = fit(data, whole, others, _middle(found.chosen)) if others else None
+    out, place = [], 0
+    for t in fitted.terms if fitted else ():
+        part = slice(place, place + len(t.free)) if t.kind == candidates.MEAN else None
+        if part is not None:
+            place += len(t.free)
+        if t.companion:
+            continue
+        x = fitted.scaled[part] if part is not None else t.scaled(t.values)
+        spread = _spread(found.chosen, t, fitted.covariance[part, part] if part is not None else None)
+        out.append(Found(t.name, t.quantities(x, spread)))
+    for t in (t for t in found.chosen.terms if t.kind == CLOCK):
+        x = t.scaled(t.values)
+        n = sum(len(f) for f in data.flights)
+        out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
+    return out
+
+
+def _middle(chosen: Judged) -> np.ndarray | None:
+    scaled = [f.scaled for f in chosen.fits]
+    return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
+
+
+def _spread(chosen: Judged, term: Term, covariance: np.ndarray | None) -> np.ndarray:
+    """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement where larger."""
+    pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
+             if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
+    apart = np.zeros((len(term.free), len(term.free)))
+    if len(pairs) == 2:
+        apart = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
+    return apart if covariance is None else covariance + apart
+
+
+def _terms(effects: Sequence[Found]) -> list[Term]:
+    out = []
+    for e in effects:
+        values = {k: q.value for k, q in e.parameters.items()}
+        term = candidates.terms(e.name)[0]
+        out.append(replace(term, values={**term.values, **values}))
+    return out
+
+
+def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:
+    """Every candidate with probability and shrink, best first; and the shrink of what was chosen."""
+    parts = halves(data)
+    chance = probabilities(found)
+    overall = shrink_of(data, parts, found.chosen)
+    out = []
+    for name, p in chance.items():
+        one = found.singles.get(name)
+        share = Quantity(0.0)
+        if one is not None and one.full and one.gain > LEAST_GAIN:
+            share = shrink_of(data, parts, one).share
+        out.append(Ranked(name, float(p), share))
+    order = {n: j.gain for n, j in found.singles.items()}
+    out.sort(key=lambda r: (-r.probability, -order.get(r.name, 0.0)))
+    return out, overall
+
+
+def _alike(found: Selection) -> tuple[tuple[str, ...], ...]:
+    """Sets that these logs cannot tell apart: named twins, and candidates as good as the best."""
+    if not found.steps:
+        return ()
+    groups = []
+    best = found.steps[0]
+    same = [n for n, j in found.singles.items() if j.full and best.gain - j.gain < CLOSE]
+    if len(same) > 1:
+        groups.append(tuple(sorted(same)))
+    for step in found.steps:
+        twins = candidates.twins_of(step.name)
+        if twins and not any(step.name in g for g in groups):
+            groups.append(tuple(sorted(twins[0])))
+    return tuple(groups)
+
+
+def _control(data: Data, parts: Sequence, found: Selection) -> dict[str, object]:
+    """The gap with a deliberately wrong effect in the model."""
+    taken = {n for g in _alike(found) for n in g} | {s.name for s in found.steps}
+    every = candidates.every()
+    for name in WRONG:
+        if name in every and name not in taken:
+            fits = tuple(fit(data, p, every[name][0]) for p in parts)
+            done = shrink_of(data, parts, Judged(name, fits[0].terms, 0.0, fits))
+            return {"name": name, "before": done.before, "after": done.after, "shrink": done.share.plain()}
+    return {}
+
+
+def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], found: Selection,
+          overall: Shrink) -> dict[str, object]:
+    """The shrink with the vehicle as calibrated (or declared, without baseline) and as its file declares it."""
+    if not nominal or found.chosen is None:
+        return {"declared": _plain(overall)}
+    data = Data(_declared(vehicle, nominal), some)
+    parts = halves(data)
+    terms = tuple(replace(t, values=dict(t.values)) for t in found.chosen.terms if t.kind != CLOCK)
+    fits = tuple(fit(data, p, terms, _middle(found.chosen)) for p in parts)
+    one = shrink_of(data, parts, Judged(found.chosen.name, terms, 0.0, fits))
+    return {"declared": _plain(one), "calibrated": _plain(overall)}
+
+
+def _declared(vehicle: Vehicle, nominal: Sequence[Flight]) -> Study:
+    return calibrate.declared(vehicle, nominal)
+
+
+def _plain(shrink: Shrink) -> dict[str, object]:
+    return {"before": shrink.before, "after": shrink.after, "shrink": shrink.share.plain()}
