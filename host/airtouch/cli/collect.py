@@ -54,7 +54,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     """
     from airtouch.crazyflie import collect, mission, recorder
     from airtouch.crazyflie.checks import parse_setting
-    from airtouch.crazyflie.drone import default_cache
+    from airtouch.crazyflie.link import default_cache
 
     if recover:
         found, unreadable = recorder.recover(out)

@@ -27,8 +27,9 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
     from airtouch.crazyflie import board as boards
     from airtouch.crazyflie import monitor
     from airtouch.crazyflie.checks import parse_setting
-    from airtouch.crazyflie.drone import Drone, default_cache
+    from airtouch.crazyflie.drone import Drone
     from airtouch.crazyflie.intake import Intake
+    from airtouch.crazyflie.link import default_cache
 
     pairs = [parse_setting(text) for text in settings]
     with stopping(quiet=True) as stop:

@@ -93,7 +93,8 @@ class Board:
         """One line for where there is no terminal."""
         value = self.latest.get
         parts = [f"{self.now_s:7.1f} s", f"P {self._last('P(over)'):.2f}", f"down {value('zrange_m', np.nan):.2f} m",
-                 f"{value('vbat_V', np.nan):.2f} V", f"{len(self.felt)} edges"]
+                 f"{len(self.felt)} edges"]
+        parts += [f"{value('vbat_V'):.2f} V"] if np.isfinite(value("vbat_V", np.nan)) else []
         return "  ".join(parts + ([str(self.link)] if self.link else []) + ([self.status] if self.status else []))
 
     def render(self):
@@ -107,7 +108,8 @@ class Board:
         for name, (_, low, high, unit) in SIGNALS.items():
             signals.add_row(name, Text(sparkline(self._signals[name], WIDTH, low, high), style="cyan"),
                             f"{self._last(name):8.2f} {unit}")
-        signals.add_row("battery", "", f"{self.latest.get('vbat_V', float('nan')):8.2f} V")
+        if np.isfinite(self.latest.get("vbat_V", np.nan)):
+            signals.add_row("battery", "", f"{self.latest['vbat_V']:8.2f} V")
         edges = [f"{f.kind:5} {f.at_s:6.2f} s  x {f.x_m:+.2f} y {f.y_m:+.2f} m  P {f.probability:.2f}" for f in self.felt[-6:]]
         below = "\n".join([f"edges ({len(self.felt)}, {self.detector})", *edges])
         track = np.array([(x, y) for _, x, y in self._track]).reshape(-1, 2)

@@ -1,8 +1,6 @@
 """One Crazyflie through cflib: connection, log blocks, parameters, commands, answers. Thin on purpose."""
 
 import contextlib
-import logging
-import os
 import queue
 import struct
 import threading
@@ -15,10 +13,10 @@ from typing import Any
 from airtouch.crazyflie.autopilot import CODES, Command
 from airtouch.crazyflie.blocks import Block
 from airtouch.crazyflie.checks import representable
+from airtouch.crazyflie.link import connect, disconnect
 from airtouch.errors import AirTouchError
 
 CONNECT_S = 20.0
-ATTEMPT_S = 2.0  #: without a packet; cflib never asks twice for the first two
 BLOCK_S = 1.5  #: that a log block gets until its first packet
 BLOCK_ATTEMPTS = 6  #: a lost "create" makes the "append" after it fail
 TAKEN_S = 0.1  #: that an app gets to put a parameter right
@@ -41,37 +39,6 @@ class Sample:
     values: dict[str, float]
 
 
-def cflib_or_error() -> Any:
-    """The cflib package; AirTouchError with the remedy where it is not installed. Its own messages are silenced."""
-    try:
-        import cflib.crtp
-        import cflib.crazyflie
-    except ImportError:
-        raise AirTouchError("flying needs cflib: pip install 'airtouch[fly]'") from None
-    logger = logging.getLogger("cflib")
-    if not logger.handlers:
-        logger.addHandler(logging.NullHandler())
-        logger.propagate = False
-    if not cflib.crtp.CLASSES:
-        cflib.crtp.init_drivers()
-    return cflib
-
-
-def _usable(cache: Path | None) -> str | None:
-    """The folder as cflib wants it, None where it cannot be made."""
-    try:
-        if cache:
-            cache.mkdir(parents=True, exist_ok=True)
-        return str(cache) if cache else None
-    except OSError:
-        return None
-
-
-def default_cache() -> Path:
-    """Where the tables of known drones are kept, so that the next connection is quick."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airtouch" / "drones"
-
-
 class Drone:
     """A connected drone. `samples` and `answers` fill up from cflib's thread; everything else is called from ours.
 
@@ -82,7 +49,7 @@ class Drone:
         self.uri, self.cache = uri, cache
         self.samples: queue.SimpleQueue[Sample] = queue.SimpleQueue()
         self.answers: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
-        self.console: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._console, self._text = queue.SimpleQueue(), ""
         self.blocks: list[Block] = []
         self.lost = threading.Event()
         self.round_trip_s = float("nan")
@@ -90,35 +57,9 @@ class Drone:
         self._configs: dict[str, Any] = {}
         self._reviving: threading.Thread | None = None
         self._cf: Any = None
-        self._open(patience_s)
+        self._listen(connect(uri, cache, patience_s, self._console.put))
 
     # connection
-
-    def _open(self, patience_s: float) -> None:
-        """Try until a connection stands. One whose packets keep coming may take longer than `patience_s`."""
-        crazyflie = cflib_or_error().crazyflie
-        deadline, reason = time.monotonic() + patience_s, "nobody answers there"
-        while time.monotonic() < deadline:
-            cf = crazyflie.Crazyflie(rw_cache=_usable(self.cache))
-            done, failure, heard_s = threading.Event(), [], [time.monotonic()]
-            cf.connected.add_callback(lambda _, done=done: done.set())
-            for failed in (cf.connection_failed, cf.connection_lost):
-                failed.add_callback(lambda _, text, f=failure, done=done: (f.append(str(text)), done.set()))
-            cf.packet_received.add_callback(lambda _, heard_s=heard_s: heard_s.append(time.monotonic()))
-            cf.open_link(self.uri)
-            if cf.link is not None:
-                cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
-            while not done.wait(0.05) and time.monotonic() - heard_s[-1] < ATTEMPT_S:
-                del heard_s[:-1]
-            if done.is_set() and not failure:
-                self._listen(cf)
-                return
-            if failure:
-                reason = failure[0].strip().splitlines()[0]
-                time.sleep(min(0.5, max(deadline - time.monotonic(), 0.0)))
-            self._drop(cf)
-        raise AirTouchError(f"{self.uri}: no connection: {reason}; is the drone on, the radio plugged in and the URI "
-                            "right (radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850)?")
 
     def _listen(self, cf: Any) -> None:
         self._cf = cf
@@ -126,28 +67,19 @@ class Drone:
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
         cf.add_header_callback(self._on_log_setting, LOG_PORT, SETTINGS_CHANNEL)
-        cf.console.receivedChar.add_callback(self.console.put)
         cf.link_statistics.stop()  # its thread would wait for itself, for ever, where the link breaks under it
         cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
 
-    @staticmethod
-    def _drop(cf: Any) -> None:
-        """Close without the zero set-point that cflib sends: it would stop the motors of a flying drone."""
-        link, cf.link = cf.link, None
-        if link is not None:
-            link.close()
-        cf.close_link()
-
     def reopen(self, patience_s: float) -> None:
         """Connect anew after the link died, with the same log blocks. Raises AirTouchError if it stays dead."""
-        self._drop(self._cf)
-        self._open(patience_s)
+        disconnect(self._cf)
+        self._listen(connect(self.uri, self.cache, patience_s, self._console.put))
         for block in self.blocks:
             self.start(block)
 
     def close(self) -> None:
         """Close the link. The drone must be on the ground."""
-        self._drop(self._cf)
+        disconnect(self._cf)
 
     # what it is and has
 
@@ -280,6 +212,11 @@ class Drone:
         """Ask for an echo; `round_trip_s` is what the last one took."""
         if not self.lost.is_set():
             self._cf.link_statistics.latency.ping()
+
+    def said(self) -> list[str]:
+        """Whole lines that its console printed since the last call."""
+        *lines, self._text = (self._text + "".join(drain(self._console))).split("\n")
+        return [line.strip() for line in lines if line.strip()]
 
     def _on_echo(self, packet: Any) -> None:
         if len(packet.data) == 9:

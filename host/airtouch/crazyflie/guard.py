@@ -52,7 +52,7 @@ def land(uri: str, height_m: float, seconds: float, patience_s: float = PATIENCE
     """Send land until the drone answers; whether it did."""
     from cflib.crtp.crtpstack import CRTPPacket
 
-    from airtouch.crazyflie.drone import cflib_or_error
+    from airtouch.crazyflie.link import cflib_or_error
 
     crtp = cflib_or_error().crtp
     deadline = time.monotonic() + patience_s
@@ -83,7 +83,7 @@ def _answered(link: object) -> bool:
 
 def main() -> None:
     """Wait for the end of the input; what landing needs is loaded before."""
-    from airtouch.crazyflie.drone import cflib_or_error
+    from airtouch.crazyflie.link import cflib_or_error
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

@@ -125,6 +125,8 @@ def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
         if time.monotonic() - pinged > PING_S:
             drone.ping()
             pinged = time.monotonic()
+        for line in drone.said():
+            say(f"the drone says: {line}")
         monitor.refresh(drone.round_trip_s)
         show(monitor.board)
         time.sleep(TURN_S)

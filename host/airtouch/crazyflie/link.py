@@ -1,0 +1,83 @@
+"""Connecting to a Crazyflie with cflib, patiently, and leaving it without stopping its motors."""
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from airtouch.errors import AirTouchError
+
+ATTEMPT_S = 2.0  #: without a packet; cflib never asks twice for the first two
+
+
+def cflib_or_error() -> Any:
+    """The cflib package; AirTouchError with the remedy where it is not installed. Its own messages are silenced."""
+    try:
+        import cflib.crtp
+        import cflib.crazyflie
+    except ImportError:
+        raise AirTouchError("flying needs cflib: pip install 'airtouch[fly]'") from None
+    logger = logging.getLogger("cflib")
+    if not logger.handlers:
+        logger.addHandler(logging.NullHandler())
+        logger.propagate = False
+    if not cflib.crtp.CLASSES:
+        cflib.crtp.init_drivers()
+    return cflib
+
+
+def _usable(cache: Path | None) -> str | None:
+    """The folder as cflib wants it, None where it cannot be made."""
+    try:
+        if cache:
+            cache.mkdir(parents=True, exist_ok=True)
+        return str(cache) if cache else None
+    except OSError:
+        return None
+
+
+def default_cache() -> Path:
+    """Where the tables of known drones are kept, so that the next connection is quick."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airtouch" / "drones"
+
+
+def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str], None]) -> Any:
+    """A connected cflib Crazyflie. One whose packets keep coming may take longer than `patience_s`.
+
+    told: gets pieces of what its console prints, from the first on.
+    Raises AirTouchError where nobody answers.
+    """
+    crazyflie = cflib_or_error().crazyflie
+    deadline, reason = time.monotonic() + patience_s, "nobody answers there"
+    while time.monotonic() < deadline:
+        cf = crazyflie.Crazyflie(rw_cache=_usable(cache))
+        done, failure, heard_s = threading.Event(), [], [time.monotonic()]
+        cf.connected.add_callback(lambda _, done=done: done.set())
+        for failed in (cf.connection_failed, cf.connection_lost):
+            failed.add_callback(lambda _, text, f=failure, done=done: (f.append(str(text)), done.set()))
+        cf.packet_received.add_callback(lambda _, heard_s=heard_s: heard_s.append(time.monotonic()))
+        cf.console.receivedChar.add_callback(told)
+        cf.open_link(uri)
+        if cf.link is not None and uri.startswith("udp"):
+            cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
+        while not done.wait(0.05) and time.monotonic() - heard_s[-1] < ATTEMPT_S:
+            del heard_s[:-1]
+        if done.is_set() and not failure:
+            return cf
+        if failure:
+            reason = failure[0].strip().splitlines()[0]
+            time.sleep(min(0.5, max(deadline - time.monotonic(), 0.0)))
+        disconnect(cf)
+    raise AirTouchError(f"{uri}: no connection: {reason}; is the drone on, the radio plugged in and the URI "
+                        "right (radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850)?")
+
+
+def disconnect(cf: Any) -> None:
+    """Close without the zero set-point that cflib sends: it would stop the motors of a flying drone."""
+    link, cf.link = cf.link, None
+    if link is not None:
+        link.close()
+    cf.close_link()
