@@ -78,8 +78,20 @@ def test_the_gap8_restarts_and_comes_back(bench):
 def test_a_gap8_that_never_answers(bench):
     craft, pass_ = flying(bench, "gap8-silent=start")
     pass_(2.0)
-    assert craft.drone.app.read("health") & 2 and craft.drone.app.read("answers") == 0
+    assert craft.drone.app.read("health") & 2  # and the STM32's own detector may have stepped in
     assert craft.height == pytest.approx(0.5, abs=0.15)
+
+
+def test_faults_can_be_ordered_in_flight(bench):
+    craft, pass_ = flying(bench)
+    pass_(1.5)
+    assert craft.drone.app.read("health") == 0
+    craft.server.order("gap8-silent=2")
+    craft.server.order("low-battery=start")
+    pass_(2.0)
+    assert craft.drone.app.read("health") & 2 and craft.drone.row[16] < 3.4
+    with pytest.raises(AirTouchError):
+        craft.server.order("rain=1")
 
 
 def test_without_an_ai_deck_the_stm32_does_it(bench):

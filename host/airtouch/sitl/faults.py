@@ -29,6 +29,7 @@ KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms",
          "gap8-silent": "when, as gap8-silent=3",
          "low-battery": "when, as low-battery=3"}
 ALL = "all"
+LINE = ("loss", "late")  #: kinds that a line has
 
 
 @dataclass(frozen=True)
@@ -86,12 +87,21 @@ class Line:
     """
 
     def __init__(self, faults: Iterable[Fault], rng: np.random.Generator) -> None:
-        self._loss = [f for f in faults if f.kind == "loss"]
-        self._late = max([f.amount for f in faults if f.kind == "late"], default=0.0)
+        self._loss: list[Fault] = []
+        self._late = 0.0
+        for fault in faults:
+            self.add(fault)
         self._rng = rng
         self._waiting: list[tuple[float, int, Packet, object]] = []
         self._count, self._last = itertools.count(), 0.0
         self.lost = 0
+
+    def add(self, fault: Fault) -> None:
+        """From now on it has this fault too; those that are not a line's are ignored."""
+        if fault.kind == "loss":
+            self._loss.append(fault)
+        elif fault.kind == "late":
+            self._late = max(self._late, fault.amount)
 
     def put(self, packet: Packet, peer: object, now_s: float) -> None:
         """Send a packet to or from `peer`."""

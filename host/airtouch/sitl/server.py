@@ -22,7 +22,7 @@ from airtouch.simulation.flight import Chosen, choose
 from airtouch.sitl import packet as crtp
 from airtouch.sitl.commander import PERIOD_S
 from airtouch.sitl.drone import Drone
-from airtouch.sitl.faults import Fault, Line, parse
+from airtouch.sitl.faults import LINE, Fault, Line, parse
 from airtouch.sitl.firmware import Firmware
 from airtouch.sitl.recorder import Recorder
 from airtouch.vehicle import Vehicle
@@ -61,13 +61,23 @@ class Server:
         self.speed, self.client = speed, None
         rng = np.random.default_rng([seed, flight, 11])
         self._up, self._down = Line(self.faults, rng), Line(self.faults, rng)
-        self._todo = [f for f in self.faults if f.kind not in ("loss", "late")]
+        self._todo = [f for f in self.faults if f.kind not in LINE]
         self._cut_until_s = -math.inf
         self._stop = threading.Event()
         self._socket = _bind(host, port)
         self.port = self._socket.getsockname()[1]
         self.uri = f"udp://{host}:{self.port}"
         self.slept_s = 0.0  #: drone time that was left out because the machine was too slow
+
+    def order(self, fault: Fault | str) -> None:
+        """One more fault, while it runs."""
+        fault = fault if isinstance(fault, Fault) else parse(fault)
+        self.faults.append(fault)
+        if fault.kind in LINE:
+            self._up.add(fault)
+            self._down.add(fault)
+        else:
+            self._todo.append(fault)
 
     def stop(self) -> None:
         """End `run`, from any thread."""
