@@ -108,4 +108,4 @@ def test_the_apps_own_edges_are_shown_once_each_at_their_time():
         if k % 5 == 0:
             monitor.take([Sample(app_log.WANTED.name, 10 * k, 0.01 * k, dict(app))])
     assert [(f.kind, pytest.approx(f.at_s, abs=0.011)) for f in said] == [("entry", 1.37)]
-    assert monitor.board.detector == "best on the GAP8" and monitor.board.status.startswith("app 0 us")
+    assert monitor.board.detector == "best on the GAP8" and monitor.board.status == ""

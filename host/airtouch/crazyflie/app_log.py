@@ -15,7 +15,7 @@ KINDS = {1: "entry", 2: "exit"}
 DETECTORS = {0: "FR-CFAR on the STM32", 1: "best on the STM32", 2: "best on the GAP8", 3: "paper on the GAP8"}
 #: appHealth_t of firmware/app
 HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GAP8 fills its window",
-          8: "the GAP8 has another model", 16: "a setting was out of range", 32: "no AI-deck: another detector runs",
+          8: "the GAP8 has another model", 16: "a setting was out of range", 32: "another detector runs than the wanted one",
           64: "the CPX queue was full", 128: "a step began late", 256: "the app stands still", 512: "a log variable is missing"}
 
 

@@ -84,8 +84,8 @@ class Monitor:
                 at = (self.intake.ticks.unwrap(sample.stamp) - self.intake.first_ms) / 1000.0 - self.app.age_s
                 self.felt(self.board.feel(self.app.kind, at, self.app.probability))
             self._edges = self.app.edges
-        faults = "; ".join(self.app.faults)
-        self.board.status = f"app {self.app.load_us:.0f} us" + (f"; {faults}" if faults else "")
+        load = [f"app {self.app.load_us:.0f} us"] if self.app.load_us else []
+        self.board.status = "; ".join([*load, *self.app.faults])
 
     def refresh(self, round_trip_s: float) -> None:
         """Bring the link's figures up to date."""
