@@ -30,6 +30,21 @@ def test_a_model_is_exported_and_checked(tmp_path: Path) -> None:
     assert isinstance(refused.exception, AirTouchError) and "stale or foreign" in str(refused.exception)
 
 
+def test_check_refuses_sources_that_no_shipped_model_gives(tmp_path: Path) -> None:
+    folder = tmp_path / "model"
+    assert airtouch("export", "--out", folder).returncode == 0
+    done = airtouch("export", "--check", "--out", folder)
+    assert done.returncode == 0 and done.stdout.count("up to date") == 3
+    (folder / "airtouch_old.c").write_text("int old;\n")
+    refused = airtouch("export", "--check", "--out", folder)
+    assert refused.returncode == 2 and "airtouch_old.c: foreign" in refused.stderr
+    (folder / "airtouch_old.c").unlink()
+    source = folder / "airtouch_rolling.c"
+    source.write_text(source.read_text().replace("{", "{ ", 1))
+    edited = airtouch("export", "--check", "--out", folder)
+    assert edited.returncode == 2 and "edited since" in edited.stderr and edited.stderr.count("\n") == 1
+
+
 @pytest.mark.parametrize("command", ["export", "evaluate"])
 def test_a_file_that_is_no_model_gives_one_line(tmp_path: Path, command: str) -> None:
     wrong = tmp_path / "wrong.npz"

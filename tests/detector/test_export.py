@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from small_model import random_model
 
-from airtouch.detector import best, export, model_file
+from airtouch.detector import best, export, model_file, paper_stream
 from airtouch.errors import AirTouchError
 
 ROOT = Path(__file__).parents[2]
@@ -56,9 +56,42 @@ int main(void) {
 def test_the_generated_sources_are_those_of_the_shipped_models() -> None:
     export.check(model_file.load(), MODEL)
     export.check(best.load(None), MODEL)
+    export.check(paper_stream.load(None), MODEL)
 
 
-@pytest.mark.parametrize("main", [MAIN, STREAM_MAIN], ids=["paper", "best"])
+ROLLING_MAIN = """
+#include <string.h>
+#include "airtouch_rolling.h"
+#include "airtouch_rolling_golden.h"
+static _Alignas(4) int8_t arena[AIRTOUCH_ROLLING_ARENA_BYTES];
+static rollingInt8_t rolling;
+int main(void) {
+  if (rollingInt8ArenaBytes(&airtouchRolling, AIRTOUCH_ROLLING_STRIDE) != AIRTOUCH_ROLLING_ARENA_BYTES ||
+      !rollingInt8Init(&rolling, &airtouchRolling, AIRTOUCH_ROLLING_STRIDE, arena)) return 2;
+  for (int again = 0; again < 2; again++, rollingInt8Reset(&rolling)) {
+    const int8_t *expected = airtouchRollingGoldenOutputs;
+    const int8_t *end = expected + sizeof airtouchRollingGoldenOutputs;
+    for (int i = 0; i < AIRTOUCH_ROLLING_GOLDEN_COUNT && expected < end; i++) {
+      const int8_t *in = airtouchRollingGoldenInputs + i * AIRTOUCH_ROLLING_GOLDEN_INPUTS;
+      const int8_t *out = rollingInt8Step(&rolling, in);
+      if (out && memcmp(out, expected, AIRTOUCH_ROLLING_GOLDEN_OUTPUTS)) return 1;
+      expected += out ? AIRTOUCH_ROLLING_GOLDEN_OUTPUTS : 0;
+    }
+    if (expected != end) return 3;
+  }
+  const float small[] = {1e-9f, 1e-9f, 1e-9f}, large[] = {1e30f, 1e30f, 1e30f};
+  float low[3], high[3];
+  fixedScaleApply(&airtouchRollingScale, small, low);
+  fixedScaleApply(&airtouchRollingScale, large, high);
+  for (int i = 0; i < 3; i++) {
+    if (low[i] != -FIXED_SCALE_LIMIT || high[i] != FIXED_SCALE_LIMIT) return 4;
+  }
+  return airtouchRollingScale.columns != 3;
+}
+"""
+
+
+@pytest.mark.parametrize("main", [MAIN, STREAM_MAIN, ROLLING_MAIN], ids=["paper", "best", "paper-stream"])
 def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path, main: str) -> None:
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:

@@ -20,9 +20,11 @@ from airtouch.kernels.network import parameter_bytes
 def command(model: Path | None, out: Path, only_check: bool, force: bool) -> None:
     """Write MODEL (.npz; all shipped ones if left out) as C: weights, shapes, scales, golden vectors.
 
-    With --check: exit code 2 and the reason where the folder is not what MODEL exports to.
+    With --check: exit code 2 and the reason where the folder is not what MODEL exports to: stale, from another
+    model, edited, incomplete, or, for the shipped ones, with sources that none of them gives.
     """
-    for trained in ([_load(model)] if model else [model_file.load(), paper_stream.load(None), stream_model.load()]):
+    shipped = [] if model else [model_file.load(), paper_stream.load(None), stream_model.load()]
+    for trained in [_load(model)] if model else shipped:
         name = model.name if model else ""
         if only_check:
             export.check(trained, out, name)
@@ -32,6 +34,8 @@ def command(model: Path | None, out: Path, only_check: bool, force: bool) -> Non
             click.echo(f"written: {path}")
         click.echo(f"{trained.metadata['detector']} model {trained.digest[:12]}: "
                    f"{parameter_bytes(trained.int8)} bytes of constants")
+    if only_check and shipped:
+        export.check_nothing_else(shipped, out)
 
 
 def _load(path: Path) -> model_file.Model | stream_model.StreamModel:

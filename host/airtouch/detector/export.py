@@ -1,5 +1,6 @@
 """A trained network as C sources for the GAP8: `gap8/model/`, made by `airtouch export`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +97,14 @@ def check(model: Model | StreamModel, folder: Path, name: str = "") -> None:
         if text != expected:
             raise AirTouchError(f"{path}: made from this model, but edited since, or written by another "
                                 f"version or under another name; {again}")
+
+
+def check_nothing_else(models: Sequence[Model | StreamModel], folder: Path) -> None:
+    """Raise AirTouchError where the folder holds C sources that none of the models exports to."""
+    known = {file for model in models for file in render(model)}
+    for path in sorted(folder.glob("*.[ch]")):
+        if path.name not in known:
+            raise AirTouchError(f"{path}: foreign, no shipped model exports to it; remove it")
 
 
 def golden_vectors(network: Int8Network) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,145 @@
+"""Prints what each network costs on the GAP8 and what it is worth, as a Markdown table, beside the paper's figures.
+
+    python tools/gap8_figures.py [FLIGHTS] [--out out/gap8] [--counts]
+
+Costs come from emulators, seconds. Accuracy and edge error come from five folds by flight; folds that are done are kept in
+--out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
+"""
+
+import json
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import click
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from airtouch.cli.flights import need_flights  # noqa: E402
+from airtouch.detector import crossval, dataset, evaluate, export, paper, registry, summary  # noqa: E402
+from airtouch.detector.dataset import FlightFile  # noqa: E402
+from airtouch.detector.stream.export import golden_flight  # noqa: E402
+from airtouch.errors import AirTouchError  # noqa: E402
+from airtouch.kernels.network import arena_bytes, parameter_bytes  # noqa: E402
+from airtouch.kernels.rolling import rolling_size  # noqa: E402
+from airtouch.kernels.stream import arena_bytes as stream_arena_bytes  # noqa: E402
+from airtouch.logs.files import write_bytes  # noqa: E402
+from airtouch.reference.int8_network import multiplications, stream_multiplications  # noqa: E402
+from tools import gap8_counts  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Row:
+    """A network: detector and what its fit is given; shipped: whether its shipped model is what is counted."""
+
+    name: str
+    detector: str
+    options: dict[str, Any] = field(default_factory=dict)
+    shipped: bool = True
+
+
+ROWS = (Row("`paper`, no zeros", "paper", {"sparsity": 0.0}, shipped=False),
+        Row("`paper`, 80 % zeros (shipped)", "paper"),
+        Row("`paper`, 90 % zeros", "paper", {"sparsity": 0.9}, shipped=False),
+        Row("`paper-stream`, 96 and 80 % zeros", "paper-stream"),
+        Row("`best`, 50 % zeros", "best"))
+#: What the paper states (sections 5.3 and 7): 14,375 bytes, 1.10 ms an inference; its split of windows leaks.
+PAPER = "| paper's own, as published | 14,375 | | | 0.27 M | | | 1.10 ms at 175 MHz = 193 k | | | |"
+HEAD = """| network | parameters, bytes | flash, bytes | L1, bytes | MAC a 10 ms sample | rv32imc instructions a sample, mean / worst | XPULP cycles a window, 1 core | 8 cores | balanced, float / int8, % | edge error, float / int8, mm | missed, float / int8, % |
+|---|---|---|---|---|---|---|---|---|---|---|"""
+
+
+def cost(row: Row, model: Any) -> dict[str, Any]:
+    """Bytes, multiplications, instructions and cycles of a model."""
+    chip = gap8_counts.compile_model(model)
+    network = model.int8
+    found: dict[str, Any] = {"parameters": parameter_bytes(network), "flash": chip.flash_bytes}
+    if chip.kind == "stream":
+        run = gap8_counts.stream(chip, golden_flight(network)[0][:200])
+        arena, columns, found["mac"] = stream_arena_bytes(network), network.channels, network.multiplications / network.stride
+    elif chip.kind == "rolling":
+        stride = paper.stride(model)
+        run = gap8_counts.rolling(chip, export.golden_stream(network, stride)[0][:200], stride)
+        arena, columns = rolling_size(network, stride).arena_bytes, network.input_shape[1]
+        found["mac"] = stream_multiplications(network, stride)
+    else:
+        run = gap8_counts.windows(chip, export.golden_vectors(network)[0])
+        arena, columns, found["mac"] = arena_bytes(network), int(np.prod(network.input_shape)), multiplications(network)
+    found |= {"instructions": float(run.instructions.mean()), "worst": int(run.instructions.max()), "stack": run.stack,
+              "l1": chip.constant_bytes + arena + columns + run.stack}
+    if chip.kind != "stream":
+        cluster = gap8_counts.compile_model(model, gap8_counts.XPULP)
+        window = export.golden_vectors(network)[0][0]
+        for cores in (1, 8):
+            cycles, _ = gap8_counts.team_cycles(cluster, window, cores)
+            found[f"cycles_{cores}"], found[f"branching_{cores}"] = cycles.looped, cycles.cycles
+    return found
+
+
+def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any], Any]:
+    """Figures over the folds, int8 and float, and the first fold's model."""
+    detector = registry.get(row.detector)
+
+    def tell(line: str) -> None:
+        click.echo(f"{row.name}: {line}", err=True)
+
+    scores, folds, _ = crossval.crossval(row.detector, files, out, options=row.options, tell=tell)
+    models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
+    cache = out / f"float_{Path(folds[0]['model']).stem}.json"
+    if not cache.exists():
+        tell("the same models in float")
+        view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
+        readable, _ = crossval.readable_flights(files)
+        exact = [evaluate.evaluate_flight(f, readable[f.path], view, models[f.condition.fold]).score
+                 for f in files if f.path in readable]
+        write_bytes(json.dumps(summary.summarise(exact)).encode(), cache, force=True)
+    return {"int8": summary.summarise(scores), "float": json.loads(cache.read_text())}, models[min(models)]
+
+
+def line(row: Row, costs: dict[str, Any], figures: dict[str, Any] | None) -> str:
+    """One row of the table."""
+    step = f"{costs['instructions']:,.0f} / {costs['worst']:,}"
+    cycles = [f"{costs[f'cycles_{n}']:,} ({costs[f'branching_{n}']:,})" if f"cycles_{n}" in costs else "" for n in (1, 8)]
+    cells = [row.name, f"{costs['parameters']:,}", f"{costs['flash']:,}", f"{costs['l1']:,}", f"{costs['mac']:,.0f}", step,
+             *cycles]
+    cells += [_pair(figures, key, factor) for key, factor in
+              (("balanced_accuracy", 100), ("mean_abs_error_m", 1000), ("missed", 100))] if figures else [""] * 3
+    return "| " + " | ".join(cells) + " |"
+
+
+def _pair(figures: dict[str, Any], key: str, factor: float) -> str:
+    low, high = figures["int8"]["intervals"][key]
+    values = [f"{factor * figures[kind][key]:.1f}" for kind in ("float", "int8")]
+    return f"{' / '.join(values)} [{factor * low:.0f}, {factor * high:.0f}]"
+
+
+@click.command()
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), default=ROOT / "out" / "gap8", help="Where finished folds are kept.")
+@click.option("--counts", is_flag=True, help="Costs of the shipped models only: no flights, no training.")
+def main(folder: Path | None, out: Path, counts: bool) -> None:
+    """Print the table."""
+    files = [] if counts else dataset.collect([need_flights(folder)])
+    lines, raw = [HEAD, PAPER], {}
+    for row in ROWS:
+        if counts and not row.shipped:
+            continue
+        figures, model = (None, None) if counts else worth(row, files, out)
+        costs = cost(row, registry.get(row.detector).load(None) if row.shipped else model)
+        lines.append(line(row, costs, figures))
+        raw[row.name] = {**costs, **({} if figures is None else figures)}
+    click.echo("\n".join(lines))
+    if not counts:
+        write_bytes(json.dumps(raw, indent=1).encode(), out / "figures.json", force=True)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except AirTouchError as error:
+        click.echo(f"gap8_figures: {error}", err=True)
+        sys.exit(2)
