@@ -7,9 +7,10 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap import motion
 from airtouch.logs.clock import lost_samples, true_period
+from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
 from airtouch.logs.resample import resample
-from airtouch.logs.segments import KINDS, segments
+from airtouch.logs.segments import KINDS, PLATFORM_STEP_M, segments
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
@@ -78,6 +79,8 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         cannot.append("no gyro: torque only at low frequency, from the balance of the motors")
     if not log.has("zrange_m"):
         cannot.append("no down range: ground effect, range steps and flow scale cannot be seen")
+    elif not true_edges(log, PLATFORM_STEP_M):
+        cannot.append("no edge crossed: range steps and flow scale cannot be seen")
     if not log.has("vx_mps", "vy_mps"):
         cannot.append("no velocity: drag, flapping and wind cannot be told from a constant push")
     angles = motion.attitude(log, PERIOD_S)

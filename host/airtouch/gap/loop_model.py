@@ -135,8 +135,11 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 
 
 def _delayed(s: np.ndarray, delay: float, step: float) -> np.ndarray:
-    """A delay; between two steps the simulator (and this) draws a straight line."""
-    if step <= 0.0:
+    """A delay; between two steps the simulator (and this) draws a straight line, which smooths.
+
+    Not below one step: there the smoothing alone would pass for lower gains.
+    """
+    if step <= 0.0 or delay < step:
         return np.exp(-s * delay)
     whole = np.floor(delay / step + 1e-9)
     part = max(delay / step - whole, 0.0)
