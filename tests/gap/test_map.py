@@ -138,6 +138,16 @@ def test_after_an_effect_that_is_right_little_is_left(name, values, force, band)
     assert c.after < 0.25 * c.gap + c.floor and c.gap > 3 * c.floor
 
 
+def test_of_several_effects_each_cell_names_the_one_that_takes_most():
+    chosen = []
+    for name, values in (("imu_bias", {"acc_x": 0.9}), ("imu_noise", {"factor": 4.0})):
+        term = terms(name)[0]
+        chosen.append(type(term)(term.effect, term.kind, term.free, {**term.values, **values}))
+    made = maps.gap_map(study(), [flight(40.0, noise(40.0, 4.0 * NOISE, 3) + np.array([0.9, 0.0, 0.0]))], terms=chosen)
+    assert cell(made, "force_x", 0).by == "imu_bias" and cell(made, "force_z", 5).by == "imu_noise"
+    assert cell(made, "force_x", 0).after < 0.3 and cell(made, "torque_z", 0).by is None
+
+
 def test_sums_of_phases_are_sums_of_blocks():
     made = sums(flight(20.0, noise(20.0, 1.0, 0)), np.zeros((2000, 13)) + 1.0, VEHICLE)
     whole = made.by_phase()

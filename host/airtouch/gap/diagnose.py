@@ -64,7 +64,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         overall.share if verdict == "effect" else None, control,
         advices.advice(verdict, [e.name for e in effects], alike, cells, seen, bool(nominal)),
         _arms(vehicle, nominal, some, found, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
-        measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen))
+        measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen), (study, fitted))
 
 
 def _some(flights: Sequence[Flight]) -> list[Flight]:

@@ -23,6 +23,7 @@ from airtouch.gap.result import Cell
 from airtouch.gap.spectra import frequencies
 from airtouch.logs.segments import KINDS
 
+LEAST_SHARE = 0.05  #: an effect that takes less of a cell's gap is not its cause
 BASELINE, SPREAD = "baseline flights", "sensor noise and how these flights differ among themselves"
 
 CHANNEL_WORDS = {
@@ -53,6 +54,7 @@ class Part:
     before: Sums
     after: Sums | None
     has_gyro: bool
+    alone: tuple[Sums, ...] = ()  #: with one of the effects each, where there are several
 
 
 def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] = (),
@@ -62,22 +64,26 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] 
     baseline: flights declared nominal, whose differences are the floor. One flight is held
     at a time besides those that the caller keeps.
     """
-    return assemble(study, [part_of(study, f, terms) for f in flights], [part_of(study, f) for f in baseline])
+    return assemble(study, [part_of(study, f, terms) for f in flights], [part_of(study, f) for f in baseline],
+                    [t.name for t in terms])
 
 
 def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     left = residual(flight, study.vehicle, study.calibration, study.controller)
     return Part(flight.name, sums(flight, left, study.vehicle), _after(study, flight, terms) if terms else None,
-                flight.rates is not None)
+                flight.rates is not None,
+                tuple(_after(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
 
 
-def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = ()) -> GapMap:
-    """The map of flights that were gone through one by one."""
+def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
+             effects: Sequence[str] = ()) -> GapMap:
+    """The map of flights that were gone through one by one; effects: names of the terms they were given."""
     joined, sensor = join([p.before for p in parts]), sensor_rms(study.vehicle)
     floors = floors_of(join([p.before for p in nominal]), len(nominal), sensor) if nominal \
         else spreads_of(joined, sensor)
     later = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
+    alone = [join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1 else [later]
     no_gyro = not any(p.has_gyro for p in parts)
     cells = []
     for k, kind in enumerate(KINDS):
@@ -86,7 +92,8 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = ()) 
             continue
         then = table_of(later, k, seed=k) if later else None
         level, top = floors.get(k) or (floors[GROUND] if k == GROUND else floors[AIR])
-        cells += _cells(kind, table, then, level, top, bool(nominal), no_gyro)
+        best = _best([_rms(a, k) for a in alone], effects, table.rms, level) if then else None
+        cells += _cells(kind, table, then, best, level, top, bool(nominal), no_gyro)
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
 
 
@@ -170,7 +177,20 @@ def _after(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     return replace(left, power=power)
 
 
-def _cells(kind: str, table: Table, then: Table | None, level: np.ndarray, top: np.ndarray,
+def _rms(found: Sums, phase: int) -> np.ndarray:
+    rows = found.phase == phase
+    return np.sqrt(found.power[rows].sum(axis=0) / np.maximum(found.weight[rows].sum(axis=0), 1.0)[:, None, None])
+
+
+def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray, floor: np.ndarray) -> np.ndarray:
+    """For each cell the effect that alone takes most from it, "" where each takes little."""
+    with np.errstate(invalid="ignore"):
+        taken = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, 1e-12))
+    best = np.array(effects, dtype=object)[taken.argmax(axis=0)]
+    return np.where((taken.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
+
+
+def _cells(kind: str, table: Table, then: Table | None, best: np.ndarray | None, level: np.ndarray, top: np.ndarray,
            baseline: bool, no_gyro: bool) -> list[Cell]:
     cells = []
     shown = _shown(kind, baseline, no_gyro)
@@ -185,7 +205,7 @@ def _cells(kind: str, table: Table, then: Table | None, level: np.ndarray, top: 
                     channel.name, band, kind, float(table.rms[r, b, c]), float(level[r, b, c]), channel.unit,
                     float(table.low[r, b, c]), float(table.high[r, b, c]), regime, int(table.blocks[r]),
                     int(table.flights[r]), None if then is None else float(then.rms[r, b, c]),
-                    float(top[r, b, c])))
+                    float(top[r, b, c]), (best[r, b, c] or None) if best is not None else None))
     return cells
 
 

@@ -58,6 +58,7 @@ class Cell:
     flights: int = 0
     after: float | None = None  #: the same cell with the named effects in the model
     floor_high: float | None = None  #: upper end of the floor's interval
+    by: str | None = None  #: of the named effects the one that alone takes most from it
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,7 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     flights: tuple[str, ...] = ()
+    held: Any = field(default=None, repr=False, compare=False)  #: study and calibration, for the report alone
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, GAP.md's fields and more; floats rounded to six digits."""

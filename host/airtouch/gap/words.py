@@ -1,9 +1,7 @@
 """A diagnosis in sentences, for the terminal and the report alike."""
 
-from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words
+from airtouch.gap.gap_map import CHANNEL_WORDS, LEAST_SHARE, PHASE_WORDS, in_words
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
-
-LEAST_SHARE = 0.05  #: effects that take less of a cell's gap are not its cause
 
 
 def answer(diagnosis: Diagnosis) -> str:
@@ -18,9 +16,13 @@ def answer(diagnosis: Diagnosis) -> str:
         return f"There is a gap{also} that no known effect explains.{where}"
     if cell is None:
         return f"The gap is {names}{_shrink(diagnosis)}."
+    others = [e.name.replace("_", " ") for e in diagnosis.effects if e.name != cell.by] if cell.by else []
+    cause, added = (cell.by.replace("_", " "), "it") if cell.by else (names, "it" if len(diagnosis.effects) == 1
+                                                                      else "them")
     return (f"{share(cell):.0%} of the gap {PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} "
-            f"({cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz) is {names}; adding it shrinks the gap from "
-            f"{cell.gap:.2g} to {cell.after:.2g} {cell.unit}, floor {cell.floor:.2g}.")
+            f"({cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz) is {cause}; adding {added} "
+            + (f"with {joined(others)} " if others else "") + f"shrinks the gap from {cell.gap:.2g} to "
+            f"{cell.after:.2g} {cell.unit}, floor {cell.floor:.2g}.")
 
 
 def telling(diagnosis: Diagnosis) -> Cell | None:

@@ -51,7 +51,8 @@ def largest_rows(cells: Iterable[Cell]) -> list[dict[str, str]]:
     """The largest cells in figures."""
     return [{"words": in_words(c).split(":")[0], "gap": f"{c.gap:.2g}",
              "interval": "" if c.low is None else f"{c.low:.2g} to {c.high:.2g}",
-             "after": "-" if c.after is None else f"{c.after:.2g}", "floor": f"{c.floor:.2g}", "unit": c.unit,
+             "after": "-" if c.after is None else f"{c.after:.2g}", "floor": f"{c.floor:.2g}",
+             "unit": c.unit + (f"; {c.by}" if c.by else ""),
              "ratio": f"{ratio(c):.1f}"} for c in cells]
 
 
