@@ -4,7 +4,6 @@ import math
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -157,16 +156,26 @@ def test_the_script_reads_one_file_a_stage_and_refuses_what_it_cannot(tmp_path):
 
 
 def test_the_estimate_follows_from_its_counts_and_says_that_it_is_one():
-    budget = tomllib.loads((ROOT / "tests" / "emulation" / "budget.toml").read_text())
-    found = power.estimate(budget, {"paper": 200_000.0})
+    budget, gap8 = (power.counts(ROOT / "tests" / "emulation" / f"{name}.toml") for name in ("budget", "gap8_budget"))
+    found = power.estimate(budget, gap8)
     one = budget["cortex-m4"]["band_power"]["instructions_mean"] * 100 / 168e6  # share of the core at a cycle each
-    assert found["FC-FE"].low_mw == pytest.approx(one * 20 * 3.7) and found["FC-FE"].high_mw == pytest.approx(one * 2 * 40 * 3.7)
-    assert found["network, paper on the GAP8"].low_mw == pytest.approx(200_000 * 100 * 64 / (6 * 41e6))
-    for line in power.estimate_table(found).splitlines()[::len(found) + 1]:
-        assert "ESTIMATE" in line
+    assert found["FC-FE"].low_mw == pytest.approx(one * 20 * 3.7)
+    assert found["FC-FE"].high_mw == pytest.approx(one * 2 * 40 * 3.7)
+    window = found["network, paper on the GAP8"]
+    assert window.high_mw == pytest.approx(gap8["paper"]["window_instructions"] * 100 * 64 / 800e6)
+    assert window.low_mw == pytest.approx(8 * gap8["paper"]["cycles_8"] * 100 * 64 / 800e6)
+    assert found["network, best on the GAP8"].low_mw == found["network, best on the GAP8"].high_mw
+    assert power.estimate_table(found).count("ESTIMATE") == 2
+    assert all(math.isfinite(e.high_mw) and e.low_mw <= e.high_mw for e in found.values())
+
+
+def test_budgets_that_lack_something_are_refused():
     with pytest.raises(AirTouchError, match="no instructions_mean for cortex-m4.band_power"):
         power.estimate({}, {})
-    assert all(math.isfinite(e.high_mw) for e in found.values())
+    with pytest.raises(AirTouchError, match="GAP8's budget"):
+        power.gap8_mw({"window_instructions": 5})
+    with pytest.raises(AirTouchError, match="cannot be read as a budget"):
+        power.counts(ROOT / "none.toml")
 
 
 def test_the_sketch_writes_what_is_read():
