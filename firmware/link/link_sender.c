@@ -137,17 +137,23 @@ void linkSenderSent(linkSender_t *sender, bool taken) {
   }
 }
 
+bool linkSenderAccept(linkSender_t *sender, uint32_t sequence) {
+  if (sender->answered && edgeLinkAfter(sequence, sender->lastAnswer) <= 0) {
+    return false;
+  }
+  sender->answered = true;
+  sender->lastAnswer = sequence;
+  return true;
+}
+
 static int newAnswers(linkSender_t *sender, const edgeLinkResult_t *result, linkAnswer_t *answers) {
   int found = 0;
   for (int i = 0; i < result->count; i++) {
     const edgeLinkAnswer_t *answer = &result->answer[i];
     const uint32_t sequence = result->expected - answer->back;
-    const bool known = sender->answered && edgeLinkAfter(sequence, sender->lastAnswer) <= 0;
-    if (answer->back == 0 || known) {
+    if (answer->back == 0 || !linkSenderAccept(sender, sequence)) {
       continue;
     }
-    sender->answered = true;
-    sender->lastAnswer = sequence;
     answers[found].sequence = sequence;
     memcpy(answers[found].output, answer->output, EDGE_LINK_OUTPUTS);
     found++;

@@ -98,5 +98,11 @@ void linkSenderSent(linkSender_t *sender, bool taken);
  */
 int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, linkAnswer_t *answers);
 
+/**
+ * Whether an answer to this sample is news; it is none any more afterwards. For answers that
+ * were found without the GAP8.
+ */
+bool linkSenderAccept(linkSender_t *sender, uint32_t sequence);
+
 /** Samples that wait for confirmation. */
 uint32_t linkSenderBacklog(const linkSender_t *sender);

@@ -112,11 +112,19 @@ def test_cfar_alone_reports_its_alerts(flight):
     assert {i for i, _ in edges} <= set(alerts.tolist()) and min(np.diff([i for i, _ in edges]), default=99) >= 25
 
 
-def test_a_gap8_that_never_answers(flight):
+def test_a_gap8_that_never_answers_leaves_the_stm32_to_do_it(flight, best_edges):
     drone = Drone("best-gap8", answers=False)
-    assert drone.fly(flight, stop=600) == []
-    assert drone.health == {"link down"} and np.isnan(drone.app.log.probability)
-    assert drone.app.log.samples == 600 and drone.sent <= 600 / 10 + 1  # it asks ten times a second, no more
+    assert drone.fly(flight, stop=24) == [] and np.isnan(drone.app.log.probability)
+    assert drone.health == {"link down"}
+    drone = Drone("best-gap8", answers=False)
+    assert drone.fly(flight) == best_edges
+    assert drone.health == {"link down", "no GAP8"} and DETECTORS[drone.app.log.detector] == "best"
+    assert drone.sent <= drone.app.log.samples / 10 + 1  # it asks ten times a second, no more
+
+
+def test_paper_without_answers_knows_no_probability(flight):
+    drone = Drone("paper-gap8", answers=False)
+    assert drone.fly(flight) == [] and np.isnan(drone.app.log.probability) and drone.health == {"link down"}
 
 
 def test_the_gap8_loses_power_and_the_link_for_five_seconds(flight):
@@ -139,6 +147,7 @@ def test_the_gap8_loses_power_and_the_link_for_five_seconds(flight):
     assert link[852:1300] == ["down"] * 448, "the log says that the link is down"
     for first, last in ((300, 500), (600, 800), (1400, 1700)):
         assert said[first:last] == logits[first - 1:last - 1] and set(lag[first:last]) == {0}
+    assert said[870:1300] == logits[870:1300], "the STM32 runs the network meanwhile"
     assert drone.health == set()
 
 

@@ -27,7 +27,7 @@ APP = ROOT / "firmware" / "app" / "src"
 GLUE = (APP / "airtouch_app.c").read_text()
 KERNELS = ("band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
            "fr_cfar", "motion_channels", "stream_detector")
-SOURCES = [*(APP / f"app_{name}.c" for name in ("core", "level", "params")),
+SOURCES = [*(APP / f"app_{name}.c" for name in ("core", "level", "local", "log", "params")),
            *(ROOT / "firmware" / "link" / f"{name}.c" for name in ("edge_link", "link_sender")),
            *(ROOT / "firmware" / "kernels" / f"{name}.c" for name in KERNELS),
            *(ROOT / "gap8" / "kernels" / f"{name}.c" for name in ("dense_int8", "sparse_dense_int8", "stream_int8")),

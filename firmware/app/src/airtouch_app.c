@@ -41,7 +41,7 @@ static QueueHandle_t inbox;
 /** Runs in the CPX task: copies the packet and returns. */
 static void takePacket(const CPXPacket_t *received) {
   static appPacket_t packet;  // of the one CPX task
-  if (received->dataLength > EDGE_LINK_MAX_BYTES) {
+  if (received->route.source != CPX_T_GAP8 || received->dataLength > EDGE_LINK_MAX_BYTES) {
     return;
   }
   packet.length = (uint8_t)received->dataLength;

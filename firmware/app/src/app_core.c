@@ -5,14 +5,10 @@
 
 #include "airtouch_model.h"
 #include "app_level.h"
+#include "app_log.h"
 #include "stream_window.h"
 
-enum { EVENT_NON_FINITE, EVENT_PARAM, EVENT_DROPPED, EVENT_LATE };
 enum { EDGE_UNKNOWN = 3 };
-
-static bool usesGap8(const appCore_t *core) {
-  return core->log.detector == APP_BEST_GAP8 || core->log.detector == APP_PAPER_GAP8;
-}
 
 static uint8_t detectorInForce(const appCore_t *core) {
   if (core->haveGap8 || core->params.detector < APP_BEST_GAP8) {
@@ -23,7 +19,7 @@ static uint8_t detectorInForce(const appCore_t *core) {
 
 static bool filters(const appCore_t *core) {
   return core->params.filter == APP_FILTER_ON ||
-         (core->params.filter == APP_FILTER_AS_TRAINED && core->log.detector == APP_PAPER_GAP8);
+         (core->params.filter == APP_FILTER_AS_TRAINED && core->detector == APP_PAPER_GAP8);
 }
 
 /** Settings that the kernels read as they run. */
@@ -49,7 +45,7 @@ static void beginPipeline(appCore_t *core) {
 
 static void beginLink(appCore_t *core) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
-  const bool paper = core->log.detector == APP_PAPER_GAP8;
+  const bool paper = core->detector == APP_PAPER_GAP8;
   edgeLinkDigest(paper ? AIRTOUCH_MODEL_SHA256 : AIRTOUCH_STREAM_SHA256, digest);
   const uint16_t refill =
       paper ? AIRTOUCH_MODEL_ROWS : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
@@ -61,7 +57,8 @@ static void beginLink(appCore_t *core) {
 
 /** Kernels, detector and stream begin anew; counters stay. */
 static void begin(appCore_t *core) {
-  core->log.detector = detectorInForce(core);
+  core->detector = detectorInForce(core);
+  core->log.detector = core->detector;
   core->log.over = 0;
   core->log.probability = NAN;
   core->probability = NAN;
@@ -71,10 +68,9 @@ static void begin(appCore_t *core) {
   streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
                      &airtouchStreamDecoder, core->arena);
   beginLink(core);
+  core->local = (appLocal_t){0};
   setThresholds(core);
 }
-
-static void happened(appCore_t *core, int event) { core->since[event] = 0; }
 
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce) {
   memset(core, 0, sizeof *core);
@@ -95,7 +91,7 @@ uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   const uint16_t errors = appParamsClamp(params);
   if (errors > 0) {
     core->log.paramErrors = (uint16_t)(core->log.paramErrors + errors);
-    happened(core, EVENT_PARAM);
+    appHappened(core, EVENT_PARAM);
   }
   core->params = *params;
   if (params->detector != old.detector || params->enable != old.enable) {
@@ -151,28 +147,10 @@ static void stepBest(appCore_t *core) {
   }
 }
 
-/** The streaming network's inputs, quantised here as the network on the STM32 would. */
-static void sendChannels(appCore_t *core) {
-  const float *held = core->pipeline.held;
-  float channels[MOTION_CHANNELS];
-  int8_t quantised[EDGE_LINK_SAMPLE_BYTES];
-  motionChannelsStep(&core->best.motion, held, held + 3, held + 6, channels);
-  streamQuantise(&core->best.quantisation, channels, MOTION_CHANNELS, quantised);
-  setAirborne(core, core->link.samples, core->best.motion.airborne > 0);
-  linkSenderPush(&core->link, (const uint8_t *)quantised);
-}
-
-static void sendFeatures(appCore_t *core, const edgeEvent_t *event) {
-  uint8_t sample[EDGE_LINK_SAMPLE_BYTES];
-  _Static_assert(sizeof event->features == EDGE_LINK_SAMPLE_BYTES, "three features are a sample");
-  memcpy(sample, event->features, sizeof sample);  // both processors are little endian
-  linkSenderPush(&core->link, sample);
-}
-
 static void takeAnswer(appCore_t *core, const linkAnswer_t *answer) {
   const uint32_t lag = core->link.samples - 1 - answer->sequence;
   core->log.lag = (uint16_t)(lag < UINT16_MAX ? lag : UINT16_MAX);
-  if (core->log.detector == APP_PAPER_GAP8) {
+  if (core->detector == APP_PAPER_GAP8) {
     const float difference = (float)(answer->output[0] - answer->output[1]);
     core->probability = sigmoid(-airtouchNetwork.outputScale * difference);
     core->log.probability = core->probability;
@@ -188,9 +166,39 @@ static void takeAnswer(appCore_t *core, const linkAnswer_t *answer) {
   takeLogits(core, core->best.logits, airborne, edge);
 }
 
+/** The streaming network's inputs, quantised here as the network on the STM32 would. */
+static void sendChannels(appCore_t *core) {
+  const float *held = core->pipeline.held;
+  float channels[MOTION_CHANNELS];
+  int8_t quantised[EDGE_LINK_SAMPLE_BYTES];
+  motionChannelsStep(&core->best.motion, held, held + 3, held + 6, channels);
+  streamQuantise(&core->best.quantisation, channels, MOTION_CHANNELS, quantised);
+  setAirborne(core, core->link.samples, core->best.motion.airborne > 0);
+  linkSenderPush(&core->link, (const uint8_t *)quantised);
+}
+
+/** While the GAP8 is silent the network runs here, over the samples that were meant for it. */
+static void runLocal(appCore_t *core) {
+  linkAnswer_t answer;
+  bool answered;
+  appLocalBegin(&core->local, &core->link, &core->best, core->arena);
+  for (int i = 0; i < APP_LOCAL_SAMPLES && appLocalStep(&core->local, &core->link, &core->best, &answer, &answered); i++) {
+    if (answered && linkSenderAccept(&core->link, answer.sequence)) {
+      takeAnswer(core, &answer);
+    }
+  }
+}
+
+static void sendFeatures(appCore_t *core, const edgeEvent_t *event) {
+  uint8_t sample[EDGE_LINK_SAMPLE_BYTES];
+  _Static_assert(sizeof event->features == EDGE_LINK_SAMPLE_BYTES, "three features are a sample");
+  memcpy(sample, event->features, sizeof sample);  // both processors are little endian
+  linkSenderPush(&core->link, sample);
+}
+
 void appCoreReceive(appCore_t *core, const uint8_t *bytes, uint16_t length) {
   linkAnswer_t answers[EDGE_LINK_ANSWERS];
-  if (!core->params.enable || !usesGap8(core)) {
+  if (!core->params.enable || !appUsesGap8(core)) {
     return;
   }
   const int count = linkSenderTake(&core->link, bytes, length, answers);
@@ -210,12 +218,13 @@ static void stepCfar(appCore_t *core, const edgeEvent_t *event) {
 }
 
 static void runDetector(appCore_t *core, const edgeEvent_t *event) {
-  switch (core->log.detector) {
+  switch (core->detector) {
     case APP_BEST:
       stepBest(core);
       break;
     case APP_BEST_GAP8:
       sendChannels(core);
+      runLocal(core);
       break;
     case APP_PAPER_GAP8:
       if (event->ready) {
@@ -231,59 +240,6 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
   }
 }
 
-static void logEvent(appCore_t *core, const edgeEvent_t *event) {
-  appLog_t *log = &core->log;
-  memcpy(log->feature, event->features, sizeof log->feature);
-  memcpy(log->force, event->force, sizeof log->force);
-  log->cfarPower = event->cfarPower;
-  log->threshold = event->threshold;
-  log->alert = event->alert;
-  if (event->nonFinite != core->nonFinite) {
-    happened(core, EVENT_NON_FINITE);
-    log->nonFinite += event->nonFinite - core->nonFinite;
-    core->nonFinite = event->nonFinite;
-  }
-}
-
-static void logLink(appCore_t *core) {
-  const linkCounters_t *counters = &core->link.counters;
-  appLog_t *log = &core->log;
-  log->dropped = counters->dropped;
-  log->lost = counters->lost;
-  log->timeouts = counters->timeouts;
-  log->gap8Resets = counters->resets;
-  log->gap8Uptime = counters->uptimeMs;
-  log->link = core->link.state;
-  if (usesGap8(core) && core->link.state != LINK_UP) {
-    log->probability = NAN;
-    core->probability = NAN;
-  }
-}
-
-static uint16_t linkHealth(const appCore_t *core) {
-  switch (core->link.state) {
-    case LINK_UP:
-      return 0;
-    case LINK_FILLING:
-      return APP_LINK_FILLING;
-    case LINK_REFUSED:
-      return APP_MODEL_REFUSED;
-    default:
-      return APP_LINK_DOWN;
-  }
-}
-
-static uint16_t healthOf(appCore_t *core) {
-  static const uint16_t flags[APP_EVENTS] = {APP_NON_FINITE, APP_PARAM_CLAMPED, APP_DROPPED, APP_LATE};
-  uint16_t health = usesGap8(core) ? linkHealth(core) : 0;
-  for (int i = 0; i < APP_EVENTS; i++) {
-    health = (uint16_t)(health | (core->since[i] < APP_RECENT_STEPS ? flags[i] : 0));
-    core->since[i] = (uint16_t)(core->since[i] + (core->since[i] < UINT16_MAX ? 1 : 0));
-  }
-  health = (uint16_t)(health | (core->log.detector != core->params.detector ? APP_NO_GAP8 : 0));
-  return (uint16_t)(health | (core->noSensor ? APP_NO_SENSOR : 0));
-}
-
 bool appCoreStep(appCore_t *core, const appSample_t *sample) {
   core->log.samples++;
   if (core->params.enable) {
@@ -292,24 +248,24 @@ bool appCoreStep(appCore_t *core, const appSample_t *sample) {
     appLevel(sample, &level);
     level.probability = core->probability;
     edgePipelineStep(&core->pipeline, &level, &event);
-    logEvent(core, &event);
+    appLogEvent(core, &event);
     runDetector(core, &event);
-    logLink(core);
+    appLogLink(core);
   }
-  core->log.health = healthOf(core);
+  core->log.health = appHealthOf(core);
   const bool reported = core->reported;
   core->reported = false;
   return reported;
 }
 
 uint16_t appCoreOutgoing(appCore_t *core, uint8_t *bytes) {
-  return core->params.enable && usesGap8(core) ? linkSenderPoll(&core->link, bytes) : 0;
+  return core->params.enable && appUsesGap8(core) ? linkSenderPoll(&core->link, bytes) : 0;
 }
 
 void appCoreSent(appCore_t *core, bool taken) {
   linkSenderSent(&core->link, taken);
   if (!taken) {
-    happened(core, EVENT_DROPPED);
+    appHappened(core, EVENT_DROPPED);
   }
 }
 
@@ -318,7 +274,7 @@ void appCoreTime(appCore_t *core, uint32_t microseconds, bool late) {
   core->log.loadMax = core->log.load > core->log.loadMax ? core->log.load : core->log.loadMax;
   if (late) {
     core->log.late++;
-    happened(core, EVENT_LATE);
+    appHappened(core, EVENT_LATE);
   }
 }
 

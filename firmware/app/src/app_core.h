@@ -10,6 +10,7 @@
  */
 #pragma once
 
+#include "app_local.h"
 #include "app_types.h"
 #include "edge_pipeline.h"
 #include "link_sender.h"
@@ -19,6 +20,7 @@
 
 #define APP_PACKETS 2            ///< a step, at most: the CPX queue is two deep
 #define APP_RECENT_STEPS 100     ///< health flags of single events stay up for so long
+#define APP_ANSWER_STEPS 50      ///< an answer of the GAP8 that is older says nothing of now
 #define APP_EVENTS 4             ///< kinds of them
 
 /** How the shipped `paper` model was tuned (host/airtouch/models/paper.npz). */
@@ -31,7 +33,7 @@
 typedef enum {
   APP_CFAR = 0,        ///< FR-CFAR alone, on the STM32: edges of unknown kind
   APP_BEST = 1,        ///< the streaming network, on the STM32
-  APP_BEST_GAP8 = 2,   ///< the same network on the GAP8
+  APP_BEST_GAP8 = 2,   ///< the same network on the GAP8; on the STM32 while that is silent
   APP_PAPER_GAP8 = 3,  ///< the paper's network on the GAP8
 } appDetector_t;
 
@@ -49,7 +51,7 @@ typedef enum {
   APP_LINK_FILLING = 4,   ///< it does, but has not seen a whole window yet
   APP_MODEL_REFUSED = 8,  ///< it has another model
   APP_PARAM_CLAMPED = 16, ///< a setting was out of range within the last second
-  APP_NO_GAP8 = 32,       ///< no AI-deck: another detector runs than the wanted one
+  APP_NO_GAP8 = 32,       ///< no AI-deck, or it is silent: another detector runs than the wanted one
   APP_DROPPED = 64,       ///< the CPX queue was full within the last second
   APP_LATE = 128,         ///< a step began late within the last second
   APP_STALLED = 256,      ///< no step for 50 ms (set by whoever reads the log)
@@ -60,6 +62,7 @@ typedef enum {
 typedef struct {
   appParams_t params;
   appLog_t log;
+  uint8_t detector;  ///< an appDetector_t: the wanted one, or what it falls back to without an AI-deck
   bool haveGap8;
   uint32_t nonce;
   uint16_t since[APP_EVENTS];  ///< steps since the last event of each kind
@@ -73,6 +76,7 @@ typedef struct {
   edgePipeline_t pipeline;
   streamDetector_t best;
   linkSender_t link;
+  appLocal_t local;
   _Alignas(4) int8_t arena[AIRTOUCH_STREAM_ARENA_BYTES];
 } appCore_t;
 
