@@ -20,6 +20,7 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import loop
 from airtouch.sitl import serve
 from airtouch.sitl.faults import Line, parse
+from airtouch.sitl.variables import log_variables
 
 SPEED = 4.0  #: drone seconds a second
 HOP = """
@@ -199,6 +200,25 @@ def test_a_rejected_log_block_says_why(virtual_on_the_ground, cache, monkeypatch
                 drone.start(blocks.Block(f"filler{number}", 200, (("sys.canfly", "uint8_t"),) * 26))
     finally:
         drone.close()
+
+
+def test_firmware_without_a_variable_is_told_which(hop, cache, tmp_path, monkeypatch):
+    def fewer(drone):
+        return {name: how for name, how in log_variables(drone).items() if name not in ("motor.m3", "pm.vbat")}
+
+    monkeypatch.setattr("airtouch.sitl.firmware.variables.log_variables", fewer)
+    with serve(hop, port=0, speed=SPEED) as virtual:
+        shown = fly(virtual, hop, cache, tmp_path)
+        assert "the firmware has no log variable motor.m3, pm.vbat" in str(shown.exception)
+        assert on_the_ground(virtual)
+
+
+def test_late_packets_are_sorted(hop, cache, tmp_path):
+    with serve(hop, port=0, speed=SPEED, faults=("late=50ms",)) as virtual:
+        shown = fly(virtual, hop, cache, tmp_path)
+        assert shown.exit_code == 0 and on_the_ground(virtual), shown.output
+    log = logs.read(tmp_path / "hop_0001.csv.gz")
+    assert log.meta["lost_samples"] == 0 and set(np.round(np.diff(log["t_s"]), 3)) == {0.01}
 
 
 def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(hop, cache, tmp_path):
