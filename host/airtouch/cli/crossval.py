@@ -14,7 +14,7 @@ from airtouch.detector import crossval, dataset, evaluate
 
 @click.command(name="crossval")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
-@click.option("--detector", default="best", show_default=True, help="best, paper or baseline.")
+@click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
               help="Drop edges without an FR-CFAR alert.")
 @click.option("--epochs", type=click.IntRange(1),

@@ -11,7 +11,7 @@ from airtouch.detector import dataset, evaluate, registry
 
 @click.command(name="evaluate")
 @click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--detector", default="best", show_default=True, help="best, paper or baseline.")
+@click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained model (.npz); the shipped one if left out.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",

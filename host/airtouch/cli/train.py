@@ -21,7 +21,7 @@ from airtouch.logs.flight_log import FlightLog
 
 @click.command(name="train")
 @click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--detector", default="best", show_default=True, help="Which detector to train: best or paper.")
+@click.option("--detector", default="best", show_default=True, help="Which detector to train: best, paper or paper-stream.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
               help="Model file to write.")
 @click.option("--epochs", type=click.IntRange(1), help="paper: at most so many; its own number if left out.")
