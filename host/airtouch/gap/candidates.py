@@ -35,6 +35,7 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "motor_noise": tuple({"time": x} for x in (0.005, 0.02, 0.1)),
     "battery_sag": tuple({"charge": x} for x in (0.95, 0.6)),
 }
+_ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are also tried alone
 _FIXED = {"ground_effect": {"turbulence": 0.0}}
 COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
 #: names for one thing in the logs at hand, with what would tell them apart
@@ -123,7 +124,8 @@ def terms(name: str) -> list[Term]:
     free = _FREE.get(name) or tuple(p.name for p in effect.parameters if p.neutral is not None)
     kind = _KIND.get(name) or (MEAN if name in _FREE or not _random(effect) else SPECTRUM)
     base = effect.scaled(effect.values(), 0.0) | _FIXED.get(name, {})
-    return [Term(effect, kind, free, base | variant) for variant in _VARIANTS.get(name, ({},))]
+    alone = [Term(effect, kind, (p,), base) for p in free] if name in _ONE_BY_ONE else []
+    return [Term(effect, kind, free, base | variant) for variant in _VARIANTS.get(name, ({},))] + alone
 
 
 def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:

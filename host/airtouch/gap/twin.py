@@ -29,7 +29,9 @@ HIGHPASS_HZ = 0.6
 MIX = 0.25 * np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]], dtype=np.float64)
 EDGE_S = (0.1, 0.4)  #: left out before and after a change of phase at an edge, take-off or landing
 PLATFORM = KINDS.index("over platform")
+START_S = (0.8, 0.2)  #: the same around hover's end and beginning: set-points step before the speed shows it
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
+FINE, REACH = 4, 2  #: points a bin, bins a window's leakage is followed
 UNSTABLE = 30.0  #: nepers of power per rad of phase beyond stability
 FEWEST = 6  #: blocks of nominal flights, for a twin view
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
@@ -89,7 +91,7 @@ class Twin:
         return self.__dict__["_base"]
 
     def _power(self, row: Any) -> np.ndarray:
-        f = frequencies()
+        f = fine_frequencies()
         made = []
         for i, axis in enumerate(AXES):
             controller = firmware(row, axis) if self.by_firmware else self.controllers[i]
@@ -99,12 +101,29 @@ class Twin:
             power = strengths @ spectra(controller, row, axis, f)
             beyond = excess_phase(controller, row, axis)
             made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
-        return np.stack(made, axis=1)
+        return np.stack([through_window(m) for m in made], axis=1)
 
 
 def frequencies() -> np.ndarray:
     """Hz of the bins that are judged."""
     return _every()[_kept()]
+
+
+def fine_frequencies() -> np.ndarray:
+    """FINE points a bin and REACH bins beyond the first and the last: what a block's window mixes."""
+    f = frequencies()
+    step = (f[1] - f[0]) / FINE
+    return f[0] + step * np.arange(-REACH * FINE, (len(f) - 1 + REACH) * FINE + 1)
+
+
+def through_window(power: np.ndarray) -> np.ndarray:
+    """PSD (..., fine points) as blocks under a Hann window show it, (..., bins)."""
+    x = np.arange(-REACH * FINE, REACH * FINE + 1) / FINE
+    kernel = (0.5 * np.sinc(x) + 0.25 * (np.sinc(x - 1.0) + np.sinc(x + 1.0))) ** 2
+    kernel /= kernel.sum()
+    count = (power.shape[-1] - 1) // FINE + 1 - 2 * REACH
+    place = np.arange(count)[:, None] * FINE + np.arange(len(kernel))
+    return power[..., place] @ kernel
 
 
 def _every() -> np.ndarray:
@@ -133,9 +152,11 @@ def steady(flight: Flight) -> np.ndarray:
     """Samples (n,) of level flight away from edges, take-off and landing."""
     inside = np.isin(flight.phase, STEADY) & (flight.usable | flight.lost)
     part = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
-    before, after = (int(x / PERIOD_S) for x in EDGE_S)
-    for k in np.flatnonzero(np.diff(part)) + 1:
-        inside[max(k - before, 0):k + after] = False
+    moves = np.where(flight.phase == KINDS.index("hover"), 0, 1)
+    for change, span in ((np.diff(part), EDGE_S), (np.diff(moves), START_S)):
+        before, after = (int(x / PERIOD_S) for x in span)
+        for k in np.flatnonzero(change) + 1:
+            inside[max(k - before, 0):k + after] = False
     return inside
 
 
@@ -187,7 +208,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
 def _fit(controller: Controller, row: Any, axis: str, power: np.ndarray,
          steps: int = 300) -> tuple[np.ndarray, float, Controller]:
     """Noise strengths of highest Whittle likelihood, its negative per block, and the controller."""
-    shapes = spectra(controller, row, axis, frequencies())
+    shapes = through_window(spectra(controller, row, axis, fine_frequencies()))
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
     a = np.full(len(shapes), 1.0 / len(shapes))

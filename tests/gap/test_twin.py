@@ -1,0 +1,126 @@
+"""Twin view: the loop model against simulated closed loops, and effects that only the commands show."""
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from airtouch import vehicle as vehicles
+from airtouch.gap import calibrate, edge_response, fit, flight, loop_model, select, twin
+from airtouch.gap.candidates import terms
+from airtouch.simulation import scenario
+from airtouch.simulation.batch import flights as simulated
+from airtouch.simulation.effects import activate
+from airtouch.simulation.flight import prepare
+
+VEHICLE = vehicles.load()
+LONG = """
+name = "long hover"
+[mission]
+step = [{ do = "wait", time_s = 0.5 }, { do = "take-off", height_m = 0.8 }, { do = "hover", time_s = 60.0 },
+        { do = "land" }]
+"""
+
+
+def flown(scene, count, effects=(), seed=0):
+    off = scenario.load(scene).table.get("effects", {}) if isinstance(scene, str) else ()
+    off = [e for e in off if e not in dict(effects)]
+    logs = list(simulated(scene, count, vehicle=VEHICLE, effects=effects, without=off, seed=seed, workers=1))
+    return [flight.ready(log, VEHICLE) for log in logs]
+
+
+@pytest.fixture(scope="module")
+def study():
+    return calibrate.declared(VEHICLE, flown("paper-mixed", 6, seed=9))
+
+
+def found(study, flights, name):
+    """Held-out gain and the mean of the two halves' fitted values, of the effect's best variant."""
+    data = fit.Data(study, flights)
+    halves = select.halves(data)
+    best = (-np.inf, {})
+    for term in terms(name):
+        gain, values = 0.0, []
+        for train, test in (halves, halves[::-1]):
+            fitted = fit.fit(data, train, (term,))
+            gain += fit.judge(data, test, fitted.terms) - fit.judge(data, test, ())
+            values.append(fitted.terms[0].values)
+        best = max(best, (gain, {k: np.mean([v[k] for v in values]) for k in values[0]}), key=lambda b: b[0])
+    return best
+
+
+def spectrum(effects):
+    total = 0.0
+    for log in simulated(scenario.parse(LONG, "long hover"), 8, vehicle=VEHICLE, effects=effects, workers=1):
+        told = VEHICLE.thrust(log.stack([f"m{i}_pwm" for i in (1, 2, 3, 4)])) @ twin.MIX.T
+        f, power = welch(told[500:6000, :3], 100.0, nperseg=twin.LENGTH, axis=0)
+        total = total + power
+    return total[np.isin(f, twin.frequencies())]
+
+
+@pytest.mark.parametrize("effects", [
+    {"sensor_latency": {"delay": 0.004}}, {"sensor_latency": {"delay": 0.006}}, {"sensor_latency": {"delay": 0.008}},
+    {"controller_gain": {"rate": 0.7}}, {"controller_gain": {"rate": 1.0, "height": 1.5}},
+    {"motor_lag": {"factor": 1.5}}, {"inertia": {"fraction": 0.4}}, {"mass": {"fraction": 0.13}}])
+def test_predicted_ratio_is_that_of_the_simulated_loop(effects):
+    nominal = spectrum({})
+    row, changed = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
+    for i, axis in enumerate(loop_model.AXES):
+        strengths, _, _ = twin._fit(loop_model.firmware(row, axis), row, axis, nominal[:, i])
+        f, fine = twin.frequencies(), twin.fine_frequencies()
+        expected = twin.through_window(
+            strengths @ loop_model.spectra(loop_model.firmware(changed, axis), changed, axis, fine))
+        expected /= twin.through_window(strengths @ loop_model.spectra(loop_model.firmware(row, axis), row, axis, fine))
+        error = 10.0 * np.log10(spectrum(effects)[:, i] / nominal[:, i] / expected)
+        assert np.abs(error).mean() < 0.6
+        assert np.abs(error[f < 5.0]).max() < 0.9
+
+
+def test_latency_is_found_with_its_value(study):
+    gain, values = found(study, flown("paper-mixed", 1, {"sensor_latency": {"delay": 0.008}}, seed=1), "sensor_latency")
+    assert gain > 50.0
+    assert values["delay"] == pytest.approx(0.008, rel=0.25)
+
+
+def test_lower_rate_gain_is_found_and_is_no_latency(study):
+    flights = flown("paper-mixed", 2, {"controller_gain": {"rate": 0.7}}, seed=1)
+    gain, values = found(study, flights, "controller_gain")
+    assert gain > 12.0
+    assert values["rate"] == pytest.approx(0.7, rel=0.15)
+    assert found(study, flights, "sensor_latency")[0] < gain
+
+
+def test_range_step_is_found_at_edges(study):
+    flights = flown("paper-mixed", 4, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
+    gain, values = found(study, flights, "range_step")
+    assert gain > 12.0
+    assert values["kick"] == pytest.approx(0.05, rel=0.3)
+    assert values["residual"] == pytest.approx(0.02, rel=0.5)
+
+
+def test_flow_scale_is_found_at_edges(study):
+    flights = flown("paper-mixed", 8, {"flow_scale": {"share": 0.0, "transient": 0.3}}, seed=2)
+    assert found(study, flights, "flow_scale")[0] > 6.0
+
+
+@pytest.mark.parametrize("name", ["sensor_latency", "controller_gain", "range_step", "flow_scale"])
+def test_nominal_flights_give_nothing(study, name):
+    for k in range(3):
+        assert found(study, flown("paper-mixed", 1, seed=20 + k), name)[0] < 4.0
+
+
+def test_without_edges_range_step_changes_nothing(study):
+    flights = flown("hover", 1)
+    assert edge_response.edges_of(flights[0]) == []
+    assert any("edge" in reason for reason in flights[0].cannot)
+    assert found(study, flights, "range_step")[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_controller_of_the_firmware_is_recognised(study):
+    assert study.controller.by_firmware
+
+
+def test_a_loop_that_would_not_fly_is_recognised():
+    slow = prepare(VEHICLE, activate({"sensor_latency": {"delay": 0.03}}))[0][0]
+    row = prepare(VEHICLE, ())[0][0]
+    assert loop_model.excess_phase(loop_model.firmware(row, "roll"), row, "roll") < 0.0
+    assert loop_model.excess_phase(loop_model.firmware(slow, "roll"), slow, "roll") > 0.0
