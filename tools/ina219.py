@@ -11,9 +11,11 @@ import numpy as np
 from airtouch.errors import AirTouchError
 
 UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0, "mv": 1e-3, "v": 1.0, "ma": 1e-3, "ua": 1e-6, "a": 1.0}
-QUANTITIES = {"time": ("time", "t", "millis", "timestamp"), "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
+QUANTITIES = {"time": ("time", "t", "millis", "timestamp"),
+              "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
               "amperes": ("current", "amperes", "i"), "stage": ("stage", "phase", "module")}
 USUAL = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
+WITHOUT_HEADER = {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3), "stage": (3, 1.0)}
 MOST_BAD = 0.05  #: share of lines that may be unreadable (a serial line loses characters)
 MOST_V, MOST_A = 26.0, 3.2  #: the INA219's range
 GAP = 20.0  #: periods without a line that are no part of the energy
@@ -45,8 +47,8 @@ class Power:
 def parse(text: str, source: str) -> Trace:
     """A log from its text. Raises AirTouchError with file, line and remedy.
 
-    Comments, empty lines, repeated headers, a last line that is cut off and a few damaged ones are passed over
-    and counted. Separators are , ; or tab; with ; and tab a comma may stand for the decimal point.
+    Comments, empty lines, repeated headers, a last line that is cut off and a few damaged ones are passed
+    over and counted. Separators are , ; or tab; with ; and tab a comma may stand for the decimal point.
     """
     lines = [(i, line.strip()) for i, line in enumerate(text.lstrip("\ufeff").splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line and not line.startswith("#")]
@@ -55,8 +57,7 @@ def parse(text: str, source: str) -> Trace:
     separator = next((s for s in "\t;" if s in lines[0][1]), ",")
     first = _cells(lines[0][1], separator)
     header = first if _number(first[0]) is None else None
-    columns = _columns(header, source, lines[0][0]) if header else {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3),
-                                                                    "stage": (3, 1.0)}
+    columns = _columns(header, source, lines[0][0]) if header else WITHOUT_HEADER
     rows, stages, bad = [], [], []
     for i, line in lines[1:] if header else lines:
         cells = _cells(line, separator)
@@ -71,7 +72,8 @@ def parse(text: str, source: str) -> Trace:
         at = columns.get("stage", (len(cells), 1.0))[0]
         stages.append(cells[at] if at < len(cells) else "")
     if len(bad) > max(MOST_BAD * (len(rows) + len(bad)), 1):
-        raise AirTouchError(f"{source}:{bad[0]}: {len(bad)} of {len(rows) + len(bad)} lines are no time, voltage (0 to "
+        total = len(rows) + len(bad)
+        raise AirTouchError(f"{source}:{bad[0]}: {len(bad)} of {total} lines are no time, voltage (0 to "
                             f"{MOST_V:g} V) and current (to {MOST_A:g} A); check the columns and their units")
     if len(rows) < 2:
         raise AirTouchError(f"{source}: {len(rows)} usable lines; log for some seconds")
@@ -103,7 +105,7 @@ def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, 
         words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
         unit = next((w for w in words[1:][::-1] if w in UNITS), None)
         for quantity, known in QUANTITIES.items():
-            if quantity not in found and words and (words[0] in known or words[0] in ("bus",) and quantity == "volts"):
+            if quantity not in found and words and words[0] in known:
                 found[quantity] = (at, UNITS[unit] if unit else USUAL.get(words[0], 1.0))
                 break
     missing = [q for q in ("time", "volts", "amperes") if q not in found]
@@ -116,8 +118,8 @@ def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, 
 def power(trace: Trace, where: np.ndarray | None = None) -> Power:
     """Mean power over the lines where `where` is true, by trapezoids between lines that follow each other.
 
-    Stretches without lines (more than 20 periods), and the step back of a clock that was reset, are left out. The
-    interval is that of means over blocks of one second.
+    Stretches without lines (more than 20 periods), and the step back of a clock that was reset, are left out.
+    The interval is that of means over blocks of one second.
     """
     watts = trace.volts * trace.amperes
     steps = np.diff(trace.time_s)
@@ -139,7 +141,8 @@ def power(trace: Trace, where: np.ndarray | None = None) -> Power:
 
 
 def by_stage(trace: Trace, known: Sequence[str]) -> dict[str, Power]:
-    """Power of each stage that a log names in its own column: those of `known` in their order, then others by name."""
+    """Power of each stage that a log names in its own column: those of `known` in their order, then others by
+    name."""
     names = np.array([canonical(name, known) for name in trace.stage])
     order = list(dict.fromkeys([*(s for s in known if s in names), *sorted(set(names) - {""})]))
     return {name: power(trace, names == name) for name in order}
@@ -152,7 +155,7 @@ def canonical(name: str, known: Sequence[str]) -> str:
 
 
 def added(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
-    """Stage -> (mW that it adds to the one before it, half width of the 95 % interval); the first is whole."""
+    """Stage -> (mW that it adds to the one before, half width of the 95 % interval); the first is whole."""
     result, before = {}, None
     for name, found in stages.items():
         half = found.half_mw if before is None else math.hypot(found.half_mw, before.half_mw)

@@ -4,8 +4,8 @@
     python tools/power.py measure baseline=a.csv FC-FE=b.csv CCS-FF=c.csv filter=d.csv network=e.csv
     python tools/power.py estimate                              # no meter: from counted instructions
 
-A log has time, bus voltage and current in any order, told by the header (time_ms, bus_V, current_mA); without a
-header they are milliseconds, volts, milliamperes, as tools/power/ina219_logger.ino writes them. Each stage is
+A log has time, bus voltage and current in any order, told by the header (time_ms, bus_V, current_mA); without
+one they are milliseconds, volts, milliamperes, as tools/power/ina219_logger.ino writes them. Each stage is
 switched on beside those before it, so its power is what it adds. See host/docs/power.md.
 """
 
@@ -28,7 +28,7 @@ NAMES = {"baseline": "Basic drone module power", "FC-FE": "Fluctuation Component
          "CCS-FF": "Cascaded Cross-Spectrum Feature Fusion", "filter": "Double Phase Physical Filter",
          "network": "Physical Knowledge-aided Network"}
 STEP_HZ = 100.0
-ROOT = Path(__file__).resolve().parent.parent
+BUDGETS = Path(__file__).resolve().parent.parent / "tests" / "emulation"
 
 def table(stages: dict[str, Power]) -> str:
     """Table 1: what each stage adds, its energy a step, and the paper's figure."""
@@ -38,29 +38,33 @@ def table(stages: dict[str, Power]) -> str:
         a_step = "" if name == "baseline" else f"{1e3 * mw / STEP_HZ:.0f}"
         paper = f"{PAPER_MW[name]:.0f}" if name in PAPER_MW else ""
         s = stages[name]
-        lines.append(f"{NAMES.get(name, name):44} {interval:>22} {a_step:>11} {paper:>10} {s.lines:>7}, {s.seconds:5.1f}")
+        lines.append(f"{NAMES.get(name, name):44} {interval:>22} {a_step:>11} {paper:>10} "
+                     f"{s.lines:>7}, {s.seconds:5.1f}")
     total = list(stages.values())[-1]
-    lines.append(f"{'Total':44} {total.mw:8.1f} [{total.mw - total.half_mw:.1f}, {total.mw + total.half_mw:.1f}]"
-                 f"{'':>14} {PAPER_TOTAL_MW:>7.0f}")
+    interval = f"[{total.mw - total.half_mw:.1f}, {total.mw + total.half_mw:.1f}]"
+    lines.append(f"{'Total':44} {total.mw:8.1f} {interval}{'':>14} {PAPER_TOTAL_MW:>7.0f}")
     return "\n".join(lines)
 
 
 # Without a meter.
 
-#: mA that a busy STM32F405 at 168 MHz draws over a sleeping one. crazyflie-firmware, src/modules/src/system.c,
+#: mA that a busy STM32F405 at 168 MHz draws over a sleeping one. crazyflie-firmware,
+#: src/modules/src/system.c,
 #: vApplicationIdleHook: sleeping "currently saves about 20mA"; that is an average over a processor that also
 #: works, so the full difference is larger: twice that where it works half of the time.
 STM32_MA = (20.0, 40.0)
 STM32_HZ = 168e6
 STM32_CPI = (1.0, 2.0)  #: cycles an instruction; assumed: flash waits, loads and divisions make more than one
 BATTERY_V = 3.7  #: behind a linear regulator the battery gives the same current
-#: joules an instruction of one of the GAP8's eight cores, its whole board included: PULP-DroNet needs 64 mW with
+#: joules an instruction of one of the GAP8's eight cores, its whole board included: PULP-DroNet needs 64 mW
+#: with
 #: the cluster at 100 MHz, 1.0 V (Palossi et al., IEEE IoT Journal 2019); as if all cores were
 #: always busy, so at least that
 GAP8_J = 64e-3 / (8 * 100e6)
 GAP8_CORES = 8
 #: stage -> kernels of the budget that run in every step
-KERNELS = {"FC-FE": ("band_power",), "CCS-FF": ("cross_spectrum",), "filter": ("disturbance_force", "fr_cfar")}
+KERNELS = {"FC-FE": ("band_power",), "CCS-FF": ("cross_spectrum",),
+           "filter": ("disturbance_force", "fr_cfar")}
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,10 @@ def stm32_mw(instructions: float) -> tuple[float, float]:
 
 
 def instructions(budget: dict, kernel: str) -> float:
-    """Mean instructions a step of a kernel on the Cortex-M4. Raises AirTouchError where the budget lacks it."""
+    """Mean instructions a step of a kernel on the Cortex-M4.
+
+    Raises AirTouchError where the budget lacks it.
+    """
     try:
         return float(budget["cortex-m4"][kernel]["instructions_mean"])
     except (KeyError, TypeError, ValueError):
@@ -88,7 +95,8 @@ def instructions(budget: dict, kernel: str) -> float:
 
 
 def gap8_mw(network: dict) -> Estimate:
-    """A network on the GAP8: high is plain C, low the eight cores with their own instructions where they were counted."""
+    """A network on the GAP8: high is plain C, low the eight cores with their own instructions where they were
+    counted."""
     try:
         count = float(network.get("step_instructions", network.get("window_instructions")))
         cycles = GAP8_CORES * float(network["cycles_8"]) if "window_instructions" in network else count
@@ -113,15 +121,16 @@ def estimate(budget: dict, gap8: dict) -> dict[str, Estimate]:
 
 def estimate_table(found: dict[str, Estimate]) -> str:
     """The estimate as text that says what it is."""
-    lines = [f"{'ESTIMATE, nothing was measured':44} {'mW':>14} {'instructions a step':>20} {'paper, measured, mW':>20}"]
+    lines = [f"{'ESTIMATE, nothing was measured':44} {'mW':>14} {'instructions a step':>20} "
+             f"{'paper, measured, mW':>20}"]
     for name, e in found.items():
         shown = f"{e.low_mw:.2f} to {e.high_mw:.2f}" if e.high_mw > e.low_mw else f"{e.low_mw:.2f}"
         paper = PAPER_MW.get(name.split(",")[0])
         lines.append(f"{NAMES.get(name, name):44} {shown:>14} {e.instructions:>20.0f} "
                      f"{'' if paper is None else f'{paper:.0f}':>20}")
     return "\n".join([
-        *lines, "ESTIMATE: instructions counted in the emulator (tests/emulation/*budget.toml, limits 3 % above the counts), times",
-        f"1 to 2 cycles x 20 to 40 mA at 168 MHz x {BATTERY_V:g} V (STM32), {1e12 * GAP8_J:.0f} pJ (GAP8). "
+        *lines, "ESTIMATE: instructions counted in the emulator (tests/emulation/*budget.toml, 3 % above the counts)",
+        f"times 1 to 2 cycles x 20 to 40 mA at 168 MHz x {BATTERY_V:g} V (STM32), {1e12 * GAP8_J:.0f} pJ (GAP8). "
         "Sources and limits: host/docs/power.md"])
 
 
@@ -133,7 +142,8 @@ def main() -> None:
 @main.command()
 @click.argument("logs", nargs=-1, required=True)
 def measure(logs: tuple[str, ...]) -> None:
-    """LOGS: one file with a column of stages, or STAGE=FILE for each stage in the order in which they were added."""
+    """LOGS: one file with a column of stages, or STAGE=FILE for each stage in the order in which they were
+    added."""
     stages: dict[str, Power] = {}
     notes: list[str] = []
     for text in logs:
@@ -144,7 +154,8 @@ def measure(logs: tuple[str, ...]) -> None:
         except OSError as error:
             raise AirTouchError(f"{path}: cannot be read: {error.strerror}") from None
         notes += trace.notes
-        found = {canonical(name, tuple(PAPER_MW)): power(trace)} if equals else by_stage(trace, tuple(PAPER_MW))
+        known = tuple(PAPER_MW)
+        found = {canonical(name, known): power(trace)} if equals else by_stage(trace, known)
         if not found:
             raise AirTouchError(f"{path}: no column of stages; give STAGE=FILE for each stage")
         stages |= found
@@ -155,9 +166,9 @@ def measure(logs: tuple[str, ...]) -> None:
 
 
 @main.command("estimate")
-@click.option("--budget", type=click.Path(path_type=Path), default=ROOT / "tests" / "emulation" / "budget.toml",
+@click.option("--budget", type=click.Path(path_type=Path), default=BUDGETS / "budget.toml",
               help="Counted instructions of each kernel on the STM32.")
-@click.option("--gap8", type=click.Path(path_type=Path), default=ROOT / "tests" / "emulation" / "gap8_budget.toml",
+@click.option("--gap8", type=click.Path(path_type=Path), default=BUDGETS / "gap8_budget.toml",
               help="Counted instructions of each network on the GAP8.")
 def estimate_command(budget: Path, gap8: Path) -> None:
     """Without a meter: counted instructions times energy per instruction."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from airtouch.cli.scores import check_free
 from airtouch.errors import AirTouchError
 
 
@@ -23,31 +24,39 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 
 @click.command("collect")
 @click.option("--uri", help="Of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850.")
-@click.option("--mission", "mission_name", help="A ready mission, a scenario or a .toml file (the same that `simulate` flies).")
-@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder for the logs.")
+@click.option("--mission", "mission_name",
+              help="A ready mission, a scenario or a .toml file (the same that `simulate` flies).")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False),
+              help="Folder for the logs.")
 @click.option("--name", help="Of the files; the mission's if left out.")
-@click.option("--flights", "-n", default=1, show_default=True, help="How many; numbers go on from those that are there.")
-@click.option("--number", type=click.IntRange(min=1), help="Number of the first flight, instead of the next free one.")
+@click.option("--flights", "-n", default=1, show_default=True,
+              help="How many; numbers go on from those that are there.")
+@click.option("--number", type=click.IntRange(min=1),
+              help="Number of the first flight, instead of the next free one.")
 @click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Written into the log.")
-@click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE", help="Set a parameter of the drone first.")
-@click.option("--min-battery", default=3.7, show_default=True, metavar="V", help="Least voltage on the ground.")
+@click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
+              help="Set a parameter of the drone first.")
+@click.option("--min-battery", default=3.7, show_default=True, metavar="V",
+              help="Least voltage on the ground.")
 @click.option("--link-timeout", default=3.0, show_default=True, metavar="S",
               help="Silence after which it lands as soon as it is heard again.")
 @click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
-@click.option("--cache", type=click.Path(path_type=Path), help="Folder for the drone's tables, so that it connects faster; ~/.cache/airtouch if left out.")
+@click.option("--cache", type=click.Path(path_type=Path),
+              help="Folder for the drone's tables, to connect faster; ~/.cache/airtouch if left out.")
 @click.option("--yes", "-y", is_flag=True, help="Take off without asking.")
 @click.option("--force", is_flag=True, help="Replace a flight that has the number already.")
 @click.option("--recover", is_flag=True, help="Only finish what killed flights left in --out.")
 @click.option("--list-missions", is_flag=True, is_eager=True, expose_value=False, callback=_list_missions,
               help="Every ready mission, and exit.")
-def command(uri: str | None, mission_name: str | None, out: Path, name: str | None, flights: int, number: int | None,
-            vehicle: str, settings: tuple[str, ...], min_battery: float, link_timeout: float, seed: int,
-            cache: Path | None, yes: bool, force: bool, recover: bool) -> None:
+def command(uri: str | None, mission_name: str | None, out: Path, name: str | None, flights: int,
+            number: int | None, vehicle: str, settings: tuple[str, ...], min_battery: float,
+            link_timeout: float, seed: int, cache: Path | None, yes: bool, force: bool,
+            recover: bool) -> None:
     """Fly a mission with the drone's high-level commander and log it at 100 Hz.
 
     \b
     airtouch collect --uri radio://0/80/2M/E7E7E7E7E7 --mission there-and-back --out flights
-    airtouch collect --uri udp://127.0.0.1:19850 --mission sweep.toml --out flights   # with `airtouch sitl` running
+    airtouch collect --uri udp://127.0.0.1:19850 --mission sweep.toml --out flights   # beside `airtouch sitl`
 
     Ctrl-C lands. Every row is on the disk at once, in NAME_0001.csv.gz.part until the flight is over.
     Exit code 1 when a flight ended early; its log is kept and listed as messy.
@@ -58,7 +67,8 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
 
     if recover:
         found, unreadable = recorder.recover(out)
-        click.echo("\n".join([f"recovered: {path}" for path in found] + unreadable) or f"{out}: nothing to recover")
+        lines = [f"recovered: {path}" for path in found] + unreadable
+        click.echo("\n".join(lines) or f"{out}: nothing to recover")
         sys.exit(2 if unreadable else 0)
     if not uri or not mission_name:
         raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
@@ -70,8 +80,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
                         link_timeout, force)
     collect.prepare_folder(out, click.echo)
     first_number = number or recorder.next_number(out, name)
-    if recorder.flight_path(out, name, first_number).exists() and not force:
-        raise AirTouchError(f"{recorder.flight_path(out, name, first_number)}: exists already; use --force to replace it")
+    check_free(recorder.flight_path(out, name, first_number), force)
     click.echo(first.describe())
     asked = sys.stdin.isatty() and not yes
     early = 0
@@ -79,12 +88,15 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         drone = collect.Drone(uri, cache or default_cache())
         try:
             for flight_number in range(first_number, first_number + flights):
-                ready = collect.make_ready(drone, plan, click.echo) if flight_number == first_number else ready
+                if flight_number == first_number:
+                    ready = collect.make_ready(drone, plan, click.echo)
                 if asked:
-                    click.confirm(f"flight {flight_number}: drone at the start, nose along x, room clear?", abort=True)
+                    click.confirm(f"flight {flight_number}: drone at the start, nose along x, room clear?",
+                                  abort=True)
                 flown = mission.load(mission_name, seed, flight_number)
                 with _shown(flown.seconds) as show:
-                    outcome = collect.fly(drone, ready, flown, plan, flight_number, stop=stop, say=click.echo, show=show)
+                    outcome = collect.fly(drone, ready, flown, plan, flight_number, stop=stop,
+                                          say=click.echo, show=show)
                 _report(outcome)
                 early += not outcome.planned
                 if early:
@@ -147,7 +159,8 @@ def _shown(seconds: float):
 
 
 def _label(flight) -> str:
-    return flight.pilot.leg.kind if flight.pilot.phase == "mission" and flight.pilot.leg else flight.pilot.phase
+    pilot = flight.pilot
+    return pilot.leg.kind if pilot.phase == "mission" and pilot.leg else pilot.phase
 
 
 def _flown(flight) -> float:
@@ -168,7 +181,7 @@ def _report(outcome) -> None:
     start = log["t_s"][0]
     edges = logs.true_edges(log)
     for edge in edges:
-        click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: down range {edge.height_before_m:.2f} "
-                   f"to {edge.height_after_m:.2f} m")
+        click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: "
+                   f"down range {edge.height_before_m:.2f} to {edge.height_after_m:.2f} m")
     if not edges:
         click.echo("no true edge: the down range never stepped by more than 0.30 m in flight")

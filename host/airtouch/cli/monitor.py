@@ -12,10 +12,13 @@ from airtouch.cli.replay import screen
 @click.option("--uri", required=True, help="Of the drone: radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850.")
 @click.option("--duration", type=click.FloatRange(0, min_open=True), metavar="S", help="Stop after so long.")
 @click.option("--host-detector", is_flag=True,
-              help="Run the detector here, from the raw log, though the drone has the app; without the app it always does.")
-@click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE", help="Set a parameter of the drone first.")
-@click.option("--cache", type=click.Path(path_type=Path), help="Folder for the drone's tables, so that it connects faster; ~/.cache/airtouch if left out.")
-def command(uri: str, duration: float | None, host_detector: bool, settings: tuple[str, ...], cache: Path | None) -> None:
+              help="Run the detector here though the drone has the app; without the app it always does.")
+@click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
+              help="Set a parameter of the drone first.")
+@click.option("--cache", type=click.Path(path_type=Path),
+              help="Folder for the drone's tables, to connect faster; ~/.cache/airtouch if left out.")
+def command(uri: str, duration: float | None, host_detector: bool, settings: tuple[str, ...],
+            cache: Path | None) -> None:
     """Show signals, P(over a platform), edges on a map, losses and latency; never flies.
 
     \b
@@ -38,9 +41,12 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
             for name, text in pairs:
                 drone.set_parameter(name, text)
             slow, detector = monitor.start(drone, host_detector)
-            board = boards.Board(uri, "best on the host" if detector else "the app", detector.lag_s if detector else 0.0)
+            board = boards.Board(uri, "the app")
+            if detector:
+                board = boards.Board(uri, "best on the host", detector.lag_s)
             with screen() as (show, say):
-                watcher = monitor.Monitor(board, Intake(slow), detector, lambda felt: say(boards.edge_line(felt)))
+                watcher = monitor.Monitor(board, Intake(slow), detector,
+                                          lambda felt: say(boards.edge_line(felt)))
                 monitor.watch(drone, watcher, duration, stop, show, say)
         finally:
             drone.close()

@@ -12,11 +12,12 @@ from airtouch.errors import AirTouchError
 
 @click.command("replay")
 @click.argument("flight", type=click.Path(path_type=Path))
-@click.option("--speed", default=0.0, show_default="as fast as it goes", metavar="X", type=click.FloatRange(0, 1000),
-              help="Times real time; 1 is as it was flown.")
+@click.option("--speed", default=0.0, show_default="as fast as it goes", metavar="X",
+              type=click.FloatRange(0, 1000), help="Times real time; 1 is as it was flown.")
 @click.option("--flown-at", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
               help="Commanded speed of a flight whose manifest does not say; turns seconds into metres.")
-@click.option("--model", type=click.Path(path_type=Path), help="Trained `best` model (.npz); the shipped one if left out.")
+@click.option("--model", type=click.Path(path_type=Path),
+              help="Trained `best` model (.npz); the shipped one if left out.")
 def command(flight: Path, speed: float, flown_at: float | None, model: Path | None) -> None:
     """Feed FLIGHT sample by sample to the detector that flies, and show it as `monitor` shows a drone.
 
@@ -50,7 +51,8 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     if result.score.false:
         click.echo("false: " + ", ".join(f"{s / 100:.2f} s" for s in result.score.false))
     figures = evaluate.as_json("best", [result.score], [], detector.lag_s, {})
-    table_of.console().print(table_of.table({"best": figures}, f"best: lag of {detector.lag_s:.2f} s taken off"))
+    title = f"best: lag of {detector.lag_s:.2f} s taken off"
+    table_of.console().print(table_of.table({"best": figures}, title))
 
 
 def _in_words(edge) -> str:
@@ -58,7 +60,8 @@ def _in_words(edge) -> str:
     if edge.detected_sample is None:
         return f"{true}: missed"
     metres = "" if edge.error_m is None else f" = {edge.error_m:+.3f} m"
-    return f"{true}: said at {edge.detected_sample / 100:.2f} s, error {edge.error_s:+.2f} s{metres} (+ is early)"
+    said = f"said at {edge.detected_sample / 100:.2f} s"
+    return f"{true}: {said}, error {edge.error_s:+.2f} s{metres} (+ is early)"
 
 
 class screen:

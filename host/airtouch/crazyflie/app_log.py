@@ -8,20 +8,22 @@ from airtouch.crazyflie.blocks import Block, available
 GROUP = "airtouch"
 #: names as in firmware/app/src/airtouch_app.c; 25 bytes
 WANTED = Block("airtouch", 50, tuple((f"{GROUP}.{name}", kind) for name, kind in (
-    ("prob", "FP16"), ("edges", "uint16_t"), ("edge", "uint8_t"), ("edgeStep", "uint32_t"), ("steps", "uint32_t"),
-    ("health", "uint16_t"), ("load", "uint16_t"), ("timeouts", "uint16_t"), ("lost", "uint16_t"), ("dropped", "uint16_t"),
-    ("detector", "uint8_t"), ("link", "uint8_t"))))
+    ("prob", "FP16"), ("edges", "uint16_t"), ("edge", "uint8_t"), ("edgeStep", "uint32_t"),
+    ("steps", "uint32_t"), ("health", "uint16_t"), ("load", "uint16_t"), ("timeouts", "uint16_t"),
+    ("lost", "uint16_t"), ("dropped", "uint16_t"), ("detector", "uint8_t"), ("link", "uint8_t"))))
 KINDS = {1: "entry", 2: "exit"}
 DETECTORS = {0: "FR-CFAR on the STM32", 1: "best on the STM32", 2: "best on the GAP8", 3: "paper on the GAP8"}
 #: appHealth_t of firmware/app
 HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GAP8 fills its window",
-          8: "the GAP8 has another model", 16: "a setting was out of range", 32: "another detector runs than the wanted one",
-          64: "the CPX queue was full", 128: "a step began late", 256: "the app stands still", 512: "a log variable is missing"}
+          8: "the GAP8 has another model", 16: "a setting was out of range",
+          32: "another detector runs than the wanted one", 64: "the CPX queue was full",
+          128: "a step began late", 256: "the app stands still", 512: "a log variable is missing"}
 
 
 @dataclass(frozen=True)
 class AppState:
-    """One packet of the app: P(over a platform), edges so far, the last one's kind and age (s), what is wrong."""
+    """One packet of the app: P(over a platform), edges so far, the last one's kind and age (s), what is
+    wrong."""
 
     probability: float
     edges: int
@@ -48,5 +50,7 @@ def state(values: Mapping[str, float]) -> AppState:
     if health & 2 and value("timeouts"):
         faults[faults.index(HEALTH[2])] += f" ({int(value('timeouts'))} timeouts)"
     age = max(value("steps") - value("edgeStep"), 0.0) * 0.01 if f"{GROUP}.edgeStep" in values else 0.0
-    return AppState(value("prob", float("nan")), int(value("edges")), KINDS.get(int(value("edge")), "edge"), age,
-                    DETECTORS.get(int(value("detector", -1)), "the app's detector"), value("load"), tuple(faults))
+    kind = KINDS.get(int(value("edge")), "edge")
+    detector = DETECTORS.get(int(value("detector", -1)), "the app's detector")
+    return AppState(value("prob", float("nan")), int(value("edges")), kind, age, detector, value("load"),
+                    tuple(faults))

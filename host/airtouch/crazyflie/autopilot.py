@@ -81,7 +81,8 @@ class Autopilot:
             return
         self.refused = f"the drone refused {kind} (code {code}); restart it"
         if code == BUSY:
-            self.refused = f"the drone's supervisor refuses {kind}: it is not ready to fly; put it upright and restart it"
+            self.refused = (f"the drone's supervisor refuses {kind}: it is not ready to fly; "
+                            "put it upright and restart it")
         self.in_air = self.in_air and kind != "take-off"
         self.land(self.refused)
 
@@ -97,7 +98,7 @@ class Autopilot:
         self._until_s = -math.inf
 
     def step(self, now_s: float, wall_s: float, silence_s: float = 0.0) -> list[Command]:
-        """Commands to send now. now_s: the drone's clock. wall_s: the host's. silence_s: since a packet came."""
+        """Commands to send now. now_s: drone's clock, wall_s: host's; silence_s: since a packet came."""
         if self.phase == "done":
             return []
         if self._command is not None and not self._answered:

@@ -13,7 +13,8 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.variables import to_columns
 
 MOST_BYTES = 26  #: of values in one log packet (LOG_MAX_LEN in the firmware)
-SIZES = {"uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "FP16": 2, "uint32_t": 4, "int32_t": 4, "float": 4}
+SIZES = {"uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "FP16": 2, "uint32_t": 4, "int32_t": 4,
+         "float": 4}
 DECIMALS = 6  #: of logged values, in their SI units; FP16 is far coarser
 
 
@@ -41,7 +42,8 @@ def _each(group: str, names: str, kind: str) -> tuple[tuple[str, str], ...]:
 
 
 MOTION = Block("motion", 10, _each("acc", "x y z", "FP16") + _each("gyro", "x y z", "FP16")
-               + _each("motor", "m1 m2 m3 m4", "uint16_t") + (("range.zrange", "uint16_t"), ("pm.vbat", "FP16")))
+               + _each("motor", "m1 m2 m3 m4", "uint16_t")
+               + (("range.zrange", "uint16_t"), ("pm.vbat", "FP16")))
 STATE = Block("state", 50, _each("stateEstimateZ", "x y z vx vy vz", "int16_t")
               + (("stateEstimateZ.quat", "uint32_t"),) + _each("range", "front back left right", "uint16_t")
               + (("supervisor.info", "uint16_t"),))
@@ -62,7 +64,8 @@ def check(block: Block, known: Collection[str]) -> None:
 
 def available(block: Block, known: Collection[str], without: Collection[str] = ()) -> Block:
     """The block with the variables that the firmware has, less `without`."""
-    return replace(block, variables=tuple(v for v in block.variables if v[0] in known and v[0] not in without))
+    kept = (v for v in block.variables if v[0] in known and v[0] not in without)
+    return replace(block, variables=tuple(kept))
 
 
 def motion_columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
@@ -84,8 +87,9 @@ def _columns(names: Sequence[str], rows: Sequence[Mapping[str, float]]) -> dict[
             if not name.startswith("acc_world")}
 
 
-def hold(times_s: np.ndarray, slow_times_s: np.ndarray, slow: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Slow columns at the fast block's times: the last value not older than HELD_S, NaN where there is none."""
+def hold(times_s: np.ndarray, slow_times_s: np.ndarray,
+         slow: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Slow columns at the fast block's times: the last value not older than HELD_S, else NaN."""
     order = np.argsort(slow_times_s, kind="stable")
     sorted_times = np.asarray(slow_times_s)[order]
     last = np.searchsorted(sorted_times, np.asarray(times_s) + 1e-9, side="right") - 1

@@ -64,11 +64,12 @@ class Board:
     now_s: float = 0.0
     felt: list[Felt] = field(default_factory=list)
     latest: dict[str, float] = field(default_factory=dict)
-    _signals: dict[str, deque] = field(default_factory=lambda: {n: deque(maxlen=int(100 * SECONDS)) for n in SIGNALS})
+    _signals: dict[str, deque] = field(
+        default_factory=lambda: {name: deque(maxlen=int(100 * SECONDS)) for name in SIGNALS})
     _track: list[tuple[float, float, float]] = field(default_factory=list)
 
     def add(self, times_s: np.ndarray, columns: Mapping[str, np.ndarray], probability: np.ndarray) -> None:
-        """New rows: seconds from the start (n,), SI columns (n,), P(over a platform) (n,), NaN where unknown."""
+        """New rows: seconds from the start, SI columns, P(over a platform) or NaN; each (n,)."""
         if not len(times_s):
             return
         self.now_s = float(times_s[-1])
@@ -92,10 +93,11 @@ class Board:
     def line(self) -> str:
         """One line for where there is no terminal."""
         value = self.latest.get
-        parts = [f"{self.now_s:7.1f} s", f"P {self._last('P(over)'):.2f}", f"down {value('zrange_m', np.nan):.2f} m",
-                 f"{len(self.felt)} edges"]
+        parts = [f"{self.now_s:7.1f} s", f"P {self._last('P(over)'):.2f}",
+                 f"down {value('zrange_m', np.nan):.2f} m", f"{len(self.felt)} edges"]
         parts += [f"{value('vbat_V'):.2f} V"] if np.isfinite(value("vbat_V", np.nan)) else []
-        return "  ".join(parts + ([str(self.link)] if self.link else []) + ([self.status] if self.status else []))
+        parts += [str(self.link)] if self.link else []
+        return "  ".join(parts + ([self.status] if self.status else []))
 
     def render(self):
         """The whole view for rich."""
@@ -110,13 +112,15 @@ class Board:
                             f"{self._last(name):8.2f} {unit}")
         if np.isfinite(self.latest.get("vbat_V", np.nan)):
             signals.add_row("battery", "", f"{self.latest['vbat_V']:8.2f} V")
-        edges = [f"{f.kind:5} {f.at_s:6.2f} s  x {f.x_m:+.2f} y {f.y_m:+.2f} m  P {f.probability:.2f}" for f in self.felt[-6:]]
+        edges = [f"{f.kind:5} {f.at_s:6.2f} s  x {f.x_m:+.2f} y {f.y_m:+.2f} m  P {f.probability:.2f}"
+                 for f in self.felt[-6:]]
         below = "\n".join([f"edges ({len(self.felt)}, {self.detector})", *edges])
         track = np.array([(x, y) for _, x, y in self._track]).reshape(-1, 2)
         plan = Text("\n".join(text_map(track, [(f.x_m, f.y_m, f.kind) for f in self.felt])))
         foot = "   ".join(part for part in (str(self.link) if self.link else "", self.status) if part)
-        return Panel(Columns([Panel(signals, title="last 10 s"), Panel(plan, title="from above: [ entry  ] exit  o drone"),
-                              Panel(below)]), title=f"{self.title}   {self.now_s:.1f} s", subtitle=foot)
+        panels = [Panel(signals, title=f"last {SECONDS:g} s"),
+                  Panel(plan, title="from above: [ entry  ] exit  o drone"), Panel(below)]
+        return Panel(Columns(panels), title=f"{self.title}   {self.now_s:.1f} s", subtitle=foot)
 
     def _last(self, name: str) -> float:
         return float(self._signals[name][-1]) if self._signals[name] else float("nan")

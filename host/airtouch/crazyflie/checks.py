@@ -38,7 +38,8 @@ def problems(seen: Condition, least_v: float = LEAST_V) -> list[str]:
         found.append("no Flow deck found (deck.bcFlow2 is 0): without it the drone cannot hold its place; "
                      "attach it and restart the drone")
     elif seen.zrange_m is not None and not seen.zrange_m < 0.3:
-        found.append(f"the down range reads {seen.zrange_m:.2f} m on the ground; clean or replace the Flow deck's sensor")
+        found.append(f"the down range reads {seen.zrange_m:.2f} m on the ground; "
+                     "clean or replace the Flow deck's sensor")
     if seen.supervisor is not None:
         found += [f"the drone {what}; put it upright and restart it" for what, bit in CONFLICTS.items()
                   if seen.supervisor >> bit & 1]
@@ -70,9 +71,11 @@ def representable(name: str, text: str, ctype: str) -> float:
         try:
             value = int(text, 0)
         except ValueError:
-            raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; give a whole number") from None
+            raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; "
+                                "give a whole number") from None
         if not low <= value <= high:
-            raise AirTouchError(f"{name} = {text}: out of range; the drone keeps it as {ctype}, {low} to {high}")
+            raise AirTouchError(f"{name} = {text}: out of range; "
+                                f"the drone keeps it as {ctype}, {low} to {high}")
         return value
     try:
         value = float(text)

@@ -83,7 +83,8 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
     if not os.access(out, os.W_OK):
         raise AirTouchError(f"{out}: cannot be written to; choose another --out")
     if free < LEAST_FREE_BYTES:
-        raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, {LEAST_FREE_BYTES / 2**20:.0f} are needed")
+        raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, "
+                            f"{LEAST_FREE_BYTES / 2**20:.0f} are needed")
     found, unreadable = recorder.recover(out)
     for path in found:
         say(f"{path}: recovered from a flight whose process was killed")
@@ -98,7 +99,8 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
     """
     known = drone.variables
     blocks.check(blocks.MOTION, known)
-    decks = {deck: bool(drone.parameter(f"deck.{deck}") or 0) for deck in DECKS if drone.has_parameter(f"deck.{deck}")}
+    decks = {deck: bool(drone.parameter(f"deck.{deck}") or 0) for deck in DECKS
+             if drone.has_parameter(f"deck.{deck}")}
     without = () if decks.get("bcMultiranger") else blocks.MULTIRANGER
     slow = blocks.available(blocks.STATE, known, without)
     blocks.check(slow, known)
@@ -130,7 +132,8 @@ def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake
             return intake
         time.sleep(0.02)
     if not intake.received:
-        raise AirTouchError(f"the log block started, but no data came within {patience_s:g} s; is the link good?")
+        raise AirTouchError(f"the log block started, but no data came within {patience_s:g} s; "
+                            "is the link good?")
     return intake
 
 
@@ -163,8 +166,8 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
     """One flight, from the ground to the file. Raises AirTouchError where it could not be written."""
     reset_estimator(drone)
     standing = listen(drone, ready.slow, FIRST_DATA_S)
-    found = checks.problems(replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor),
-                            plan.least_v)
+    now = replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor)
+    found = checks.problems(now, plan.least_v)
     if found:
         raise AirTouchError(f"not ready: {found[0]}")
     origin = origin_of(standing.latest)
@@ -172,10 +175,12 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
     path = recorder.flight_path(plan.out, plan.name, number)
     book = Recorder(path, intake.names, meta_of(drone, ready, mission, plan, number), plan.force)
     height = max((leg.z_m for leg in mission.legs), default=0.0)
-    watch = guarding(plan.uri, origin.z_m, max(2.0, height / LANDING_MPS)) if plan.guarded else nullcontext(None)
+    down_s = max(2.0, height / LANDING_MPS)
+    watch = guarding(plan.uri, origin.z_m, down_s) if plan.guarded else nullcontext(None)
     ended = "an error"
     with watch as guard:
-        flight = Flight(drone, Autopilot(mission.legs, origin), intake, book, stop, plan.link_timeout_s, show, say)
+        flight = Flight(drone, Autopilot(mission.legs, origin), intake, book, stop, plan.link_timeout_s, show,
+                        say)
         try:
             ended = flight.run()
         finally:
@@ -195,8 +200,9 @@ def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number
     now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
     held = {"period_s": blocks.STATE.period_ms / 1000.0, "longest_s": blocks.HELD_S} if ready.slow else {}
     return {
-        "vehicle": plan.vehicle, "condition": dict(mission.values), "acc_frame": "body", "mission": mission.name,
-        "speed_mps": mission.speed_mps, "flight": number, "firmware": ready.firmware, "protocol": drone.protocol,
+        "vehicle": plan.vehicle, "condition": dict(mission.values), "acc_frame": "body",
+        "mission": mission.name, "speed_mps": mission.speed_mps, "flight": number,
+        "firmware": ready.firmware, "protocol": drone.protocol,
         "decks": sorted(deck for deck, there in ready.condition.decks.items() if there), "uri": plan.uri,
         "started": now, "recorded_by": f"airtouch {__version__}", "held_columns": held, "warnings": [],
         "settings": [f"{name}={text}" for name, text in plan.settings],

@@ -40,7 +40,7 @@ class Sample:
 
 
 class Drone:
-    """A connected drone. `samples` and `answers` fill up from cflib's thread; everything else is called from ours.
+    """A connected drone. `samples` and `answers` fill up from cflib's thread; all else is called from ours.
 
     Raises AirTouchError for a URI that nobody answers at.
     """
@@ -67,11 +67,14 @@ class Drone:
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
         cf.add_header_callback(self._on_log_setting, LOG_PORT, SETTINGS_CHANNEL)
-        cf.link_statistics.stop()  # its thread would wait for itself, for ever, where the link breaks under it
+        cf.link_statistics.stop()  # its thread would wait for itself where the link breaks under it
         cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
 
     def reopen(self, patience_s: float) -> None:
-        """Connect anew after the link died, with the same log blocks. Raises AirTouchError if it stays dead."""
+        """Connect anew after the link died, with the same log blocks.
+
+        Raises AirTouchError if it stays dead.
+        """
         disconnect(self._cf)
         self._listen(connect(self.uri, self.cache, patience_s, self._console.put))
         for block in self.blocks:
@@ -149,7 +152,10 @@ class Drone:
     # log blocks
 
     def start(self, block: Block) -> None:
-        """Have a block logged into `samples`. Raises AirTouchError that says what the drone has against it."""
+        """Have a block logged into `samples`.
+
+        Raises AirTouchError that says what the drone has against it.
+        """
         reason = f"log block {block.name}: the drone sends none of it; is the link good?"
         for _ in range(BLOCK_ATTEMPTS):
             drain(self._refusals)
@@ -158,8 +164,8 @@ class Drone:
             while not came.wait(0.02) and time.monotonic() < until:
                 if not self._refusals.empty():
                     command, code = self._refusals.get()
-                    reason = (f"log block {block.name} rejected: the drone could not {LOG_COMMANDS[command]} it: "
-                              f"{LOG_ERRORS.get(code, f'error {code}')}")
+                    reason = (f"log block {block.name} rejected: the drone could not "
+                              f"{LOG_COMMANDS[command]} it: {LOG_ERRORS.get(code, f'error {code}')}")
                     break
             if came.is_set():
                 if block not in self.blocks:
@@ -168,7 +174,10 @@ class Drone:
         raise AirTouchError(reason)
 
     def _configure(self, block: Block) -> threading.Event:
-        """Ask for the block under a new number; the event is set by its first packet. An older one is given up."""
+        """Ask for the block under a new number; the event is set by its first packet.
+
+        An older one is given up.
+        """
         from cflib.crazyflie.log import LogConfig
 
         config, came = LogConfig(block.name, block.period_ms), threading.Event()
@@ -192,7 +201,7 @@ class Drone:
         return came
 
     def revive(self) -> None:
-        """Ask for the log blocks again, in the background: the firmware forgets them when the link is down for 1 s."""
+        """Ask for the log blocks again, in the background: with the link down the firmware forgets them."""
         if self._reviving is None or not self._reviving.is_alive():
             self._reviving = threading.Thread(target=self._revive, daemon=True)
             self._reviving.start()
@@ -223,7 +232,10 @@ class Drone:
             self.round_trip_s = time.time() - struct.unpack("<Bd", packet.data)[1]
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Send commands to the high-level commander; answers come in `answers`. Nothing is sent on a dead link."""
+        """Send commands to the high-level commander; answers come in `answers`.
+
+        Nothing is sent on a dead link.
+        """
         if self.lost.is_set():
             return
         high = self._cf.high_level_commander

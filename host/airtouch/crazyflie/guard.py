@@ -35,8 +35,8 @@ class Guard:
 @contextlib.contextmanager
 def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
     """While the body runs, another process stands by to land."""
-    process = subprocess.Popen([sys.executable, "-m", "airtouch.crazyflie.guard", uri, str(height_m), str(seconds)],
-                               stdin=subprocess.PIPE, start_new_session=True)
+    command = [sys.executable, "-m", "airtouch.crazyflie.guard", uri, str(height_m), str(seconds)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
     guard = Guard()
     try:
         yield guard
@@ -91,7 +91,8 @@ def main() -> None:
     sys.stdin.read()
     uri, height, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
     done = land(uri, height, seconds)
-    print(f"airtouch: the flying process is gone; {'landing' if done else 'NO CONTACT, land by hand'}", file=sys.stderr)
+    what = "landing" if done else "NO CONTACT, land by hand"
+    print(f"airtouch: the flying process is gone; {what}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,10 @@ MOST_FILLED = 100  #: samples of a gap that are given to the detector as missing
 
 
 class HostDetector:
-    """The C that flies, sample by sample. `next` takes rows, `trace` gives what `best.run` gives of all of them."""
+    """The C that flies, sample by sample.
+
+    `next` takes rows, `trace` gives what `best.run` gives of all of them.
+    """
 
     def __init__(self, model: StreamModel | None = None) -> None:
         self.model = model or best.load(None)
@@ -28,18 +31,23 @@ class HostDetector:
         self.taken = 0  #: rows so far
 
     def next(self, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[Detection]]:
-        """(P(over a platform) (n,), the edges reported at these rows). Raises AirTouchError for missing columns."""
+        """(P(over a platform) (n,), the edges reported at these rows).
+
+        Raises AirTouchError for missing columns.
+        """
         log = FlightLog(dict(columns), {"source": "live"})
         events = self._session.next(level_acceleration(log), log.stack(GYRO), log.stack(PWM))
-        for kept, new in ((self._logits, events.logits), (self._edge, events.edge), (self._airborne, events.airborne)):
-            kept.append(new)
+        self._logits.append(events.logits)
+        self._edge.append(events.edge)
+        self._airborne.append(events.airborne)
         recent = (self.model.decoder.hold_steps + self.model.decoder.look_back) * STRIDE
         found = []
         for i in np.flatnonzero(events.edge):
             past = np.concatenate(self._logits[-recent:])[-(recent + len(log)):]
             upto = len(past) - len(log) + int(i)
             crossing = past[max(upto - recent, 0):upto + 1, int(events.edge[i])].max()
-            found.append(Detection(self.taken + int(i), best.KINDS[int(events.edge[i])], _sigmoid(float(crossing))))
+            kind = best.KINDS[int(events.edge[i])]
+            found.append(Detection(self.taken + int(i), kind, _sigmoid(float(crossing))))
         self.taken += len(log)
         over = _sigmoid(events.logits[:, 0].astype(np.float64))
         return np.where(events.airborne, over, 0.0), found

@@ -76,7 +76,8 @@ class Intake:
             rows = [values for _, values in self._past] or [dict.fromkeys(self.slow.names, 0)]
             slow_times = np.array([at for at, _ in self._past], dtype=np.float64) / 1000.0
             slow = blocks.state_columns(self.slow, rows)
-            columns |= blocks.hold(times / 1000.0, slow_times, {n: v[:len(slow_times)] for n, v in slow.items()})
+            slow = {name: values[:len(slow_times)] for name, values in slow.items()}
+            columns |= blocks.hold(times / 1000.0, slow_times, slow)
         self.latest = {name: float(values[-1]) for name, values in columns.items()}
         return times, columns
 

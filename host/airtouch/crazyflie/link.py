@@ -14,7 +14,10 @@ ATTEMPT_S = 2.0  #: without a packet; cflib never asks twice for the first two
 
 
 def cflib_or_error() -> Any:
-    """The cflib package; AirTouchError with the remedy where it is not installed. Its own messages are silenced."""
+    """The cflib package; AirTouchError with the remedy where it is not installed.
+
+    Its own messages are silenced.
+    """
     try:
         import cflib.crtp
         import cflib.crazyflie

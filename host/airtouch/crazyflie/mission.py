@@ -58,8 +58,8 @@ class Mission:
         """One line: what is flown and how much room it takes."""
         x0, x1, y0, y1, z1 = self.room_m
         speed = f", {self.speed_mps:g} m/s" if self.speed_mps else ""
-        return (f"{self.name}: {self.seconds:.0f} s{speed}; x {x0:.1f} to {x1:.1f} m ahead, y {y0:.1f} to {y1:.1f} m "
-                f"to the left, up to {z1:.2f} m high")
+        return (f"{self.name}: {self.seconds:.0f} s{speed}; x {x0:.1f} to {x1:.1f} m ahead, "
+                f"y {y0:.1f} to {y1:.1f} m to the left, up to {z1:.2f} m high")
 
 
 def names() -> list[str]:

@@ -100,8 +100,8 @@ class Monitor:
                                i.lost / total if total else 0.0, i.lateness_s, round_trip_s, silent)
 
 
-def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event, show: Callable[[Board], None],
-          say: Callable[[str], None]) -> None:
+def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
+          show: Callable[[Board], None], say: Callable[[str], None]) -> None:
     """Until the duration is over or `stop` is set; a broken link is opened again for as long."""
     until = time.monotonic() + duration_s if duration_s else float("inf")
     pinged = 0.0

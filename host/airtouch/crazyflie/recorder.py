@@ -63,7 +63,8 @@ class Recorder:
 
     def add(self, times_ms: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
         """Append rows: the drone's clock (n,) in ms and SI columns (n,). Never raises."""
-        table = np.column_stack([times_ms / 1000.0 if name == "t_s" else columns[name] for name in self.names])
+        columns = {**columns, "t_s": times_ms / 1000.0}
+        table = np.column_stack([columns[name] for name in self.names])
         self._rows.append(table)
         self._times.append(np.asarray(times_ms, dtype=np.int64))
         if self.error is None:
@@ -75,13 +76,14 @@ class Recorder:
         table = np.concatenate([np.empty((0, len(self.names))), *self._rows])
         kept = in_order(times)
         missing = gaps(times[kept])
-        counted = {"lost_samples": sum(g.lost for g in missing), "longest_gap_s": max((g.seconds for g in missing), default=0.0),
+        counted = {"lost_samples": sum(g.lost for g in missing),
+                   "longest_gap_s": max((g.seconds for g in missing), default=0.0),
                    "doubled_samples": int(len(times) - len(kept))}
         return FlightLog({name: table[kept, i] for i, name in enumerate(self.names)},
                          {"source": str(self.path), "format": "canonical", **self.meta, **counted, **meta})
 
     def finish(self, **meta: Any) -> FlightLog:
-        """Write the whole log under its own name and remove the unfinished file; without rows only the latter.
+        """Write the whole log under its own name and remove the unfinished file; without rows only remove it.
 
         Raises AirTouchError where it cannot be written; the unfinished file then stays.
         """
@@ -115,7 +117,7 @@ class Recorder:
 
 
 def recover(folder: Path) -> tuple[list[Path], list[str]]:
-    """Finish what killed flights left in a folder: sorted, gaps counted. Returns (files, what could not be read).
+    """Finish what killed flights left in a folder: sorted, gaps counted. Returns (files, complaints).
 
     Files that another process still writes are passed over; what cannot be read stays as it is.
     """

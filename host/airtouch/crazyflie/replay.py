@@ -18,16 +18,20 @@ CHUNK = 5  #: rows a turn, 50 ms
 
 
 def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
-    """x_m, y_m of a log that has none, at constant speed straight ahead while in the air; nothing without a speed."""
+    """x_m, y_m of a log that has none: constant speed straight ahead while in the air; nothing without it."""
     if log.has("x_m", "y_m") or speed_mps is None:
         return {}
     along = np.cumsum(airborne(log)) * SAMPLE_PERIOD_S * speed_mps
     return {"x_m": along, "y_m": np.zeros(len(log))}
 
 
-def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 0.0, speed_mps: float | None = None,
-        stop: Event, show: Callable[[Board], None] = lambda _: None, felt: Callable[[Felt], None] = lambda _: None) -> int:
-    """Feed the log in steps of 50 ms, at `speed` times real time, 0 for as fast as it goes. Returns the rows fed."""
+def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 0.0,
+        speed_mps: float | None = None, stop: Event, show: Callable[[Board], None] = lambda _: None,
+        felt: Callable[[Felt], None] = lambda _: None) -> int:
+    """Feed the log in steps of 50 ms, at `speed` times real time, 0 for as fast as it goes.
+
+    Returns the rows fed.
+    """
     columns = {**log.columns, **position(log, speed_mps)}
     began = time.monotonic()
     for first in range(0, len(log), CHUNK):
@@ -50,6 +54,6 @@ def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 
 def result(file: FlightFile, log: FlightLog, detector: HostDetector) -> evaluate.Result:
     """What `evaluate` says of the flight, from what the detector said step by step."""
     trace = detector.trace(log)
-    score = score_flight(file.path.name, file.condition, evaluate.truth(log), airborne(log), trace.probability,
-                         trace.edges, best.lag_s(detector.model))
+    score = score_flight(file.path.name, file.condition, evaluate.truth(log), airborne(log),
+                         trace.probability, trace.edges, best.lag_s(detector.model))
     return evaluate.Result(log, trace, score)

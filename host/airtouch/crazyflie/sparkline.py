@@ -8,7 +8,8 @@ BLOCKS = "▁▂▃▄▅▆▇█"
 EMPTY = " "
 
 
-def sparkline(values: Sequence[float], width: int, low: float | None = None, high: float | None = None) -> str:
+def sparkline(values: Sequence[float], width: int, low: float | None = None,
+              high: float | None = None) -> str:
     """The last values as `width` block characters, each the mean of its share; spaces where none is finite.
 
     low, high: the scale's ends; those of the values if left out. A constant signal lies at the bottom.
@@ -31,8 +32,9 @@ def sparkline(values: Sequence[float], width: int, low: float | None = None, hig
     return text.rjust(width)
 
 
-def text_map(track: np.ndarray, edges: Sequence[tuple[float, float, str]], width: int = 40, height: int = 12) -> list[str]:
-    """The plane from above, x to the right, y up: the track ".", entries "[", exits "]", others "|", the drone "o".
+def text_map(track: np.ndarray, edges: Sequence[tuple[float, float, str]], width: int = 40,
+             height: int = 12) -> list[str]:
+    """The plane from above, x to the right, y up: track ".", entries "[", exits "]", others "|", drone "o".
 
     track: (n, 2), m. edges: (x, y, kind). One character is as wide as it is high, counting two columns a row.
     """
@@ -62,5 +64,6 @@ def text_map(track: np.ndarray, edges: Sequence[tuple[float, float, str]], width
         put(*known[-1], "o")
     lines = ["".join(row) for row in grid]
     scale = f"{metre_a_row * 10:.2f} m"
-    lines[-1] = f"{lines[-1][:max(width - 22 - len(scale), 0)]:{max(width - 22 - len(scale), 0)}} |<- 20 columns = {scale}"[:width + 8]
+    room = max(width - 22 - len(scale), 0)
+    lines[-1] = f"{lines[-1][:room]:{room}} |<- 20 columns = {scale}"
     return lines

@@ -26,10 +26,12 @@ class StreamSession:
             "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
             "outputScale": network.head.output_scale, "outputZeroPoint": network.head.output_zero_point})
         arena = ffi.new("int8_t[]", arena_bytes(network))
-        self._state = ffi.new("double[]", call("streamSessionBytes")() // 8 + 1)  # doubles, for their alignment
+        doubles = call("streamSessionBytes")() // 8 + 1  # for their alignment
+        self._state = ffi.new("double[]", doubles)
         self._keep = (flat, keep, arena)  # the session points into these
-        if not call("streamSessionOpen")(self._state, motion_struct(motion or MotionConfig()), flat, quantisation,
-                                         decoder_struct(decoder), arena):
+        fits = call("streamSessionOpen")(self._state, motion_struct(motion or MotionConfig()), flat,
+                                         quantisation, decoder_struct(decoder), arena)
+        if not fits:
             raise AirTouchError("stream detector: the network must take 12 channels and give 3 logits")
 
     def next(self, acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray) -> StreamEvents:
