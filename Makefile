@@ -29,8 +29,8 @@ bench: setup  ## time the kernels and the simulator against their peers, as rati
 	$(BIN)/python tools/bench.py $(BENCH_ARGS)
 	$(BIN)/python tools/bench_simulation.py
 
-firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [CONFIG=app-config-tap]
-	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)"
+firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [CONFIG=app-config-tap] [PLATFORM=cf21bl]
+	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)" "$(or $(PLATFORM),cf2)"
 
 gap8:  ## build the GAP8 app: GAP_SDK_HOME=... AIDECK=...
 	@sh gap8/app/build.sh "$(GAP_SDK_HOME)" "$(AIDECK)"

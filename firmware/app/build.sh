@@ -1,9 +1,11 @@
 #!/bin/sh
 # Builds the STM32 app against a checkout of bitcraze/crazyflie-firmware, in build/firmware, so that no object
-# file lands in the sources. Called by `make firmware`; arguments: the checkout, and a configuration of firmware/app.
+# file lands in the sources. Called by `make firmware`; arguments: the checkout, a configuration of firmware/app, and
+# the platform (cf2, cf21bl, bolt: a *_defconfig of the firmware).
 set -eu
 base=${1:-}
 config=${2:-app-config}
+platform=${3:-cf2}
 out=build/firmware
 
 fail() {
@@ -19,6 +21,7 @@ fail() {
 command -v arm-none-eabi-gcc > /dev/null ||
   fail "no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi, or docker run bitcraze/builder"
 [ -f "firmware/app/$config" ] || fail "no firmware/app/$config; there are app-config and app-config-tap"
+[ -f "$base/configs/${platform}_defconfig" ] || fail "the firmware has no configs/${platform}_defconfig"
 base=$(cd "$base" && pwd)
 
 mkdir -p "$out"
@@ -28,5 +31,6 @@ mkdir "$out/gap8"
 cp -R gap8/kernels gap8/model "$out/gap8/"
 # Not PWD: the firmware's makefiles read it, and make does not set it.
 cd "$out/firmware/app"
+make PWD="$(pwd)" CRAZYFLIE_BASE="$base" CONFIG="$config" "${platform}_defconfig"
 make PWD="$(pwd)" CRAZYFLIE_BASE="$base" CONFIG="$config"
-echo "$out/firmware/app/build/cf2.bin"
+echo "$out/firmware/app/build/$platform.bin"

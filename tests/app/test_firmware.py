@@ -18,6 +18,7 @@ from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
+from tools import stack
 from tools.emulator import build
 from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
@@ -176,3 +177,17 @@ def test_the_image_links_with_the_firmware():
         pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc")
     run = subprocess.run(["make", "-C", ROOT, "firmware", f"CRAZYFLIE_BASE={base}"], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr[-3000:]
+
+
+def test_the_deepest_stack_is_summed_along_calls(tmp_path):
+    node = 'node: {{ title: "{0}" label: "{0}\\nx.c:1\\n{1} bytes (static)" }}\n'
+    edge = 'edge: {{ sourcename: "{}" targetname: "{}" label: "x.c:1" }}\n'
+    (tmp_path / "a.ci").write_text(node.format("appMain", 100) + node.format("a.c:short", 500) + node.format("deep", 30)
+                                   + edge.format("appMain", "a.c:short") + edge.format("appMain", "deep"))
+    (tmp_path / "b.ci").write_text(node.format("deeper", 600) + edge.format("deep", "deeper")
+                                   + edge.format("deeper", "memcpy") + edge.format("deeper", "deep"))
+    size, chain, unknown = stack.deepest(tmp_path, "appMain")
+    assert (size, chain[:3]) == (730, ["appMain", "deep", "deeper"])
+    assert unknown == {"memcpy", "deep (calls itself)"}
+    with pytest.raises(SystemExit, match="no nobody in any .ci file"):
+        stack.deepest(tmp_path, "nobody")
