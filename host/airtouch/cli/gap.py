@@ -1,11 +1,14 @@
 """`airtouch gap`: where real flights and the simulator part, why, and how far an effect closes it."""
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait for one another: products are small
 
 from airtouch.cli import scores
 from airtouch.errors import AirTouchError

@@ -19,7 +19,8 @@ def answer(diagnosis: Diagnosis) -> str:
     others = [e.name.replace("_", " ") for e in diagnosis.effects if e.name != cell.by] if cell.by else []
     cause, added = (cell.by.replace("_", " "), "it") if cell.by else (names, "it" if len(diagnosis.effects) == 1
                                                                       else "them")
-    return (f"{share(cell):.0%} of the gap {PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} "
+    part = f"{share(cell):.0%}" if share(cell) < 0.995 else "Nearly all"
+    return (f"{part} of the gap {PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} "
             f"({cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz) is {cause}; adding {added} "
             + (f"with {joined(others)} " if others else "") + f"shrinks the gap from {cell.gap:.2g} to "
             f"{cell.after:.2g} {cell.unit}, floor {cell.floor:.2g}.")
