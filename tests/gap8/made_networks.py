@@ -16,11 +16,13 @@ def weighted(rng: np.random.Generator, kind: str, before: tuple, after: tuple, k
     flat = weights.reshape(out, -1)
     if flat.shape[1] % 4 == 0:
         flat.reshape(out, -1, 4)[rng.random((out, flat.shape[1] // 4)) < sparsity] = 0
-    flat[rng.random(out) < 0.1 * sparsity] = 0
+    dead = rng.random(out) < 0.1 * sparsity  # as training leaves them: next to no scale and a bias to match
+    flat[dead] = 0
     spread = flat.shape[1] ** -0.5 * 0.02
     weight_scale = (spread * rng.uniform(0.3, 3.0, out)).astype(np.float32)
     weight_scale[rng.random(out) < 0.1] *= 40.0  # multipliers above one
     bias = rng.integers(-4000, 4001, out).astype(np.int32)
+    weight_scale[dead], bias[dead] = 3e-9, rng.integers(-2**31 + 1, 2**31, dead.sum())
     return Int8Layer(kind, before, after, kernel, SCALE, input_zero, SCALE, -128 if relu else ZERO, relu, weights, bias,
                      weight_scale)
 

@@ -124,12 +124,13 @@ def _check_int8(arrays: dict[str, np.ndarray], source: str) -> None:
 
 def check_range(layers: Sequence[Int8Layer], source: str) -> None:
     """No accumulator may leave what the kernels' rounding takes, 2^28, whatever the input; AirTouchError where one may.
-    An output whose weights pruning took is a constant, which must fit in int32."""
+    An output whose weights pruning took is a constant; its bias may fill int32, its scale must be below one."""
     for layer in layers:
         if layer.kind == "max_pool":
             continue
         real = layer.weight_scale.astype(np.float64) * (layer.input_scale / layer.output_scale)
         weights = np.abs(layer.weights.astype(np.int64)).reshape(len(layer.bias), -1).sum(axis=1)
         largest = np.abs(layer.bias.astype(np.int64)) + 256 * weights
-        if (largest * np.maximum(real, 1.0) >= np.where(weights > 0, 2.0**28, 2.0**30)).any():
+        too_large = largest * np.maximum(real, 1.0) >= 2.0**28
+        if np.where(weights > 0, too_large, real > 1.0).any():
             raise AirTouchError(f"{source}: int8 biases or scales out of range; {archive.REMEDY}")
