@@ -158,3 +158,12 @@ def test_an_error_of_ours_lands_first(tmp_path):
         fly(craft, tmp_path, show=show)
     assert not craft.flying and not craft.crashed
     assert len(logs.read(tmp_path / "f_0001.csv.gz.part")) > 300  # readable though nobody finished it
+
+
+def test_a_closed_terminal_is_no_reason_to_fall(tmp_path):
+    def gone(*_):
+        raise BrokenPipeError
+
+    craft = FakeCraft(silent=[(8.0, 12.0)])
+    _, _, ended = fly(craft, tmp_path, show=gone, say=gone)
+    assert "link lost" in ended and not craft.flying and not craft.crashed

@@ -96,3 +96,12 @@ def test_recovery_says_what_it_cannot_read_and_leaves_it(tmp_path):
     (tmp_path / "b_0001.csv.gz.part").write_text("")
     found, unreadable = recorder.recover(tmp_path)
     assert found == [] and "b_0001.csv.gz.part" in unreadable[0] and (tmp_path / "b_0001.csv.gz.part").exists()
+
+
+def test_a_log_that_cannot_be_finished_stays_as_it_is(tmp_path):
+    book = Recorder(tmp_path / "a_0001.csv.gz", NAMES, {})
+    book.add(*rows([0, 10]))
+    book.path.mkdir()
+    with pytest.raises(AirTouchError, match="what was received is in .*a_0001.csv.gz.part: make room"):
+        book.finish()
+    assert len(logs.read(book.part)) == 2

@@ -53,6 +53,12 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("tables")
 
 
+@pytest.fixture(autouse=True)
+def short_waits(monkeypatch):
+    monkeypatch.setattr("airtouch.crazyflie.collect.RESET_S", 0.2)
+    monkeypatch.setattr("airtouch.crazyflie.flight.AFTER_S", 0.2)
+
+
 def run(*arguments):
     return CliRunner().invoke(airtouch, [str(a) for a in arguments])
 
@@ -72,13 +78,14 @@ def height(virtual):
 
 
 def test_sweeps_are_flown_logged_and_listed(hop, cache, tmp_path):
-    with serve(hop, port=0, speed=SPEED) as virtual:
+    with serve(hop, port=0, speed=SPEED, faults=("late=50ms",)) as virtual:
         shown = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
         assert shown.exit_code == 0, shown.output
         assert on_the_ground(virtual)
     assert logs.read(tmp_path / "hop_0005.csv.gz").meta["ended"] == "as planned"
     log = logs.read(tmp_path / "hop_0004.csv.gz")
     assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and shown.output.count("\ntrue ") >= 2
+    assert set(np.round(np.diff(log["t_s"]), 3)) == {0.01}  # late packets are none lost
     assert log.meta["lost_samples"] == 0 and log.meta["mission"] == "hop" and log.meta["decks"][:2] == ["bcAI", "bcFlow2"]
     assert log.meta["settings"] == ["airtouch.detector=1"] and log.meta["acc_frame"] == "body"
     entry, leave = (e.sample for e in logs.true_edges(log))
@@ -211,14 +218,6 @@ def test_firmware_without_a_variable_is_told_which(hop, cache, tmp_path, monkeyp
         shown = fly(virtual, hop, cache, tmp_path)
         assert "the firmware has no log variable motor.m3, pm.vbat" in str(shown.exception)
         assert on_the_ground(virtual)
-
-
-def test_late_packets_are_sorted(hop, cache, tmp_path):
-    with serve(hop, port=0, speed=SPEED, faults=("late=50ms",)) as virtual:
-        shown = fly(virtual, hop, cache, tmp_path)
-        assert shown.exit_code == 0 and on_the_ground(virtual), shown.output
-    log = logs.read(tmp_path / "hop_0001.csv.gz")
-    assert log.meta["lost_samples"] == 0 and set(np.round(np.diff(log["t_s"]), 3)) == {0.01}
 
 
 def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(hop, cache, tmp_path):

@@ -3,7 +3,7 @@
 import signal
 import sys
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -112,9 +112,11 @@ def stopping(quiet: bool = False):
     stop = threading.Event()
 
     def asked(*_) -> None:
-        if not stop.is_set() and not quiet:
-            click.echo("landing; the log is kept", err=True)
+        first = not stop.is_set()
         stop.set()
+        if first and not quiet:
+            with suppress(OSError):  # the terminal may be gone
+                click.echo("landing; the log is kept", err=True)
 
     if threading.current_thread() is not threading.main_thread():
         yield stop

@@ -56,7 +56,7 @@ def check(block: Block, known: Collection[str]) -> None:
     missing = [name for name in block.names if name not in known]
     if missing:
         raise AirTouchError(f"the firmware has no log variable {', '.join(missing)}; "
-                            "flash firmware 2023.11 or newer, with drivers for the attached decks")
+                            "flash a newer firmware, with drivers for the attached decks")
     if block.size > MOST_BYTES:
         raise AirTouchError(f"log block {block.name}: {block.size} bytes, but a packet holds {MOST_BYTES}; "
                             "log fewer variables or shorter types")

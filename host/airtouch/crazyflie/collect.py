@@ -29,6 +29,9 @@ from airtouch.logs.flight_log import FlightLog
 
 DECKS = ("bcFlow2", "bcFlow", "bcMultiranger", "bcAI", "bcZRanger2", "bcLighthouse4", "bcLoco")
 FIRST_DATA_S = 3.0
+LINEAR_PROTOCOL = 8  #: of the radio; from here on go-to can be linear
+CAN_BE_ARMED, ARMED = 1, 2  #: bits of the supervisor
+ARMING_S = 1.0
 RESET_S = 1.0  #: that the estimator gets to settle
 MANIFEST_COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
 CLEAN_LOSS = 0.01  #: share of lost samples up to which a flight counts as clean
@@ -119,6 +122,8 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
         raise AirTouchError(f"not ready: {found[-1]}")
     for line in checks.notes(condition):
         say(line)
+    if drone.protocol < LINEAR_PROTOCOL:
+        say("this firmware flies legs smoothly, not at constant speed; flash a newer one for sweeps")
     return Readiness(condition, slow, firmware(drone))
 
 
@@ -128,7 +133,7 @@ def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake
     intake, until = Intake(slow), time.monotonic() + patience_s
     while time.monotonic() < until:
         intake.take(drain(drone.samples))
-        if intake.received > 20 and (slow is None or intake._past):
+        if intake.complete:
             return intake
         time.sleep(0.02)
     if not intake.received:
@@ -170,6 +175,9 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
     found = checks.problems(now, plan.least_v)
     if found:
         raise AirTouchError(f"not ready: {found[0]}")
+    if standing.supervisor is not None and standing.supervisor & (CAN_BE_ARMED | ARMED) == CAN_BE_ARMED:
+        drone.arm()
+        time.sleep(ARMING_S)
     origin = origin_of(standing.latest)
     intake = Intake(ready.slow)
     path = recorder.flight_path(plan.out, plan.name, number)

@@ -1,5 +1,6 @@
 """One flight: packets in, rows to the file, commands out, and what makes it land early."""
 
+import contextlib
 import statistics
 import time
 from collections import deque
@@ -81,7 +82,7 @@ class Flight:
                     self.pilot.answer(kind, code)
                 reason = self._reason(silence)
                 if reason and self.pilot.phase == "mission":
-                    self.say(f"{reason}: landing")
+                    self._tell(f"{reason}: landing")
                     self.pilot.land(reason)
                     landing_since = wall
                 if self.craft.lost.is_set():
@@ -94,13 +95,19 @@ class Flight:
                     last_ping = wall
                 if landing_since and self.pilot.waiting and wall - landing_since > GIVE_UP_S:
                     return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
-                self.show(self)
+                with contextlib.suppress(OSError):  # the terminal may be gone
+                    self.show(self)
                 self.sleep(TURN_S)
             self._tail()
             return self._over(self.pilot.reason)
         except BaseException:
             self._bring_down()
             raise
+
+    def _tell(self, text: str) -> None:
+        """Say it where there is still someone to hear it; a closed terminal is no reason to fall."""
+        with contextlib.suppress(OSError):
+            self.say(text)
 
     def _over(self, reason: str | None) -> str:
         self.landed = True
@@ -124,7 +131,7 @@ class Flight:
             self._silent_since = wall - silence
         elif silence < 0.5 and self._silent_since is not None:
             self.silences.append(round(wall - self._silent_since, 2))
-            self.say(f"the drone is heard again after {self.silences[-1]:.1f} s of silence")
+            self._tell(f"the drone is heard again after {self.silences[-1]:.1f} s of silence")
             self._silent_since = None
         return silence
 
@@ -149,11 +156,11 @@ class Flight:
         return None
 
     def _reconnect(self) -> None:
-        self.say("the link broke; connecting anew")
+        self._tell("the link broke; connecting anew")
         try:
             self.craft.reopen(GIVE_UP_S)
         except AirTouchError as error:
-            self.say(f"{error}: the drone hovers where its leg ended; land it by hand")
+            self._tell(f"{error}: the drone hovers where its leg ended; land it by hand")
             self.pilot.phase = "done"
             self.pilot.reason = f"{self.pilot.reason}; NO CONTACT, land by hand"
             raise
@@ -172,7 +179,7 @@ class Flight:
         if not self.pilot.in_air:
             self.landed = True
             return
-        self.say("an error in flight: landing")
+        self._tell("an error in flight: landing")
         command = Command("land", z_m=self.pilot.origin.z_m, seconds=DOWN_S)
         for _ in range(50):
             try:

@@ -43,6 +43,11 @@ class Intake:
         return found
 
     @property
+    def complete(self) -> bool:
+        """Whether both blocks have been heard, the fast one for a fifth of a second."""
+        return self.received > 20 and (self.slow is None or bool(self._past))
+
+    @property
     def lost(self) -> int:
         """Samples that should have come by now and did not (those under way count as lost)."""
         if self.first_ms is None:

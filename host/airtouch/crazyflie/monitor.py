@@ -87,6 +87,10 @@ class Monitor:
         load = [f"app {self.app.load_us:.0f} us"] if self.app.load_us else []
         self.board.status = "; ".join([*load, *self.app.faults])
 
+    def restart(self) -> None:
+        """The drone's clock starts anew; the detector goes on."""
+        self.intake, self._before_ms, self._edges = Intake(self.intake.slow), None, None
+
     def refresh(self, round_trip_s: float) -> None:
         """Bring the link's figures up to date."""
         now = time.monotonic()
@@ -116,8 +120,7 @@ def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
             monitor.take(drain(drone.samples))
         except Restarted:
             say("the drone restarted")
-            monitor.intake = Intake(monitor.intake.slow)
-            monitor._before_ms = None
+            monitor.restart()
             continue
         heard = monitor.intake.last_arrival_s
         if heard is not None and time.monotonic() - heard > FORGOTTEN_S:
