@@ -38,6 +38,6 @@ void edgeDecoderInit(edgeDecoder_t *decoder, const decoderConfig_t *config);
  * @param logits    over, entry, exit; NaN counts as "no"
  * @param airborne  whether the drone flies; on the ground it is over nothing
  * @return 0 nothing, 1 entry, 2 exit
- * Costs about 30 operations, where an edge is seen up to 200 more. Never fails.
+ * Costs about 130 instructions of a Cortex-M4, where an edge is seen up to 800 more. Never fails.
  */
 uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airborne);
