@@ -11,7 +11,7 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap_input import Flights, files_of, vehicle_of
 from airtouch.errors import AirTouchError
-from airtouch.simulation.effects import EFFECTS
+from airtouch.simulation.effects import EFFECTS, unregister
 
 KEPT = ("wind", "mass", "imu_bias")  #: candidates; the others take time
 VERDICTS = ("effect", "none", "unknown")
@@ -77,11 +77,39 @@ def test_baseline_takes_every_file_up_to_the_next_option(folder, tmp_path):
     assert "Ranking" in result.output
 
 
+MAGNET = '''
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Effect, Parameter, wrench
+
+@wrench
+def pull(p, s, memory, stream, out):
+    out[2] -= p[0] / (1.0 + (s[at.HEIGHT] / 0.2) ** 2)
+
+EFFECT = Effect("magnet", "a magnet in the floor",
+                (Parameter("force", "N", 0.01, 0.0, 0.1, 0.0, "at the floor"),), wrench=pull)
+'''
+
+
+def test_each_flight_alone_with_an_effect_of_the_users_own(folder, tmp_path):
+    mine, out = tmp_path / "magnet.py", tmp_path / "out.json"
+    mine.write_text(MAGNET)
+    left_out = [word for name in EFFECTS if name != "mass" for word in ("--without", name)]
+    try:
+        result = run("diagnose", f"{folder}/real_*", "--each", "--effects-file", mine, "--json", out, *left_out)
+    finally:
+        unregister("magnet")
+    assert result.exit_code == 0, result.output
+    cases = json.loads(out.read_text(), parse_constant=no_constant)["cases"]
+    assert [len(c["flights"]) for c in cases] == [1, 1]
+    assert all({r["name"] for r in c["ranking"]} == {"mass", "magnet", "none", "unknown"} for c in cases)
+    assert "real_0.csv.gz" in result.output
+
+
 def test_an_unknown_effect_or_vehicle_is_an_error(folder):
     real = folder / "real_0.csv.gz"
     for arguments, words in ((("--without", "magic"), "no effect 'magic'"), (("--vehicle", "x.toml"), "x.toml"),
-                             (("--effects-file", "x.py"), "x.py")):
-        result = run("diagnose", real, *arguments, "--each")
+                             (("--effects-file", "x.py"), "x.py"), (("--dask", "tcp://x:1"), "--each")):
+        result = run("diagnose", real, *arguments)
         assert isinstance(result.exception, AirTouchError) and words in str(result.exception), result.output
 
 

@@ -102,3 +102,13 @@ def test_recorded_flights_of_every_kind(flights, name):
     assert found.where and found.map.cells
     assert (any("no gyro" in line for line in found.cannot)) == (not log.has(*GYRO))
     assert log.has(*ACC) or log.has(*ACC_WORLD)
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same(flown):
+    distributed = pytest.importorskip("dask.distributed")
+    from airtouch.gap.on_cluster import mapper
+
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        found = measure(flown, VEHICLE, run=mapper(cluster.scheduler_address))
+    assert found.plain() == measure(flown, VEHICLE).plain()

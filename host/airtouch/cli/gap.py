@@ -105,6 +105,8 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     _check_free(report, json_path, force)
     if each and report:
         raise AirTouchError("--report shows one diagnosis; leave --each out")
+    if dask and not each:
+        raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each or leave it out")
     for path in effect_files:
         effects.load_file(path)
     for name in without:

@@ -285,14 +285,21 @@ def _solve(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, wei
 
     twin: gradient and information of the likelihood from the commands' spectra.
     """
+    normal, slope = _normal(columns, prior, values, weights, at, twin)
+    covariance = np.linalg.pinv(normal, hermitian=True)
+    return covariance @ slope, covariance
+
+
+def _normal(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray, at: np.ndarray,
+            twin: tuple[np.ndarray, np.ndarray] | None) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and right-hand side of that ridge regression."""
     j = np.array(columns)
     wj = j.conj() * weights
     normal = 2.0 * (wj @ j.T).real + np.diag(1.0 / prior ** 2)
     slope = -2.0 * (wj @ values).real - at / prior ** 2
     if twin is not None:
         slope, normal = slope + twin[0], normal + twin[1]
-    covariance = np.linalg.pinv(normal, hermitian=True)
-    return covariance @ slope, covariance
+    return normal, slope
 
 
 def _bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
@@ -304,11 +311,14 @@ def _bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarr
     covariance = np.zeros((n, n))
     gradient, information = np.zeros(len(at)), np.zeros((len(at), len(at)))
     gradient[:n], information[:n, :n] = twin
+    normal, slope = _normal(columns, prior, values, weights, at, (gradient, information))
     for _ in range(n + 1):
         change = np.zeros(len(at))
         where = np.flatnonzero(free)
-        change[where], full = _solve([columns[i] for i in where], prior[where], values, weights, at[where],
-                                     (gradient[where], information[np.ix_(where, where)]))
+        if not len(where):
+            break
+        full = np.linalg.pinv(normal[np.ix_(where, where)], hermitian=True)
+        change[where] = full @ slope[where]
         stuck = np.zeros(len(at), bool)
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
