@@ -60,6 +60,7 @@ def test_thirty_percent_loss_is_counted_and_every_command_gets_through(tmp_path)
     span = round((log["t_s"][-1] - log["t_s"][0]) / 0.01) + 1
     assert len(log) + log.meta["lost_samples"] == span
     assert 0.25 < log.meta["lost_samples"] / span < 0.35
+    assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"]
     assert np.diff(log["t_s"]).max() > 0.015  # gaps stay gaps
 
 
