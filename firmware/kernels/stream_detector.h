@@ -34,7 +34,8 @@ bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion
  * Takes one sample and says what it means.
  * @param event  every field is written
  * @return whether an edge is reported at this sample
- * Costs about 33,000 instructions of a Cortex-M4 on every stride-th sample, else 1,000. Never fails: values that are not finite hold the last finite one.
+ * Costs about 33,000 instructions of a Cortex-M4 on every stride-th sample, else 1,000.
+ * Never fails: values that are not finite hold the last finite one.
  */
 bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const float gyro[3], const float pwm[4],
                         streamEvent_t *event);
