@@ -5,9 +5,12 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
 from tools.emulator import build, elf
+from tools.emulator.machine import Machine
 
 ROOT = Path(__file__).parents[2]
 APP = ROOT / "gap8" / "app" / "src"
@@ -96,29 +99,63 @@ def test_glue_compiles_against_the_interfaces_it_uses(compiler, source, tmp_path
     assert run.returncode == 0, run.stderr
 
 
-def test_core_and_networks_fit_l1_with_the_stacks(tmp_path):
-    if "zig" not in build.compilers("rv32imc"):
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    if not build.compilers("rv32imc"):
         pytest.skip("no cross compiler: pip install ziglang")
-    (tmp_path / "size.c").write_text('#include "gap8_core.h"\nchar gap8CoreBytes[sizeof(gap8Core_t)];\n')
-    program = build.build([*PORTABLE, tmp_path / "size.c"], "rv32imc", include=INCLUDES)
+    size = tmp_path_factory.mktemp("size") / "size.c"
+    size.write_text('#include "gap8_core.h"\nchar gap8CoreBytes[sizeof(gap8Core_t)];\n')
+    return build.build([*PORTABLE, size], "rv32imc", include=INCLUDES)
+
+
+def test_core_and_networks_fit_l1_with_the_stacks(program):
     symbols = elf.Elf(program.elf).symbols
     core = symbols["gap8CoreBytes"].size
     networks = sum(s.size for s in elf.Elf(program.objects["airtouch_model.c"]).symbols.values()) + \
         sum(s.size for s in elf.Elf(program.objects["airtouch_stream.c"]).symbols.values())
-    stacks = 2048 + 7 * 1024
+    stacks = 8 * 2048
     print(f"L1: core {core}, networks {networks}, stacks {stacks} bytes of {L1_BYTES}")
     assert 5_000 < core < 13_000
-    assert core + networks + stacks < L1_BYTES // 2 + 16_384
+    assert core + networks + stacks < L1_BYTES - 12_288  # the rest is for the SDK
+
+
+@pytest.fixture(scope="module")
+def team(compiler, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("team")
+    (folder / "team.c").write_text(TEAM)
+    built = subprocess.run([compiler, *FLAGS, *PORTABLE, folder / "team.c", "-pthread", "-lm", "-o", folder / "team"],
+                           capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    return folder / "team"
 
 
 @pytest.mark.parametrize("cores", [1, 2, 4, 8])
-def test_a_team_of_cores_gives_the_same_packets(compiler, cores, tmp_path):
-    (tmp_path / "team.c").write_text(TEAM)
-    build_ = subprocess.run([compiler, *FLAGS, *PORTABLE, tmp_path / "team.c", "-pthread", "-lm", "-o",
-                             tmp_path / "team"], capture_output=True, text=True)
-    assert build_.returncode == 0, build_.stderr
-    run = subprocess.run([tmp_path / "team", str(cores)], capture_output=True, text=True, timeout=60)
+def test_a_team_of_cores_gives_the_same_packets(team, cores):
+    run = subprocess.run([team, str(cores)], capture_output=True, text=True, timeout=60)
     assert run.returncode == 0 and int(run.stdout) == 31
+
+
+@pytest.mark.parametrize("detector, most", [("best-gap8", 90_000), ("paper-gap8", 2_200_000)])
+def test_on_an_emulated_core_the_replies_are_those_of_the_desktop(program, detector, most):
+    machine, desktop = Machine(program.elf), Gap8Core()
+    core, packet, reply = (machine.allocate(n) for n in (elf.Elf(program.elf).symbols["gap8CoreBytes"].size, 98, 98))
+    machine.call("gap8CoreInit", core, machine.address("airtouchStream"), machine.address("airtouchNetwork"), 0)
+    app, counts = AppCore({"detector": DETECTORS.index(detector)}, have_gap8=True), []
+    rng = np.random.default_rng(0)
+    for i in range(320):
+        app.step(rng.normal(0, 1, 3) + [0, 0, 9.81], rng.normal(0, 0.3, 3), rng.uniform(40_000, 45_000, 4))
+        for sent in app.packets():
+            machine.write(packet, sent)
+            call = machine.call("gap8CoreTake", core, packet, len(sent), reply)
+            expected = desktop.take(sent)
+            assert machine.read(reply, call.value & 0xFFFF) == expected
+            app.receive(expected)
+            counts.append(call.instructions)
+    steady = np.array(counts[-10:])
+    print(f"{detector}: {steady.mean():.0f} instructions a packet on one rv32imc core, {steady.max()} at worst, stack "
+          f"{machine.stack_used()} bytes")
+    assert app.log.answers > 0 and steady.max() <= most
+    assert machine.stack_used() <= 1_000  # main.c gives each core 2048
 
 
 @pytest.mark.parametrize("arguments, words", [([], "say where CPX for the GAP8 is"),

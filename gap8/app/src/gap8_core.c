@@ -27,22 +27,55 @@ static void resetWindow(void *context) {
   window->oldest = 0;
 }
 
-/** One core's part of the windowed network. */
-static void shareWindow(void *argument) {
-  gap8Window_t *window = argument;
-  const gap8Team_t *team = window->team;
-  const teamInt8_t mine = {.core = team->core(), .cores = team->cores, .barrier = team->barrier};
-  const int8_t *logits = networkInt8RunTeam(window->network, window->quantised, window->arena, &mine);
-  if (mine.core == 0) {
+/** One column of the window, oldest row first, normalised by itself. */
+static void normaliseColumn(gap8Window_t *window, int32_t c) {
+  float *column = window->column[c];
+  int32_t row = window->oldest;
+  for (int32_t i = 0; i < AIRTOUCH_MODEL_ROWS; i++) {
+    column[i] = window->ring[row * AIRTOUCH_MODEL_COLUMNS + c];
+    row = row + 1 < AIRTOUCH_MODEL_ROWS ? row + 1 : 0;
+  }
+  zScoreWindow(column, AIRTOUCH_MODEL_ROWS, 1, column);
+  for (int32_t i = 0; i < AIRTOUCH_MODEL_ROWS; i++) {
+    window->window[i * AIRTOUCH_MODEL_COLUMNS + c] = column[i];
+  }
+}
+
+static void meet(const teamInt8_t *team) {
+  if (team->cores > 1) {
+    team->barrier(team->context);
+  }
+}
+
+/** One core's part: columns, then values, then what it has of each layer. */
+static void shareWindow(gap8Window_t *window, const teamInt8_t *mine) {
+  for (int32_t c = mine->core; c < AIRTOUCH_MODEL_COLUMNS; c += mine->cores) {
+    normaliseColumn(window, c);
+  }
+  meet(mine);
+  const int32_t begin = shareBegin(GAP8_VALUES, mine->core, mine->cores);
+  const int32_t end = shareBegin(GAP8_VALUES, mine->core + 1, mine->cores);
+  networkInt8Quantise(window->network, window->window + begin, end - begin, window->quantised + begin);
+  meet(mine);
+  const int8_t *logits = networkInt8RunTeam(window->network, window->quantised, window->arena, mine);
+  if (mine->core == 0) {
     window->logits = logits;
   }
 }
 
+static void workOnWindow(void *argument) {
+  gap8Window_t *window = argument;
+  const gap8Team_t *team = window->team;
+  const teamInt8_t mine = {.core = team->core(), .cores = team->cores, .barrier = team->barrier};
+  shareWindow(window, &mine);
+}
+
 static void runWindow(gap8Window_t *window) {
   if (window->team != NULL) {
-    window->team->fork(shareWindow, window);
+    window->team->fork(workOnWindow, window);
   } else {
-    window->logits = networkInt8Run(window->network, window->quantised, window->arena);
+    const teamInt8_t alone = {.core = 0, .cores = 1};
+    shareWindow(window, &alone);
   }
 }
 
@@ -56,11 +89,6 @@ static bool stepWindow(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_BYTE
   if (window->rows < AIRTOUCH_MODEL_ROWS) {
     return false;
   }
-  const int32_t tail = GAP8_VALUES - window->oldest * columns;
-  memcpy(window->window, window->ring + window->oldest * columns, (size_t)tail * sizeof(float));
-  memcpy(window->window + tail, window->ring, (size_t)(GAP8_VALUES - tail) * sizeof(float));
-  zScoreWindow(window->window, AIRTOUCH_MODEL_ROWS, AIRTOUCH_MODEL_COLUMNS, window->window);
-  networkInt8Quantise(window->network, window->window, GAP8_VALUES, window->quantised);
   runWindow(window);
   memcpy(output, window->logits, AIRTOUCH_MODEL_OUTPUTS);
   return true;

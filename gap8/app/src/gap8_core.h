@@ -2,7 +2,7 @@
  * @file gap8_core.h
  * Everything that the GAP8 app does, without an operating system: packets from the STM32 in,
  * networks, packets for the STM32 out. The PMSIS app (main.c) gives it CPX, the cluster and a clock;
- * tests give it a byte pipe. No heap, no global; about 11 kB, so that it lies in L1.
+ * tests give it a byte pipe. No heap, no global; about 12 kB, so that it lies in L1.
  */
 #pragma once
 
@@ -37,7 +37,8 @@ typedef struct {
   const gap8Team_t *team;
   const int8_t *logits;  ///< of the last run, in the arena
   float ring[GAP8_VALUES];  ///< rows of features, the oldest at `oldest`
-  float window[GAP8_VALUES];
+  float window[GAP8_VALUES];  ///< normalised
+  float column[AIRTOUCH_MODEL_COLUMNS][AIRTOUCH_MODEL_ROWS];
   int32_t oldest;
   int32_t rows;  ///< seen since the reset, at most a window of them
   _Alignas(4) int8_t quantised[GAP8_VALUES];
@@ -64,7 +65,8 @@ void gap8CoreInit(gap8Core_t *core, const streamInt8_t *stream, const networkInt
  * Takes a packet from the STM32: any bytes of any length.
  * @param reply  EDGE_LINK_MAX_BYTES of room
  * @return the reply's length; 0 for none
- * Runs a network up to seven times; integer arithmetic, but for the windowed network's normalisation.
+ * Runs a network up to seven times; integer arithmetic, but for the windowed network's normalisation, which the
+ * cores share as well.
  */
 uint16_t gap8CoreTake(gap8Core_t *core, const uint8_t *bytes, uint16_t length, uint8_t *reply);
 

@@ -13,7 +13,7 @@
 #define HEARTBEAT_MS 500
 #define STACK_WORDS (4 * configMINIMAL_STACK_SIZE)
 #define FIRST_CORE_STACK 2048  // bytes
-#define OTHER_CORE_STACK 1024
+#define OTHER_CORE_STACK 2048
 
 /** What the cluster is asked to do: a packet, and room for the reply. In L2, which both sides see. */
 typedef struct {
