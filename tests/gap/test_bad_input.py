@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
+from airtouch.gap.diagnose import diagnose
 from airtouch.gap.measure import measure
 from airtouch.logs.flight_log import ACC, ACC_WORLD, COLUMNS, GYRO, POSITION, PWM, VELOCITY, FlightLog
+from airtouch.simulation.effects import EFFECTS
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
 
@@ -165,3 +167,34 @@ def test_damaged_flights_give_an_answer_or_one_line(flown, damage):
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_a_damaged_baseline_does_no_harm(flown, damage):
     answers_or_one_line(flown[1], [damaged(flown[0], damage)])
+
+
+OTHERS = tuple(name for name in EFFECTS if name not in ("mass", "imu_bias", "imu_noise", "time_jitter"))
+
+
+@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@given(damages())
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_damaged_flight_is_diagnosed_or_refused_in_one_line(flown, damage):
+    try:
+        found = diagnose([damaged(flown[0], damage)], VEHICLE, without=OTHERS)
+    except AirTouchError as error:
+        assert "\n" not in str(error) and str(error)
+        return
+    table = json.loads(json.dumps(found.plain(), allow_nan=False))
+    assert table["verdict"] in ("effect", "none", "unknown")
+    assert sum(r["probability"] for r in table["ranking"]) == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("samples", [420, 470, 520, 600, 700])
+def test_short_flights_are_diagnosed_or_refused(flown, samples):
+    try:
+        found = diagnose([flown[0].slice(0, samples)], VEHICLE, without=OTHERS)
+        assert found.verdict in ("effect", "none", "unknown")
+    except AirTouchError as error:
+        assert "too short" in str(error) or "no flight in it" in str(error)
+
+
+def test_nothing_to_diagnose():
+    with pytest.raises(AirTouchError, match="no flight to diagnose"):
+        diagnose([], VEHICLE)

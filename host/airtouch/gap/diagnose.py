@@ -15,6 +15,7 @@ from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
 from airtouch.gap.select import LEAST_GAIN, UNKNOWN_GAIN, Judged, Selection, halves, probabilities, select
 from airtouch.gap.shrink import Shrink, shrink_of
+from airtouch.gap.spectra import AIR
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -42,6 +43,9 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = Data(study, some)
+    if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
+        raise AirTouchError(f"{seen[0].name}: too short to be judged on other data than it is fitted on; at least "
+                            "5 s in the air without a hole are needed")
     found = select(data, candidates.every(without), say)
     say("how far")
     parts = halves(data)

@@ -76,7 +76,7 @@ def halves(data: Data) -> tuple[Part, Part]:
             if len(data.flights) >= 4:
                 (first if i % 2 == 0 else second).append((i, regime, np.ones(n, bool)))
             else:
-                even = (np.arange(n) // GROUP) % 2 == 0
+                even = (np.arange(n) // max(min(GROUP, n // 2), 1)) % 2 == 0
                 first.append((i, regime, even))
                 second.append((i, regime, ~even))
     return Part(tuple(first)), Part(tuple(second))
@@ -90,7 +90,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     screen = Screen(data)
     singles = _round(data, parts, base, screen, candidates, None, progress)
     steps: list[Judged] = []
-    best = max(singles.values(), key=lambda j: j.gain, default=None)
+    best = _best_of(singles)
     while best is not None and len(steps) < MOST_EFFECTS:
         before = steps[-1].gain if steps else 0.0
         if best.gain - before < max(LEAST_GAIN, LEAST_SHARE * before):
@@ -98,9 +98,14 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         steps.append(best)
         if len(steps) < MOST_EFFECTS:
             more = _round(data, parts, base, screen, candidates, best, progress)
-            best = max(more.values(), key=lambda j: j.gain, default=None)
+            best = _best_of(more)
     return Selection(singles, tuple(steps), free_gain(data, parts, None),
                      free_gain(data, parts, steps[-1] if steps else None))
+
+
+def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
+    """The best of those that were fitted, and not only looked at."""
+    return max((j for j in judged.values() if j.full), key=lambda j: j.gain, default=None)
 
 
 def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Screen,
