@@ -275,3 +275,17 @@ def test_recorded_flights_give_the_same_edges_on_both_processors(flights):
         edges = [(d.sample, d.kind) for d in best.run(log).edges]
         assert Drone("best").fly(flight) == edges
         assert Drone("best-gap8").fly(flight) == [(i + 1, kind) for i, kind in edges]
+
+
+def test_load_and_late_steps_are_logged():
+    app = AppCore({"detector": 1})
+    rest = (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.0,) * 4
+    for microseconds, late in ((120, False), (70_000, True), (90, False)):
+        app.step(*rest)
+        app.time(microseconds, late)
+    app.step(*rest)
+    assert (app.log.load, app.log.loadMax, app.log.late) == (90, 65_535, 1)
+    assert app.log.health == HEALTH["late"]
+    for _ in range(100):
+        app.step(*rest)
+    assert app.log.health == 0
