@@ -22,11 +22,14 @@ BLOCK_ATTEMPTS = 6  #: a lost "create" makes the "append" after it fail
 TAKEN_S = 0.1  #: that an app gets to put a parameter right
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
-LOG_PORT, SETTINGS_CHANNEL = 5, 1
+LOG_PORT, SETTINGS_CHANNEL, DATA_CHANNEL = 5, 1, 2
+DELETE_BLOCK, CREATE_BLOCK, LOG_HEADER = 2, 6, 4  #: bytes before the values: number, 24-bit clock
+INCOMPLETE = 256  #: no error of the firmware: an "append" that came before its "create" is lost
+FORGET_S = 0.3
 LOG_COMMANDS = {0: "create", 1: "append to", 3: "start", 6: "create", 7: "append to"}
 LOG_ERRORS = {2: "a variable or the block is unknown to it", 7: "it is larger than a packet",
               8: "it does not know the command", 12: "its memory for log blocks is full; restart the drone",
-              17: "another block has its number"}
+              17: "another block has its number", INCOMPLETE: "it left variables out"}
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,8 @@ class Drone:
         self.lost = threading.Event()
         self.round_trip_s = float("nan")
         self._refusals: queue.SimpleQueue[tuple[int, int]] = queue.SimpleQueue()
-        self._configs: dict[str, Any] = {}
+        self._asked: dict[str, tuple[Block, Any]] = {}  #: name -> block and cflib's view of it
+        self._forgot_s: dict[int, float] = {}
         self._reviving: threading.Thread | None = None
         self._cf: Any = None
         self._listen(connect(uri, cache, patience_s, self._console.put))
@@ -67,6 +71,7 @@ class Drone:
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
         cf.add_header_callback(self._on_log_setting, LOG_PORT, SETTINGS_CHANNEL)
+        cf.add_header_callback(self._on_log_data, LOG_PORT, DATA_CHANNEL)
         cf.link_statistics.stop()  # its thread would wait for itself where the link breaks under it
         cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
 
@@ -185,16 +190,15 @@ class Drone:
             config.add_variable(name, kind)
 
         def take(stamp: int, values: dict[str, float], _: Any) -> None:
-            if self._configs.get(block.name) is not config:
-                config.delete()
+            if self._asked.get(block.name, (None, None))[1] is not config:
                 return
             came.set()
             self.samples.put(Sample(block.name, stamp, time.monotonic(), values))
 
         config.data_received_cb.add_callback(take)
-        self._configs[block.name] = config
         try:
             self._cf.log.add_config(config)
+            self._asked[block.name] = block, config
             config.start()
         except (KeyError, AttributeError) as error:
             raise AirTouchError(f"log block {block.name}: {str(error).strip(chr(39))}") from None
@@ -210,6 +214,21 @@ class Drone:
         for block in list(self.blocks):
             with contextlib.suppress(AirTouchError):
                 self.start(block)
+
+    def _on_log_data(self, packet: Any) -> None:
+        """Sees to blocks that are none of ours any more, or only half of one."""
+        number, size = packet.data[0], len(packet.data) - LOG_HEADER
+        wanted = {config.id: block.size for block, config in list(self._asked.values())}
+        if number in wanted and size < wanted[number]:
+            self._refusals.put((CREATE_BLOCK, INCOMPLETE))
+        elif number not in wanted and time.monotonic() - self._forgot_s.get(number, 0.0) > FORGET_S:
+            from cflib.crtp.crtpstack import CRTPPacket
+
+            self._forgot_s[number] = time.monotonic()
+            delete = CRTPPacket()
+            delete.set_header(LOG_PORT, SETTINGS_CHANNEL)
+            delete.data = (DELETE_BLOCK, number)
+            self._cf.send_packet(delete)
 
     def _on_log_setting(self, packet: Any) -> None:
         if len(packet.data) >= 3 and packet.data[0] in LOG_COMMANDS and packet.data[2] not in (0, 17):
