@@ -14,7 +14,7 @@ from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 
 PATIENCE_S = 2.0
-MOST_CELLS = 12
+MOST_CELLS = 16
 
 
 class Bar:

@@ -77,7 +77,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, flights: Sequence[FlightLo
         indistinguishable=[f"Cannot be told apart in these logs: {words.joined(list(g))}."
                            for g in diagnosis.indistinguishable],
         images=_images(study, seen, effects, shown, where) + _twin_images(seen, nominal, vehicle),
-        how_far=gap_tables.how_far(diagnosis), judged=True, unexplained=_unexplained(where),
+        how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None, judged=True, unexplained=_unexplained(where),
         calibration=gap_tables.named(fitted.parameters) if fitted else [], advice=diagnosis.advice,
         lists=[("What these logs cannot say", diagnosis.cannot), ("Notes", diagnosis.notes), ("Left out", left_out)],
         flights=_flights(diagnosis.flights or [f.name for f in seen], vehicle.name, [f.name for f in nominal]),
@@ -102,7 +102,7 @@ def _page(**context: Any) -> str:
              "unexplained": [], "advice": "", "calibration": []}
     return template.render({
         **usual, **context, "phases": gap_tables.maps(made), "bands": [f"{a:g}-{b:g}" for a, b in BANDS_HZ],
-        "legend": gap_tables.LEGEND, "floor_from": made.floor_from, "where": gap_tables.largest_rows(where[:MOST_CELLS]),
+        "legend": gap_tables.LEGEND, "floor_from": made.floor_from, "where": gap_tables.largest_rows(where),
         "has_after": any(c.after is not None for c in made.cells), "version": __version__})
 
 
