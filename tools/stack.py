@@ -2,8 +2,9 @@
 
     python tools/stack.py build/firmware appMain
 
-Sums frames along the deepest chain of calls. Calls through pointers are not seen; libraries and recursions are not counted: their
-names are printed, add what they need. What follows a failed assertion is left out: the drone has stopped by then. CONFIG_APP_STACKSIZE (firmware/app/app-config) counts words of four bytes.
+Sums frames along the deepest chain of calls. Calls through pointers are not seen; libraries and recursions are not
+counted: their names are printed, add what they need. What follows a failed assertion is left out: the drone has
+stopped by then. CONFIG_APP_STACKSIZE (firmware/app/app-config) counts words of four bytes.
 """
 
 import re

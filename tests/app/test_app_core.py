@@ -179,9 +179,9 @@ def test_values_that_are_not_finite_do_not_stay(flight, value):
         assert list(log.logit) == list(clean.app.log.logit) or abs(log.probability - clean.app.log.probability) < 0.05
 
 
-OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 3), "filter": (3, 2), "bandMid": (1e9, 48.0), "bandWidth": (50.0, 2.0),
-                "pFa": (0.0, 1e-12), "probabilityIn": (7.0, 0.99), "probabilityOut": (0.95, 0.89), "scoreIn": (99.0, 12.0),
-                "scoreOut": (-99.0, -8.0)}
+OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 3), "filter": (3, 2), "bandMid": (1e9, 48.0),
+                "bandWidth": (50.0, 2.0), "pFa": (0.0, 1e-12), "probabilityIn": (7.0, 0.99),
+                "probabilityOut": (0.95, 0.89), "scoreIn": (99.0, 12.0), "scoreOut": (-99.0, -8.0)}
 
 
 @pytest.mark.parametrize("name", PARAMS)

@@ -182,7 +182,10 @@ static void runLocal(appCore_t *core) {
   linkAnswer_t answer;
   bool answered;
   appLocalBegin(&core->local, &core->link, &core->best, core->arena);
-  for (int i = 0; i < APP_LOCAL_SAMPLES && appLocalStep(&core->local, &core->link, &core->best, &answer, &answered); i++) {
+  for (int i = 0; i < APP_LOCAL_SAMPLES; i++) {
+    if (!appLocalStep(&core->local, &core->link, &core->best, &answer, &answered)) {
+      return;
+    }
     if (answered && linkSenderAccept(&core->link, answer.sequence)) {
       takeAnswer(core, &answer);
     }

@@ -9,7 +9,7 @@ from airtouch.crazyflie import flash
 
 @click.command()
 @click.argument("image", type=click.Path(path_type=Path))
-@click.option("--uri", help="The running Crazyflie, e.g. radio://0/80/2M/E7E7E7E7E7. Left out: cold boot, switch it on.")
+@click.option("--uri", help="The running Crazyflie, radio://0/80/2M/E7E7E7E7E7 say; left out: cold boot.")
 @click.option("--target", type=click.Choice(list(flash.TARGETS)), help="What the image is for; found out if left out.")
 @click.option("--check", is_flag=True, help="Only look at the image.")
 def command(image: Path, uri: str | None, target: str | None, check: bool) -> None:
