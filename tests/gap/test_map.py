@@ -50,6 +50,7 @@ def test_an_offset_is_in_the_lowest_band_alone():
     made = maps.gap_map(study(), [flight(7.0, np.array([0.5, 0.0, -0.2]))])
     assert cell(made, "force_x", 0).gap == pytest.approx(0.5)
     assert cell(made, "force_z", 0).gap == pytest.approx(0.2)
+    assert cell(made, "force_x", 0).low == pytest.approx(0.5) == cell(made, "force_x", 0).high
     assert all(cell(made, f"force_{a}", b).gap < 1e-9 for a in "xyz" for b in range(1, 6))
 
 

@@ -73,8 +73,6 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
         found = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
     failed = (*flights.failed.values(), *nominal.failed.values())
     found = replace(found, left_out=(*failed, *found.left_out))
-    gap_show.measurement(scores.console(), found)
-    gap_show.left_out(found.left_out)
     if json_path:
         scores.write_json(json_path, found.plain(), force)
     if report:
@@ -82,6 +80,8 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
 
         gap_report.write_measurement(report, found, flights, vehicle, force=force,
                                      command=_line("measure", real, baseline, vehicle_name))
+    gap_show.measurement(scores.console(), found)
+    gap_show.left_out(found.left_out)
     _written(json_path, report)
 
 
@@ -122,7 +122,6 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
             raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
         with gap_show.Bar() as bar:
             found = case(logs, progress=bar)
-        gap_show.diagnosis(scores.console(), found)
         if json_path:
             scores.write_json(json_path, found.plain(), force)
         if report:
@@ -130,6 +129,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
 
             gap_report.write_diagnosis(report, found, logs, vehicle, list(nominal),
                                        command=_line("diagnose", real, baseline, vehicle_name), force=force)
+        gap_show.diagnosis(scores.console(), found)
     gap_show.left_out([*flights.failed.values(), *nominal.failed.values()])
     _written(json_path, report)
 

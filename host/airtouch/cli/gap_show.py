@@ -9,7 +9,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from airtouch.gap import words
-from airtouch.gap.gap_map import CHANNEL_WORDS, ratio
+from airtouch.gap.gap_map import CHANNEL_WORDS, ratio, short
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 
@@ -55,10 +55,10 @@ def cells(some: Iterable[Cell], title: str) -> Table:
         table.add_column("after", justify="right")
     for c in some:
         row = [c.phase, "" if c.regime == "all" else c.regime, CHANNEL_WORDS[c.channel],
-               f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", f"{c.gap:.2g}",
-               "" if c.low is None else f"{c.low:.2g} to {c.high:.2g}", c.unit, f"{c.floor:.2g}",
-               f"{ratio(c):.1f}"]
-        table.add_row(*row, *([("" if c.after is None else f"{c.after:.2g}")] if after else []))
+               f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", f"{short(c.gap)}",
+               "" if c.low is None else f"{short(c.low)} to {short(c.high)}", c.unit, f"{short(c.floor)}",
+               short(ratio(c))]
+        table.add_row(*row, *([("" if c.after is None else f"{short(c.after)}")] if after else []))
     return table
 
 

@@ -12,7 +12,8 @@ from airtouch.logs.segments import KINDS
 DRAWS = 400
 LEAST_FLIGHTS = 5  #: with fewer, blocks are drawn and not flights
 LEAST_SECONDS = 0.3  #: a cell with less is left out
-INTERVAL = (5.0, 95.0)
+INTERVAL = np.array([5.0, 95.0])
+SIGMAS = 1.645  #: the same of a normal distribution
 FREEDOM = 4.0  #: independent values that a block counts for at most: blocks differ by more than chance
 AIR = "air"  #: floor of phases that no nominal flight had
 
@@ -49,9 +50,18 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
     seconds = weight * PERIOD_S
     width = np.array([b - a for a, b in BANDS_HZ])
     freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, np.maximum(FREEDOM * blocks, 1.0)[:, None])[:, :, None]
-    low = np.minimum(low, mean_square * freedom / chi2.ppf(INTERVAL[1] / 100.0, freedom))
-    high = np.maximum(high, mean_square * freedom / chi2.ppf(INTERVAL[0] / 100.0, freedom))
+    narrow, wide = mean_square * freedom / chi2.ppf(INTERVAL[::-1] / 100.0, freedom[..., None]).transpose(3, 0, 1, 2)
+    narrow[:, 0], wide[:, 0] = _offset(part.mean.sum(axis=0) / total[:, 0], mean_square[:, 0], freedom[:, 0])
+    low, high = np.minimum(low, narrow), np.maximum(high, wide)
     return Table(np.sqrt(mean_square), np.sqrt(low), np.sqrt(high), seconds, blocks, flights)
+
+
+def _offset(mean: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Interval of a mean square that is a constant and something that varies around it."""
+    rest = np.maximum(square - mean ** 2, 0.0)
+    error = SIGMAS * np.sqrt(rest / freedom)
+    below, above = (freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
+    return np.maximum(np.abs(mean) - error, 0.0) ** 2 + rest * below, (np.abs(mean) + error) ** 2 + rest * above
 
 
 def _bootstrap(weight: np.ndarray, power: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -120,4 +130,4 @@ def _without_common(nominal: Sums, phase: int, count: int) -> Sums | None:
     common = mean.sum(axis=0) / total
     spread = power[:, :, 0] - 2.0 * common * mean + weight[:, :, None] * common ** 2
     power[:, :, 0] = np.maximum(spread, 0.0) * (count / (count - 1.0) if count > 1 else 1.0)
-    return Sums(nominal.phase[rows], nominal.flight[rows], weight, power, mean)
+    return Sums(nominal.phase[rows], nominal.flight[rows], weight, power, mean - weight[:, :, None] * common)

@@ -153,7 +153,12 @@ def in_words(cell: Cell) -> str:
     """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
     regime = "" if cell.regime == "all" else f" ({cell.regime})"
     return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
-            f"{CHANNEL_WORDS[cell.channel]}: {cell.gap:.2g} {cell.unit}, {ratio(cell):.2g} times the floor")
+            f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor")
+
+
+def short(value: float) -> str:
+    """Two digits, or the whole part where that has more."""
+    return f"{value:.0f}" if 10.0 <= abs(value) < 1e5 else f"{value:.2g}"
 
 
 def _after(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:

@@ -1,6 +1,6 @@
 """A diagnosis in sentences, for the terminal and the report alike."""
 
-from airtouch.gap.gap_map import CHANNEL_WORDS, LEAST_SHARE, PHASE_WORDS, in_words
+from airtouch.gap.gap_map import CHANNEL_WORDS, LEAST_SHARE, PHASE_WORDS, in_words, short
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
 
 
@@ -22,8 +22,8 @@ def answer(diagnosis: Diagnosis) -> str:
     part = f"{share(cell):.0%}" if share(cell) < 0.995 else "Nearly all"
     return (f"{part} of the gap {PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} "
             f"({cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz) is {cause}; adding {added} "
-            + (f"with {joined(others)} " if others else "") + f"shrinks the gap from {cell.gap:.2g} to "
-            f"{cell.after:.2g} {cell.unit}, floor {cell.floor:.2g}.")
+            + (f"with {joined(others)} " if others else "") + f"shrinks the gap from {short(cell.gap)} to "
+            f"{short(cell.after)} {cell.unit}, floor {short(cell.floor)}.")
 
 
 def telling(diagnosis: Diagnosis) -> Cell | None:

@@ -5,7 +5,7 @@ from typing import Any
 
 from airtouch.gap.band_sums import BANDS_HZ
 from airtouch.gap.channels import CHANNELS
-from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, GapMap, in_words, ratio, significant
+from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, GapMap, in_words, ratio, short, significant
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.words import quantity
 from airtouch.logs.segments import KINDS
@@ -40,20 +40,20 @@ def shaded(cell: Cell) -> dict[str, str]:
     times = ratio(cell)
     sure = significant(cell)
     colour, ink = next((c, i) for least, c, i in SHADES if times >= least) if sure else QUIET
-    title = (f"{in_words(cell)}; interval {cell.low:.2g} to {cell.high:.2g}, floor {cell.floor:.2g} {cell.unit}, "
+    title = (f"{in_words(cell)}; interval {short(cell.low)} to {short(cell.high)}, floor {short(cell.floor)} {cell.unit}, "
              f"{cell.blocks} blocks of {cell.flights} flights")
-    after = "" if cell.after is None or not sure else f"{cell.after / max(cell.floor, 1e-12):.2g}×"
+    after = "" if cell.after is None or not sure else f"{short(cell.after / max(cell.floor, 1e-12))}×"
     return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": colour, "ink": ink,
             "title": title, "after": after}
 
 
 def largest_rows(cells: Iterable[Cell]) -> list[dict[str, str]]:
     """The largest cells in figures."""
-    return [{"words": in_words(c).split(":")[0], "gap": f"{c.gap:.2g}",
-             "interval": "" if c.low is None else f"{c.low:.2g} to {c.high:.2g}",
-             "after": "-" if c.after is None else f"{c.after:.2g}", "floor": f"{c.floor:.2g}",
+    return [{"words": in_words(c).split(":")[0], "gap": f"{short(c.gap)}",
+             "interval": "" if c.low is None else f"{short(c.low)} to {short(c.high)}",
+             "after": "-" if c.after is None else f"{short(c.after)}", "floor": f"{short(c.floor)}",
              "unit": c.unit + (f"; {c.by}" if c.by else ""),
-             "ratio": f"{ratio(c):.1f}"} for c in cells]
+             "ratio": short(ratio(c))} for c in cells]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
