@@ -29,6 +29,7 @@ from airtouch.logs.flight_log import FlightLog
 
 DECKS = ("bcFlow2", "bcFlow", "bcMultiranger", "bcAI", "bcZRanger2", "bcLighthouse4", "bcLoco")
 FIRST_DATA_S = 3.0
+PARAMETERS_S = 30.0  #: cflib fetches them all, one after the other
 LINEAR_PROTOCOL = 8  #: of the radio; from here on go-to can be linear
 CAN_BE_ARMED, ARMED = 1, 2  #: bits of the supervisor
 ARMING_S = 1.0
@@ -102,8 +103,7 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
     """
     known = drone.variables
     blocks.check(blocks.MOTION, known)
-    decks = {deck: bool(drone.parameter(f"deck.{deck}") or 0) for deck in DECKS
-             if drone.has_parameter(f"deck.{deck}")}
+    decks = {deck: there for deck in DECKS if (there := has_deck(drone, deck)) is not None}
     without = () if decks.get("bcMultiranger") else blocks.MULTIRANGER
     slow = blocks.available(blocks.STATE, known, without)
     blocks.check(slow, known)
@@ -125,6 +125,16 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
     if drone.protocol < LINEAR_PROTOCOL:
         say("this firmware flies legs smoothly, not at constant speed; flash a newer one for sweeps")
     return Readiness(condition, slow, firmware(drone))
+
+
+def has_deck(drone: Drone, deck: str) -> bool | None:
+    """Whether a deck is attached; None where the firmware knows no such deck."""
+    if not drone.has_parameter(f"deck.{deck}"):
+        return None
+    value = drone.parameter(f"deck.{deck}", PARAMETERS_S)
+    if value is None:
+        raise AirTouchError(f"deck.{deck}: the drone does not tell its parameters; is the link good?")
+    return bool(value)
 
 
 def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake:

@@ -4,13 +4,15 @@ import logging
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from airtouch.errors import AirTouchError
 
-ATTEMPT_S = 2.0  #: without a packet; cflib never asks twice for the first two
+#: without a packet: before the first ones, for which cflib never asks twice, and later
+FIRST_S, NEXT_S, FIRST_PACKETS = 1.5, 4.0, 3
 
 
 def cflib_or_error() -> Any:
@@ -57,7 +59,7 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
     deadline, reason = time.monotonic() + patience_s, "nobody answers there"
     while time.monotonic() < deadline:
         cf = crazyflie.Crazyflie(rw_cache=_usable(cache))
-        done, failure, heard_s = threading.Event(), [], [time.monotonic()]
+        done, failure, heard_s = threading.Event(), [], deque([time.monotonic()], FIRST_PACKETS)
         cf.connected.add_callback(lambda _, done=done: done.set())
         for failed in (cf.connection_failed, cf.connection_lost):
             failed.add_callback(lambda _, text, f=failure, done=done: (f.append(str(text)), done.set()))
@@ -66,8 +68,9 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
         cf.open_link(uri)
         if cf.link is not None and uri.startswith("udp"):
             cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
-        while not done.wait(0.05) and time.monotonic() - heard_s[-1] < ATTEMPT_S:
-            del heard_s[:-1]
+        while not done.wait(0.05):
+            if time.monotonic() - heard_s[-1] > (FIRST_S if len(heard_s) < FIRST_PACKETS else NEXT_S):
+                break
         if done.is_set() and not failure:
             return cf
         if failure:
