@@ -10,7 +10,7 @@ from airtouch import logs, vehicle
 from airtouch.gap.flight import ready
 from airtouch.gap.gap_map import significant
 from airtouch.gap.measure import measure
-from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
+from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, RPM, FlightLog
 from airtouch.logs.segments import KINDS
 
 VEHICLE = vehicle.load("crazyflie-2.1-flow")
@@ -69,6 +69,16 @@ def test_without_a_gyro_torque_is_known_at_low_frequency_alone(flown):
                      for log in flown], VEHICLE)
     assert {c.band_hz for c in found.map.cells if c.channel.startswith("torque")} == {(0.0, 0.5)}
     assert any("no gyro" in line for line in found.cannot)
+
+
+def test_logged_rotor_speeds_are_held_against_the_model(flown):
+    """The simulator logs what its rotors did; 5 % slower ones are seen as such."""
+    assert all(log.has(*RPM) for log in flown)
+    slow = [log.with_columns({"rpm_3": 0.95 * log["rpm_3"]}) for log in flown]
+    plain, changed = measure(flown, VEHICLE), measure(slow, VEHICLE)
+    for r, s in zip(plain.rotors, changed.rotors, strict=True):
+        assert r["ratio"] == pytest.approx(1.0, abs=0.05) and r["low"] <= r["ratio"] <= r["high"]
+        assert s["ratio"] / r["ratio"] == pytest.approx(0.95 if r["rotor"] == 3 else 1.0, abs=1e-6)
 
 
 def test_any_map_may_spread_the_work_and_progress_is_told(flown):

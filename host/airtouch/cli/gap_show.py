@@ -74,6 +74,7 @@ def measurement(screen: Console, found: Measurement) -> None:
     screen.print(f"overall: {found.gap['before']:.2g} times the floor"
                  + (f"; with the vehicle calibrated on the baseline {found.gap['calibrated']:.2g} times"
                     if "calibrated" in found.gap else ""))
+    remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors])
     remarks(screen, "What these logs cannot say", found.cannot)
     remarks(screen, "Notes", found.notes)
 

@@ -15,8 +15,10 @@ from airtouch.gap.fit import Study
 from airtouch.gap.flight import GROUND, Flight, ready
 from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of,
                                    where)
+from airtouch.gap.motion import held
 from airtouch.gap.result import Cell, Quantity, rounded
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.flight_log import RPM, FlightLog
+from airtouch.simulation import replay
 from airtouch.vehicle import Vehicle
 
 #: means of nominal flights that differ by more than this are worth a word: force m/s^2, torque rad/s^2
@@ -43,6 +45,7 @@ class Measurement:
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)
     spectra: Mapping[str, Any] = field(default_factory=dict)
+    rotors: tuple[Mapping[str, float], ...] = ()  #: speeds as logged and as modelled, in the air, 1/min
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -55,7 +58,7 @@ class Measurement:
             "gap": dict(self.gap), "floor_from": self.map.floor_from,
             "calibration": {k: q.plain() for k, q in self.calibration.items()},
             "cannot": list(self.cannot), "notes": list(self.notes), "left_out": list(self.left_out),
-            "spectra": dict(self.spectra), "map": [plain_cell(c) for c in self.map.cells],
+            "rotors": [dict(r) for r in self.rotors], "spectra": dict(self.spectra), "map": [plain_cell(c) for c in self.map.cells],
         })
 
 
@@ -70,6 +73,7 @@ class Held:
 
     parts: tuple[Part, ...]
     power: np.ndarray
+    speeds: np.ndarray | None
     notes: tuple[str, ...]
     cannot: tuple[str, ...]
 
@@ -95,12 +99,12 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         studies.append(study)
         notes += [n for n in fitted.notes if n not in notes]
     found: list[Held] = []
-    for held in run(partial(hold, tuple(studies)), flights):
-        if isinstance(held, str):
-            left_out.append(held)
+    for one in run(partial(hold, tuple(studies)), flights):
+        if isinstance(one, str):
+            left_out.append(one)
         else:
-            progress(held.parts[0].name)
-            found.append(held)
+            progress(one.parts[0].name)
+            found.append(one)
     if not found:
         raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
                             (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
@@ -113,7 +117,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     return Measurement(
         vehicle.name, maps[0], tuple(where(maps[0])), gap, maps[0].flights,
         tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]), tuple(notes),
+        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]), _rotors([h.speeds for h in found]), tuple(notes),
         cannot_of([h.cannot for h in found]), tuple(left_out))
 
 
@@ -124,7 +128,7 @@ def hold(studies: Sequence[Study], log: FlightLog) -> Held | str:
     except AirTouchError as error:
         return str(error)
     return Held(tuple(part_of(s, flight) for s in studies), _command_power(flight, studies[0].vehicle),
-                flight.notes, flight.cannot)
+                _rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
 
 
 def usable(logs: Iterable[FlightLog], vehicle: Vehicle, left_out: list[str]) -> Iterator[Flight]:
@@ -159,6 +163,33 @@ def differences(study: Study, nominal: Sequence[Flight]) -> list[str]:
 def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:
     count = Counter(reason for one in flights for reason in one)
     return tuple(r if n == len(flights) else f"{n} of {len(flights)} flights: {r}" for r, n in count.items())
+
+
+def _rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
+    """Median speed of each rotor in the air as logged and as modelled, (2, 4) 1/min; None without rpm."""
+    air = (flight.phase != GROUND) & flight.usable
+    if not flight.log.has(*RPM) or not air.any():
+        return None
+    model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(), pwm=flight.pwm)
+    logged = np.array([held(flight.log[c]) for c in RPM]).T[air]
+    turning = (logged > 0.0).mean(axis=0) > 0.5  # a counter that is stuck says nothing
+    return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
+                     np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
+
+
+def _rotors(found: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
+    known = [s for s in found if s is not None]
+    if not known:
+        return ()
+    made = []
+    for i in range(4):
+        pairs = np.array([s[:, i] for s in known if np.isfinite(s[0, i])])
+        if len(pairs):
+            ratio = pairs[:, 0] / np.maximum(pairs[:, 1], 1.0)
+            made.append({"rotor": i + 1, "logged": float(pairs[:, 0].mean()), "modelled": float(pairs[:, 1].mean()),
+                         "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
+                         "flights": len(pairs)})
+    return tuple(made)
 
 
 def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """A diagnosis in sentences, for the terminal and the report alike."""
 
+from collections.abc import Mapping
+
 from airtouch.gap.gap_map import CHANNEL_WORDS, LEAST_SHARE, PHASE_WORDS, in_words, short
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
 
@@ -60,3 +62,9 @@ def _shrink(diagnosis: Diagnosis) -> str:
     if diagnosis.shrink is None:
         return ""
     return f"; adding it shrinks the gap by {quantity(diagnosis.shrink, '{:.0%}')} on data held out"
+
+
+def rotor_in_words(rotor: Mapping[str, float]) -> str:
+    """`rotor 1: 19600 rpm logged, 0.96 of the model's (0.95 to 0.97 over 6 flights)`."""
+    return (f"rotor {rotor['rotor']}: {rotor['logged']:.0f} rpm logged, {rotor['ratio']:.3f} of the model's "
+            f"({rotor['low']:.3f} to {rotor['high']:.3f} over {rotor['flights']} flights)")

@@ -47,7 +47,8 @@ def write_measurement(path: Path, found: measure.Measurement, flights: Iterable[
         title="Gap between flights and simulator", answer=answer, support=support, made=found.map, where=where,
         images=(_images(calibrate.declared(vehicle, ()), seen, [], where[0], where) if seen and where else [])
         + _command_image(found.spectra), calibration=gap_tables.named(found.calibration),
-        lists=[("What these logs cannot say", found.cannot), ("Notes", found.notes), ("Left out", found.left_out)],
+        lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),
+               ("What these logs cannot say", found.cannot), ("Notes", found.notes), ("Left out", found.left_out)],
         flights=_flights(found.flights, found.vehicle, found.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
