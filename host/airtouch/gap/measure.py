@@ -23,6 +23,7 @@ from airtouch.vehicle import Vehicle
 
 #: means of nominal flights that differ by more than this are worth a word: force m/s^2, torque rad/s^2
 APART = np.array([0.2, 0.2, 0.2, 4.0, 4.0, 4.0])
+LEAST_RPM = 500.0  #: of a rotor in flight
 SURE = 6.0  #: and by more than this many standard errors
 NAMES = tuple(CHANNEL_WORDS.values())[:6]
 UNITS = ("m/s^2",) * 3 + ("rad/s^2",) * 3
@@ -172,7 +173,7 @@ def _rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
         return None
     model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(), pwm=flight.pwm)
     logged = np.array([held(flight.log[c]) for c in RPM]).T[air]
-    turning = (logged > 0.0).mean(axis=0) > 0.5  # a counter that is stuck says nothing
+    turning = (logged > LEAST_RPM).mean(axis=0) > 0.5  # a counter that is stuck says nothing
     return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
                      np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
 
