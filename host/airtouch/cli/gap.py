@@ -106,7 +106,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     if each and report:
         raise AirTouchError("--report shows one diagnosis; leave --each out")
     if dask and not each:
-        raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each or leave it out")
+        raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each")
     for path in effect_files:
         effects.load_file(path)
     for name in without:
@@ -170,7 +170,8 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
             bar(found.flights[0])
             first = found.ranking[0]
             table.add_row(Path(found.flights[0]).name, found.verdict,
-                          "; ".join(words.effect_in_words(e) for e in found.effects), f"{first.probability:.0%}")
+                          "; ".join(words.effect_in_words(e) for e in found.effects),
+                          f"{first.probability:.0%}")
             rows.append(found.plain())
     scores.console().print(table)
     if json_path:
@@ -191,7 +192,8 @@ def blind() -> None:
 
 @blind.command("make")
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
-@click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1), help="How many flights.")
+@click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1),
+              help="How many flights.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
 @click.option("--force", is_flag=True, help="Replace a set in --out.")
 def blind_make(out: Path, flights: int, seed: int, force: bool) -> None:
@@ -205,7 +207,8 @@ def blind_make(out: Path, flights: int, seed: int, force: bool) -> None:
 @blind.command("score")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.argument("answers", type=click.Path(path_type=Path, exists=True))
-@click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False), help="Write every figure.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write every figure.")
 @click.option("--force", is_flag=True, help="Replace the file.")
 def blind_score(folder: Path, answers: Path, json_path: Path | None, force: bool) -> None:
     """Open the key of the set in FOLDER and score the diagnoses in ANSWERS."""

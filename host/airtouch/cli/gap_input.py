@@ -50,7 +50,8 @@ def files_of(names: Sequence[str]) -> list[Path]:
     for name in names:
         path = Path(name)
         if path.is_dir():
-            some = [p for p in sorted(path.iterdir()) if p.name.endswith(ENDINGS) and p.name != "manifest.csv"]
+            some = [p for p in sorted(path.iterdir())
+                    if p.name.endswith(ENDINGS) and p.name != "manifest.csv"]
         elif path.exists():
             some = [path]
         else:

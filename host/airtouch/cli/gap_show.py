@@ -24,8 +24,8 @@ class Bar:
     """
 
     def __init__(self, total: int | None = None) -> None:
-        self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(),
-                                 console=Console(stderr=True), transient=True)
+        self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(),
+                                 TimeElapsedColumn(), console=Console(stderr=True), transient=True)
         self.task = self.progress.add_task("", total=total)
         self.timer = threading.Timer(PATIENCE_S, self.progress.start)
         self.timer.daemon = True
@@ -85,7 +85,7 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
     for effect in found.effects:
         screen.print("  " + words.effect_in_words(effect))
     table = Table(title="Ranking", title_justify="left", caption_justify="left",
-                  caption="shrink: part of the gap above the floor that goes away on data held out, 90 % interval")
+                  caption="shrink: part of the gap above the floor that goes away on data held out, 90 %")
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     for r in [r for i, r in enumerate(found.ranking) if i < 8 or r.name in ("none", "unknown")]:

@@ -12,7 +12,7 @@ from airtouch.logs.segments import KINDS
 DRAWS = 400
 LEAST_FLIGHTS = 5  #: with fewer, blocks are drawn and not flights
 LEAST_SECONDS = 0.3  #: a cell with less is left out
-INTERVAL = np.array([5.0, 95.0])
+INTERVAL = (5.0, 95.0)
 SIGMAS = 1.645  #: the same of a normal distribution
 FREEDOM = 4.0  #: independent values that a block counts for at most: blocks differ by more than chance
 AIR = "air"  #: floor of phases that no nominal flight had
@@ -38,7 +38,7 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
     if not rows.any():
         return None
     flight = all_sums.flight[rows]
-    part = Sums(all_sums.phase[rows], flight, all_sums.weight[rows], all_sums.power[rows], all_sums.mean[rows])
+    part = _rows(all_sums, rows)
     blocks = (part.weight > 0).sum(axis=0)
     flights = np.array([len(np.unique(flight[w > 0])) for w in part.weight.T])
     if len(np.unique(flight)) >= LEAST_FLIGHTS:
@@ -49,11 +49,16 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
     low, high = _bootstrap(part.weight, part.power, seed)
     seconds = weight * PERIOD_S
     width = np.array([b - a for a, b in BANDS_HZ])
-    freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, np.maximum(FREEDOM * blocks, 1.0)[:, None])[:, :, None]
-    narrow, wide = mean_square * freedom / chi2.ppf(INTERVAL[::-1] / 100.0, freedom[..., None]).transpose(3, 0, 1, 2)
+    most = np.maximum(FREEDOM * blocks, 1.0)[:, None]
+    freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, most)[:, :, None]
+    narrow, wide = (mean_square * freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
     narrow[:, 0], wide[:, 0] = _offset(part.mean.sum(axis=0) / total[:, 0], mean_square[:, 0], freedom[:, 0])
     low, high = np.minimum(low, narrow), np.maximum(high, wide)
     return Table(np.sqrt(mean_square), np.sqrt(low), np.sqrt(high), seconds, blocks, flights)
+
+
+def _rows(some: Sums, rows: np.ndarray) -> Sums:
+    return Sums(some.phase[rows], some.flight[rows], some.weight[rows], some.power[rows], some.mean[rows])
 
 
 def _offset(mean: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -61,7 +66,8 @@ def _offset(mean: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> tuple[
     rest = np.maximum(square - mean ** 2, 0.0)
     error = SIGMAS * np.sqrt(rest / freedom)
     below, above = (freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
-    return np.maximum(np.abs(mean) - error, 0.0) ** 2 + rest * below, (np.abs(mean) + error) ** 2 + rest * above
+    size = np.abs(mean)
+    return np.maximum(size - error, 0.0) ** 2 + rest * below, (size + error) ** 2 + rest * above
 
 
 def _bootstrap(weight: np.ndarray, power: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -93,18 +99,19 @@ def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
             continue
         wide = table.rms[:1], table.high[:1]  # where a regime was never flown, the phase as a whole
         there = (table.seconds >= LEAST_SECONDS)[:, None, None]
-        level, top = (np.where(there, own, every) for own, every in zip((table.rms, table.high), wide, strict=True))
+        own = table.rms, table.high
+        level, top = (np.where(there, one, every) for one, every in zip(own, wide, strict=True))
         level, top = (np.where(np.isfinite(v), v, least) for v in (level, top))
         found[key] = np.maximum(level, least), np.maximum(top, least)
     return found
 
 
 def spreads_of(found: Sums, sensor: np.ndarray) -> Floors:
-    """Phase -> floor without a baseline: sensor noise, and the spread between flights (blocks of a single one)."""
+    """Phase -> floor without a baseline: sensor noise, and the spread between flights (a single one: blocks)."""
     spreads: dict[int | str, np.ndarray] = {}
     for k in range(len(KINDS)):
         rows = found.phase == k
-        part = Sums(found.phase[rows], found.flight[rows], found.weight[rows], found.power[rows], found.mean[rows])
+        part = _rows(found, rows)
         if len(np.unique(part.flight)) > 1:
             part = part.by_phase()
         long = part.weight[:, 0] >= LEAST_SECONDS / PERIOD_S

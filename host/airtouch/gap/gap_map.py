@@ -33,8 +33,8 @@ CHANNEL_WORDS = {
     "command_thrust": "thrust command", "command_roll": "roll command",
     "command_pitch": "pitch command", "command_yaw": "yaw command",
 }
-PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover", "cruise": "in cruise",
-               "over platform": "over the platform", "landing": "at landing"}
+PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
+               "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] 
 def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     left = residual(flight, study.vehicle, study.calibration, study.controller)
-    return Part(flight.name, sums(flight, left, study.vehicle), _after(study, flight, terms) if terms else None,
-                flight.rates is not None,
+    after = _after(study, flight, terms) if terms else None
+    return Part(flight.name, sums(flight, left, study.vehicle), after, flight.rates is not None,
                 tuple(_after(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
 
 
@@ -115,7 +115,8 @@ def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
         key = (c.channel, c.band_hz, c.phase)
         if not significant(c) or key not in whole:
             continue
-        if c.regime != "all" and not (c.low > (whole[key].high or np.inf) and sure_ratio(c) > sure_ratio(whole[key])):
+        phase = whole[key]
+        if c.regime != "all" and not (c.low > (phase.high or np.inf) and sure_ratio(c) > sure_ratio(phase)):
             continue
         if key not in best or sure_ratio(c) > sure_ratio(best[key]):
             best[key] = c
@@ -129,7 +130,8 @@ def where(made: GapMap, count: int = 10) -> list[Cell]:
     more = [next((c for c in every if c.phase == kind), None) for kind in KINDS]
     closed = [c for c in every if c.after is not None]
     more += sorted(closed, key=lambda c: (c.after - c.gap) / max(c.floor_high or c.floor, 1e-12))[:3]
-    return chosen + sorted({c for c in more if c is not None and c not in chosen}, key=sure_ratio, reverse=True)
+    others = {c for c in more if c is not None and c not in chosen}
+    return chosen + sorted(others, key=sure_ratio, reverse=True)
 
 
 def ratio(cell: Cell) -> float:
@@ -153,7 +155,8 @@ def in_words(cell: Cell) -> str:
     """The cell as a phrase, `over the platform, 0-0.5 Hz, roll torque: 16 rad/s^2, 18 times the floor`."""
     regime = "" if cell.regime == "all" else f" ({cell.regime})"
     return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
-            f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, {short(ratio(cell))} times the floor")
+            f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, "
+            f"{short(ratio(cell))} times the floor")
 
 
 def short(value: float) -> str:
@@ -184,10 +187,12 @@ def _after(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
 
 def _rms(found: Sums, phase: int) -> np.ndarray:
     rows = found.phase == phase
-    return np.sqrt(found.power[rows].sum(axis=0) / np.maximum(found.weight[rows].sum(axis=0), 1.0)[:, None, None])
+    samples = np.maximum(found.weight[rows].sum(axis=0), 1.0)
+    return np.sqrt(found.power[rows].sum(axis=0) / samples[:, None, None])
 
 
-def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray, floor: np.ndarray) -> np.ndarray:
+def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
+          floor: np.ndarray) -> np.ndarray:
     """For each cell the effect that alone takes most from it, "" where each takes little."""
     with np.errstate(invalid="ignore"):
         taken = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, 1e-12))
@@ -195,8 +200,8 @@ def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray, 
     return np.where((taken.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
 
-def _cells(kind: str, table: Table, then: Table | None, best: np.ndarray | None, level: np.ndarray, top: np.ndarray,
-           baseline: bool, no_gyro: bool) -> list[Cell]:
+def _cells(kind: str, table: Table, then: Table | None, best: np.ndarray | None, level: np.ndarray,
+           top: np.ndarray, baseline: bool, no_gyro: bool) -> list[Cell]:
     cells = []
     shown = _shown(kind, baseline, no_gyro)
     for r, regime in enumerate(REGIMES):

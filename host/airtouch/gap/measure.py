@@ -59,7 +59,8 @@ class Measurement:
             "gap": dict(self.gap), "floor_from": self.map.floor_from,
             "calibration": {k: q.plain() for k, q in self.calibration.items()},
             "cannot": list(self.cannot), "notes": list(self.notes), "left_out": list(self.left_out),
-            "rotors": [dict(r) for r in self.rotors], "spectra": dict(self.spectra), "map": [plain_cell(c) for c in self.map.cells],
+            "rotors": [dict(r) for r in self.rotors], "spectra": dict(self.spectra),
+            "map": [plain_cell(c) for c in self.map.cells],
         })
 
 
@@ -118,7 +119,8 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     return Measurement(
         vehicle.name, maps[0], tuple(where(maps[0])), gap, maps[0].flights,
         tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]), _rotors([h.speeds for h in found]), tuple(notes),
+        _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]),
+        _rotors([h.speeds for h in found]), tuple(notes),
         cannot_of([h.cannot for h in found]), tuple(left_out))
 
 
@@ -171,7 +173,8 @@ def _rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
     air = (flight.phase != GROUND) & flight.usable
     if not flight.log.has(*RPM) or not air.any():
         return None
-    model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(), pwm=flight.pwm)
+    model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(),
+                       pwm=flight.pwm)
     logged = np.array([held(flight.log[c]) for c in RPM]).T[air]
     turning = (logged > LEAST_RPM).mean(axis=0) > 0.5  # a counter that is stuck says nothing
     return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
@@ -187,7 +190,8 @@ def _rotors(found: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
         pairs = np.array([s[:, i] for s in known if np.isfinite(s[0, i])])
         if len(pairs):
             ratio = pairs[:, 0] / np.maximum(pairs[:, 1], 1.0)
-            made.append({"rotor": i + 1, "logged": float(pairs[:, 0].mean()), "modelled": float(pairs[:, 1].mean()),
+            logged, model = pairs.mean(axis=0)
+            made.append({"rotor": i + 1, "logged": float(logged), "modelled": float(model),
                          "ratio": float(ratio.mean()), "low": float(ratio.min()), "high": float(ratio.max()),
                          "flights": len(pairs)})
     return tuple(made)

@@ -19,8 +19,8 @@ def answer(diagnosis: Diagnosis) -> str:
     if cell is None:
         return f"The gap is {names}{_shrink(diagnosis)}."
     others = [e.name.replace("_", " ") for e in diagnosis.effects if e.name != cell.by] if cell.by else []
-    cause, added = (cell.by.replace("_", " "), "it") if cell.by else (names, "it" if len(diagnosis.effects) == 1
-                                                                      else "them")
+    cause = cell.by.replace("_", " ") if cell.by else names
+    added = "it" if cell.by or len(diagnosis.effects) == 1 else "them"
     part = f"{share(cell):.0%}" if share(cell) < 0.995 else "Nearly all"
     return (f"{part} of the gap {PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} "
             f"({cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz) is {cause}; adding {added} "

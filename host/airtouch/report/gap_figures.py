@@ -68,7 +68,8 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Mapping[str, Any]]) -> byt
         for ax, some in zip(axes, shown, strict=True):
             for key, colour, width in (("floor", FLOOR, 1.6), ("before", BEFORE, 1.3), ("after", AFTER, 1.3)):
                 if some.get(key) is not None:
-                    ax.loglog(frequency_hz[1:], np.maximum(some[key][1:], 1e-12), color=colour, lw=width, label=key)
+                    ax.loglog(frequency_hz[1:], np.maximum(some[key][1:], 1e-12), color=colour, lw=width,
+                              label=key)
             ax.set_title(CHANNEL_WORDS[some["channel"]], loc="left")
             ax.set_ylabel(f"({some['unit']})²/Hz")
             ax.grid(alpha=0.2)
@@ -121,8 +122,10 @@ def _below(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
     """Values up to the end of a band, NaN where nothing is judged."""
     out = np.full(len(values), np.nan)
     for start, stop in stretches(flight):
-        out[start:stop] = filtered(np.nan_to_num(values[start:stop, None]))[:max(band, 1) + 1].sum(axis=0)[:, 0] \
-            if band < len(BANDS_HZ) - 1 else values[start:stop]
+        here = values[start:stop]
+        if band < len(BANDS_HZ) - 1:
+            here = filtered(np.nan_to_num(here[:, None]))[:max(band, 1) + 1].sum(axis=0)[:, 0]
+        out[start:stop] = here
     return out
 
 

@@ -17,7 +17,8 @@ from airtouch.gap.candidates import MEAN, SPECTRUM, Term, terms
 from airtouch.gap.channels import CHANNELS, residual
 from airtouch.gap.fit import Data, Study
 from airtouch.gap.flight import Flight
-from airtouch.gap.gap_map import GapMap, gap_map, in_words, where as where_of
+from airtouch.gap.gap_map import CHANNEL_WORDS, GapMap, gap_map, in_words, short
+from airtouch.gap.gap_map import where as where_of
 from airtouch.gap.result import Cell, Diagnosis, Found
 from airtouch.gap.spectra import AIR, blocks, frequencies, sensor_power, starts
 from airtouch.logs.files import write_bytes
@@ -44,11 +45,13 @@ def write_measurement(path: Path, found: measure.Measurement, flights: Iterable[
                (f", {found.gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights."
                 if "calibrated" in found.gap else ".")]
     page = _page(
-        title="Gap between flights and simulator", answer=answer, support=support, made=found.map, where=where,
+        title="Gap between flights and simulator", answer=answer, support=support, made=found.map,
+        where=where,
         images=(_images(calibrate.declared(vehicle, ()), seen, [], where[0], where) if seen and where else [])
         + _command_image(found.spectra), calibration=gap_tables.named(found.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),
-               ("What these logs cannot say", found.cannot), ("Notes", found.notes), ("Left out", found.left_out)],
+               ("What these logs cannot say", found.cannot), ("Notes", found.notes),
+               ("Left out", found.left_out)],
         flights=_flights(found.flights, found.vehicle, found.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -78,10 +81,13 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, flights: Sequence[FlightLo
         indistinguishable=[f"Cannot be told apart in these logs: {words.joined(list(g))}."
                            for g in diagnosis.indistinguishable],
         images=_images(study, seen, effects, shown, where) + _twin_images(seen, nominal, vehicle),
-        how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None, judged=True, unexplained=_unexplained(where),
+        how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None, judged=True,
+        unexplained=_unexplained(where),
         calibration=gap_tables.named(fitted.parameters) if fitted else [], advice=diagnosis.advice,
-        lists=[("What these logs cannot say", diagnosis.cannot), ("Notes", diagnosis.notes), ("Left out", left_out)],
-        flights=_flights(diagnosis.flights or [f.name for f in seen], vehicle.name, [f.name for f in nominal]),
+        lists=[("What these logs cannot say", diagnosis.cannot), ("Notes", diagnosis.notes),
+               ("Left out", left_out)],
+        flights=_flights(diagnosis.flights or [f.name for f in seen], vehicle.name,
+                         [f.name for f in nominal]),
         command=command)
     write_bytes(page.encode(), path, force)
 
@@ -90,7 +96,8 @@ def term_of(effect: Found) -> Term:
     """An effect as a diagnosis names it, as a term with its values."""
     given = {k: q.value for k, q in effect.parameters.items()}
     some = terms(effect.name)
-    right = min(some, key=lambda t: sum(abs(given.get(k, v) - v) for k, v in t.values.items() if k not in t.free))
+    right = min(some, key=lambda t: sum(abs(given.get(k, v) - v) for k, v in t.values.items()
+                                        if k not in t.free))
     return Term(right.effect, right.kind, right.free, {**right.values, **given})
 
 
@@ -129,7 +136,8 @@ def _control(diagnosis: Diagnosis) -> str:
 
 def _unexplained(where: Iterable[Cell]) -> list[str]:
     left = [c for c in where if (c.gap if c.after is None else c.after) > 1.5 * (c.floor_high or c.floor)]
-    return [in_words(c) + ("" if c.after is None else f"; with the effects in the model {c.after:.2g} {c.unit}")
+    return [in_words(c) + ("" if c.after is None else
+                           f"; with the effects in the model {short(c.after)} {c.unit}")
             for c in left[:MOST_CELLS]]
 
 
@@ -142,18 +150,22 @@ def _images(study: Study, flights: Sequence[Flight], effects: Sequence[Term], ce
     band = BANDS_HZ.index(cell.band_hz) if cell.band_hz in BANDS_HZ else len(BANDS_HZ) - 1
     flight = _telling_flight(study, flights, cell)
     before = residual(flight, study.vehicle, study.calibration, study.controller)
-    after = residual(flight, study.vehicle, (*study.calibration, *active), study.controller) if active else None
-    images = [{"title": f"{gap_figures.CHANNEL_WORDS[cell.channel].capitalize()}, up to {BANDS_HZ[band][1]:g} Hz",
+    after = None
+    if active:
+        after = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
+    name = CHANNEL_WORDS[cell.channel].capitalize()
+    images = [{"title": f"{name}, up to {BANDS_HZ[band][1]:g} Hz",
                "data": embed(gap_figures.signals(flight, cell.channel, band, before, after, cell.floor)),
-               "text": f"Flight {Path(flight.name).name}. Grey: the floor; blue: take-off and landing; yellow: over a "
-                       "platform."}]
+               "text": f"Flight {Path(flight.name).name}. Grey: the floor; blue: take-off and landing; "
+                       "yellow: over a platform."}]
     channels = gap_tables.shown_channels([cell, *where])
     curves = _curves(study, flights, effects, channels)
     if curves:
         images.append({"title": "Spectra of the gap in the air",
                        "data": embed(gap_figures.spectra(frequencies(AIR), curves)),
-                       "text": "Mean over all blocks. A random effect cannot be predicted sample by sample: its "
-                               "green curve is what is left of the power." if effects else "Mean over all blocks."})
+                       "text": "Mean over all blocks." + (
+                           " A random effect cannot be predicted sample by sample: its green curve is what is "
+                           "left of the power." if effects else "")})
     return images
 
 
@@ -193,7 +205,8 @@ def _curves(study: Study, flights: Sequence[Flight], effects: Sequence[Term], ch
             for name in channels if np.isfinite(first[:, index.index(name)]).all()]
 
 
-def _twin_images(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> list[dict[str, str]]:
+def _twin_images(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle,
+                 ) -> list[dict[str, str]]:
     return _command_image(measure.command_spectra(flights, nominal, vehicle))
 
 
@@ -205,8 +218,10 @@ def _command_image(made: dict[str, Any]) -> list[dict[str, str]]:
 
 
 def _flights(names: Sequence[str], vehicle: str, baseline: Sequence[str]) -> str:
-    shown = ", ".join(Path(n).name for n in names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-    base = ", ".join(Path(n).name for n in baseline[:5]) + (f" and {len(baseline) - 5} more" if len(baseline) > 5
-                                                            else "")
-    return (f"Flights: {shown}. Vehicle: {vehicle}. "
-            + (f"Baseline: {base}." if baseline else "No baseline flights were given."))
+    return (f"Flights: {_few(names)}. Vehicle: {vehicle}. "
+            + (f"Baseline: {_few(baseline)}." if baseline else "No baseline flights were given."))
+
+
+def _few(names: Sequence[str]) -> str:
+    shown = ", ".join(Path(n).name for n in names[:5])
+    return shown + (f" and {len(names) - 5} more" if len(names) > 5 else "")

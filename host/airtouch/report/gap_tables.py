@@ -40,7 +40,8 @@ def shaded(cell: Cell) -> dict[str, str]:
     times = ratio(cell)
     sure = significant(cell)
     colour, ink = next((c, i) for least, c, i in SHADES if times >= least) if sure else QUIET
-    title = (f"{in_words(cell)}; interval {short(cell.low)} to {short(cell.high)}, floor {short(cell.floor)} {cell.unit}, "
+    title = (f"{in_words(cell)}; interval {short(cell.low)} to {short(cell.high)}, "
+             f"floor {short(cell.floor)} {cell.unit}, "
              f"{cell.blocks} blocks of {cell.flights} flights")
     after = "" if cell.after is None or not sure else f"{short(cell.after / max(cell.floor, 1e-12))}×"
     return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": colour, "ink": ink,
