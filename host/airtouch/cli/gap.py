@@ -227,9 +227,12 @@ def _check_free(report: Path | None, json_path: Path | None, force: bool) -> Non
 
 
 def _line(name: str, real: tuple[str, ...], baseline: tuple[str, ...], vehicle: str | None) -> str:
-    """The command as it was given, for the report."""
-    base = "".join(f" --baseline {b}" for b in baseline)
-    return f"airtouch gap {name} {' '.join(real)}" + (f" --vehicle {vehicle}" if vehicle else "") + base
+    """The command as it was given, for the report; long lists of files cut short."""
+    def few(names: tuple[str, ...]) -> str:
+        return " ".join(names[:4]) + (f" [and {len(names) - 4} more]" if len(names) > 4 else "")
+
+    return (f"airtouch gap {name} {few(real)}" + (f" --vehicle {vehicle}" if vehicle else "")
+            + (f" --baseline {few(baseline)}" if baseline else ""))
 
 
 def _written(*paths: Path | None) -> None:
