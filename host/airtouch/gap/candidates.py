@@ -33,8 +33,10 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "slung_load": tuple({"length": x} for x in (0.1, 0.2, 0.4)),
     "gust": tuple({"length": x} for x in (0.2, 0.5, 1.5)),
     "motor_noise": tuple({"time": x} for x in (0.005, 0.02, 0.1)),
-    "battery_sag": tuple({"charge": x} for x in (0.95, 0.6)),
+    "battery_sag": tuple({"charge": x, "capacity": c} for x in (0.95, 0.8, 0.6, 0.4) for c in (0.2, 1.0)),
 }
+#: parameters that are freed once a fit of the others is close
+_LATER = {"battery_sag": ("charge", "capacity"), "slung_load": ("length",)}
 _ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are also tried alone
 _FIXED = {"ground_effect": {"turbulence": 0.0}}
 COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
@@ -73,6 +75,11 @@ class Term:
 
     def fitted(self, x: np.ndarray) -> "Term":
         return replace(self, values=self.at(x))
+
+    def refined(self) -> "Term":
+        """The same with those parameters free too that are fitted last."""
+        more = tuple(p for p in _LATER.get(self.name, ()) if p not in self.free)
+        return replace(self, free=self.free + more) if more else self
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest scaled parameters."""

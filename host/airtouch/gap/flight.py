@@ -22,6 +22,8 @@ GROUND = KINDS.index("ground")
 LEAST_AIR_S = 3.0  #: less time in the air than this is not diagnosed
 LARGEST = 1e5  #: no column holds more
 LEAST_GOOD = 0.5  #: part of a column's values that must be there
+SETTLED_S = 1.0  #: after the motors have stopped, in which it may still bounce
+KNOCK = 7.0  #: usual deviations
 CONTACT_S = 0.3  #: left out around the moments at which the vehicle touches the ground
 
 
@@ -106,7 +108,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
         signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
     rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
-    usable = ~lost & ~_near_contact(phase, pwm)
+    usable = ~lost & ~_near_contact(phase, pwm) & ~_knocks(force, (phase == GROUND) & (pwm.max(axis=1) <= 0.0))
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
                   tuple(notes), tuple(cannot))
 
@@ -162,6 +164,16 @@ def _regular(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np.ndarr
     return FlightLog(columns, meta), clock, lost
 
 
+def _knocks(force: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Samples on the ground at which somebody or something pushed: far off all the others there."""
+    out = np.zeros(len(rest), bool)
+    if rest.any():
+        away = np.abs(force[rest] - np.median(force[rest], axis=0))
+        usual = 1.4826 * np.median(away, axis=0)
+        out[rest] = (away > KNOCK * np.maximum(usual, 1e-3)).any(axis=1)
+    return out
+
+
 def _near_contact(phase: np.ndarray, pwm: np.ndarray) -> np.ndarray:
     """Samples at which legs may touch: motors run on the ground, and around take-off and touch-down."""
     moving = pwm.max(axis=1) > 0.0
@@ -171,6 +183,8 @@ def _near_contact(phase: np.ndarray, pwm: np.ndarray) -> np.ndarray:
     wide = int(CONTACT_S / PERIOD_S)
     for k in np.flatnonzero(change):
         touching[max(k - wide, 0):k + wide] = True
+    since = np.arange(len(moving)) - np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -10 ** 6))
+    touching |= rest & (since < SETTLED_S / PERIOD_S)
     before = rest & (np.cumsum(moving) == 0)
     before[np.argmax(moving) - 1 if moving.any() else 0:] = False
     return touching & ~before

@@ -131,7 +131,7 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Scr
                 looked.append(Judged(name, (*held, *terms), before + gain, full=False))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen))
-    looked.sort(key=lambda j: -j.gain)
+    looked = _best_variants(looked)
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * LEAST_GAIN)]
     fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen) for j in worth]
     best: dict[str, Judged] = {}
@@ -141,6 +141,14 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Scr
         if old is None or (j.full, j.gain) > (old.full, old.gain + need):
             best[j.name] = j
     return best
+
+
+def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
+    """The best of each candidate's variants of one length, best first."""
+    kept: dict[tuple[str, int], Judged] = {}
+    for j in sorted(looked, key=lambda j: -j.gain):
+        kept.setdefault((j.name, len(j.terms)), j)
+    return list(kept.values())
 
 
 def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str, held: Hypothesis,
@@ -155,7 +163,7 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str
         others = [t for t in every if t.kind != CLOCK]
         gain += sum(clock_gain(data, t)[1] for t in held if t.kind == CLOCK)
         for train, test in ((0, 1), (1, 0)):
-            found = fit(data, parts[train], others, _start(chosen, others, train))
+            found = _refined(data, parts[train], fit(data, parts[train], others, _start(chosen, others, train)))
             gain += judge(data, parts[test], found.terms) - base[test] if others else 0.0
             fits.append(found)
     fitted = list(fits[0].terms) if fits else []
@@ -164,6 +172,14 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str
         fitted.append(made)
         gain += more if t in timed else 0.0
     return Judged(name, tuple(fitted), gain, tuple(fits))
+
+
+def _refined(data: Data, part: Part, found: Fit) -> Fit:
+    """A fit with the parameters free too that only a fit close to the truth can find."""
+    terms = [t.refined() for t in found.terms]
+    if all(a.free == b.free for a, b in zip(terms, found.terms, strict=True)):
+        return found
+    return fit(data, part, terms, np.concatenate([t.scaled(t.values) for t in terms if t.kind == MEAN]))
 
 
 def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
