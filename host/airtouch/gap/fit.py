@@ -29,6 +29,7 @@ LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only th
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
 FREEDOM = 12.0  #: of the Student-like tail at most
+KEPT, KEPT_SAMPLES = 64, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,20 @@ class Data:
 
 
 def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap with effects in the model, by flight and regime."""
+    """Spectra of the gap with effects in the model, by flight and regime; commands are the twin view's."""
     study, out = data.study, []
+    kept = data.__dict__.setdefault("_spectra", {})
+    key = tuple((a.effect.name, *a.values.values()) for a in active)
+    if key in kept:
+        return kept[key]
     for flight, first in zip(data.flights, data.first, strict=True):
-        left = residual(flight, study.vehicle, (*study.calibration, *active), study.controller)
+        left = residual(flight, study.vehicle, (*study.calibration, *active))
         left = np.where(flight.lost[:, None], 0.0, left)
         out.append({r: blocks(left, first[r], r) for r in first})
+    if sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
+        if len(kept) >= KEPT:
+            kept.pop(next(iter(kept)))
+        kept[key] = out
     return out
 
 

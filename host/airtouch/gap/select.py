@@ -117,7 +117,7 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Scr
     have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
     left, added = [], []
     for k, part in enumerate(parts):
-        problem, values, power = left_over(data, part, chosen.fits[1 - k].terms if chosen else ())
+        problem, values, power = left_over(data, part, chosen.fits[1 - k].terms if chosen and chosen.fits else ())
         left.append(values)
         added.append(power - problem.power)
     looked, sure = [], []
@@ -184,7 +184,7 @@ def _refined(data: Data, part: Part, found: Fit) -> Fit:
 
 def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
     """The parameters found before, and a little of every new effect; None to begin anew."""
-    if chosen is None or any(t.name in COMMAND_ONLY for t in terms):
+    if chosen is None or not chosen.fits or any(t.name in COMMAND_ONLY for t in terms):
         return None
     known = chosen.fits[train].scaled
     size = sum(len(t.free) for t in terms if t.kind == MEAN)
