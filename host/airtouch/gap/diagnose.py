@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import advice as advices
-from airtouch.gap import calibrate, candidates, measure
+from airtouch.gap import balance_result, calibrate, candidates, measure
 from airtouch.gap.candidates import CLOCK, Term
 from airtouch.gap.fit import Data, Study, fit
 from airtouch.gap.flight import Flight
@@ -39,6 +39,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     seen = list(measure.usable(flights, vehicle, left_out))
     if not seen:
         raise AirTouchError(left_out[-1] if left_out else "no flight to diagnose")
+    if balance_result.applies(seen, nominal, vehicle):
+        return balance_result.diagnosis(seen, nominal, vehicle, left_out, without)
     say("calibration")
     study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)

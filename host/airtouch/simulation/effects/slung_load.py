@@ -5,7 +5,7 @@ import math
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 
-LOAD, LENGTH, BELOW, DAMPING = range(4)
+LOAD, LENGTH, BELOW, DAMPING, TIED_X, TIED_Y = range(6)
 STRETCH = 60.0  #: rad/s, bounce of the load on its thread: stiff against the swing
 
 
@@ -39,8 +39,9 @@ def slung_load(p, s, memory, stream, out):
     out[0] += fx
     out[1] += fy
     out[2] += fz
-    out[3] += p[BELOW] * fy
-    out[4] -= p[BELOW] * fx
+    out[3] += p[BELOW] * fy + p[TIED_Y] * fz
+    out[4] -= p[BELOW] * fx + p[TIED_X] * fz
+    out[5] += p[TIED_X] * fy - p[TIED_Y] * fx
 
 
 EFFECT = Effect(
@@ -48,5 +49,7 @@ EFFECT = Effect(
     (Parameter("load", "kg", 0.003, 0.0, 1.0, 0.0, "mass of the weight", "CrazyPAD: a few grams"),
      Parameter("length", "m", 0.2, 0.02, 2.0, None, "of the thread", "CrazyPAD"),
      Parameter("below", "m", 0.01, 0.0, 0.2, None, "where it is tied, below the centre of mass"),
-     Parameter("damping", "1/s", 0.3, 0.0, 20.0, None, "of the swing, by the air")),
+     Parameter("damping", "1/s", 0.3, 0.0, 20.0, None, "of the swing, by the air"),
+     Parameter("x", "m", 0.0, -0.1, 0.1, None, "where it is tied, forward of the centre of mass"),
+     Parameter("y", "m", 0.0, -0.1, 0.1, None, "where it is tied, left of the centre of mass")),
     wrench=slung_load)
