@@ -29,6 +29,7 @@ _FREE = {
 _KIND = {"gust": SPECTRUM, "motor_noise": SPECTRUM, "imu_noise": SPECTRUM, "vibration": SPECTRUM,
          "time_jitter": CLOCK, "packet_loss": CLOCK}
 _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
+    "ground_effect": tuple({"fade": x} for x in (0.0, 0.06)),
     "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
     "slung_load": tuple({"length": x} for x in (0.1, 0.2, 0.4)),
     "gust": tuple({"length": x} for x in (0.2, 0.5, 1.5)),

@@ -7,6 +7,7 @@ itself on the flight's signals with several seeds.
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from airtouch.gap.channels import COUNT, residual
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
@@ -17,6 +18,10 @@ from airtouch.simulation import rigid_body
 from airtouch.simulation.random_stream import stream, normals
 
 SEEDS = 4
+GROUP = 3  #: blocks, as in the two halves of the data: a line must stand out in both
+LOWEST_LINE = 8  #: bins of 0.39 Hz
+NEIGHBOURS = 41  #: bins among whose median a line stands out
+PEAK = 3.0  #: times that median
 
 
 def growth(term: Any, x: float) -> float:
@@ -105,17 +110,22 @@ def _vibration(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarra
 
 def line_shape(data: Any, i: int, term: Any) -> np.ndarray:
     """(bins, COUNT): power of lines of unit amplitude, at the bins where they are."""
-    spectrum = (np.abs(data.base[i]["air"]) ** 2).mean(axis=0)[:, :6]
+    every = np.abs(data.base[i]["air"][:, :, :6]) ** 2
+    spectrum = every.mean(axis=0)
+    made = np.zeros((len(spectrum), COUNT))
     floor = data.study.floor.power["air"][:, :6]
-    with np.errstate(invalid="ignore"):
-        over = np.maximum(np.nan_to_num(spectrum / floor) - 1.0, 0.0)
-    force = over[:, :3].sum(axis=1)
-    force[:8] = 0.0
-    made = np.zeros((len(over), COUNT))
-    if force.max() <= 0.0:
+    halves = [every[(np.arange(len(every)) // GROUP) % 2 == k] for k in (0, 1)]
+    if min(len(h) for h in halves) == 0:
         return made
-    shape = force / force.sum()
-    shape[shape < 0.05 * shape.max()] = 0.0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        over = np.min([np.nan_to_num(h.mean(axis=0) / floor)[:, :3].sum(axis=1) for h in halves], axis=0)
+    over = np.maximum(over - 3.0, 0.0)
+    over[:LOWEST_LINE] = 0.0
+    around = median_filter(over, NEIGHBOURS, mode="nearest")
+    shape = np.where(over > PEAK * around + 0.5, over - around, 0.0)
+    shape[shape < 0.05 * shape.max(initial=0.0)] = 0.0
+    if shape.sum() <= 0.0:
+        return made
     shape /= max(shape.sum(), 1e-12)
     f = frequencies("air")
     width = f[1]
