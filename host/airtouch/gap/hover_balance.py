@@ -28,15 +28,16 @@ NAMES = ("lift", "roll", "pitch", "yaw", "unsteady", "heave")
 #: at a voltage is known to 1 %. The last two are of log10 power.
 BETWEEN = np.array([0.012, 0.011, 0.011, 0.014, 0.2, 0.2])
 #: on top of that for a vehicle that was worked on: another set of propellers, whose torque differs too
-WORKED_ON = np.array([0.012, 0.012, 0.012, 0.025])
-OWN = 3.0  #: nominal flights that BETWEEN is worth beside the scatter of the flights given
+WORKED_ON = np.array([0.012, 0.012, 0.012, 0.02])
+OWN = 0.5  #: nominal flights that BETWEEN is worth beside the scatter of the flights given
 VOLTAGE_EXPONENT = 1.2  #: thrust at a PWM grows with voltage to this power (from nominal flights)
 SETTLE_S = 0.8  #: left out after take-off and before landing
 LEAST_S = 4.0
 UNSTEADY_HZ, HEAVE_HZ = (2.0, 35.0), (0.9, 2.0)
 SAMPLES = 4096  #: of each prior
-LOSS = 0.2  #: half-normal prior of a share of thrust lost
+LOSS = 0.12  #: half-normal prior of a share of thrust lost
 WEIGHT = 0.1  #: half-normal prior of an added share of the mass
+FREEDOM = 4.0  #: of the Student-like tail: now and then a set of propellers is far off
 REACH = 1.2  #: farthest place of a weight, over the arm
 SHIFT_M = 0.002  #: normal prior of a centre of mass that moved
 HUNG = 0.02  #: of a weight on a thread, which may rest on the floor
@@ -160,7 +161,8 @@ def evidence(seen: np.ndarray, base: Reference, every: Sequence[Hypothesis]) -> 
     logs, weights = [], []
     for h in every:
         variance = base.variance[:4] + (WORKED_ON ** 2 if h.effects else 0.0)
-        distance = 0.5 * ((apart[:4] - h.change) ** 2 / variance).sum(axis=1)
+        tail = FREEDOM * np.log1p((apart[:4] - h.change) ** 2 / variance / FREEDOM)
+        distance = 0.5 * (FREEDOM + 1.0) / FREEDOM * tail.sum(axis=1)
         w = np.exp(distance.min() - distance)
         log = np.log(w.mean()) - distance.min() + np.log(h.prior) - 0.5 * np.log(variance).sum()
         for k, (mean, spread) in enumerate(h.manner):
