@@ -44,10 +44,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     say("calibration")
     study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
-    data = Data(study, some)
-    if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
-        raise AirTouchError(f"{seen[0].name}: too short to be judged on other data than it is fitted on; at least "
-                            "5 s in the air without a hole are needed")
+    data = _data(study, some)
     found = select(data, candidates.every(without), say)
     say("how far")
     parts = halves(data)
@@ -71,6 +68,31 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         advices.advice(verdict, [e.name for e in effects], alike, cells, seen, bool(nominal)),
         _arms(vehicle, nominal, some, found, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
         measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen), (study, fitted))
+
+
+def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
+    """`diagnose` with a study that is there already, without map, arms and advice: for many cases alike.
+
+    data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
+    """
+    data = _data(study, flights) if data is None else data
+    found = select(data, candidates.every(without))
+    verdict = _verdict(found)
+    ranking, overall = _ranking(data, found)
+    named = verdict == "effect"
+    return Diagnosis(
+        verdict, tuple(_effects(data, found)) if named else (), tuple(ranking), _alike(found), (),
+        {"before": overall.before, "after": overall.after if named else overall.before, "floor": 1.0},
+        overall.share if named else None, _control(data, halves(data), found) if named else {}, "",
+        flights=tuple(f.name for f in flights))
+
+
+def _data(study: Study, flights: Sequence[Flight]) -> Data:
+    data = Data(study, flights)
+    if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
+        raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
+                            "5 s in the air without a hole are needed")
+    return data
 
 
 def _some(flights: Sequence[Flight]) -> list[Flight]:
