@@ -1,0 +1,119 @@
+"""Flights without a gyro: hover balance against closed forms, and CrazyPAD's known defects."""
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle
+from airtouch.gap.diagnose import diagnose
+from airtouch.gap.hover_balance import BETWEEN, MIX, Reference, evidence, hypotheses
+from airtouch.logs import read
+from airtouch.simulation import replay
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Active, get
+
+FLOWN = vehicle.load("crazyflie-2.1")
+NOMINAL = Reference(np.zeros(6), BETWEEN ** 2)
+
+
+def told(thrusts: np.ndarray) -> np.ndarray:
+    """The pattern (6,) of commanded thrusts (4,), each over its nominal one; steady as a load is."""
+    mixed = MIX @ thrusts
+    return np.array([np.log(mixed[0]), *(mixed[1:] / mixed[0]), 0.4, 0.3])
+
+
+def best(pattern: np.ndarray) -> tuple:
+    every = hypotheses(FLOWN)
+    logs, weights = evidence(pattern, NOMINAL, every)
+    i = int(np.argmax(logs))
+    return every[i], weights[i]
+
+
+@pytest.mark.parametrize("rotor", [1, 2, 3, 4])
+def test_a_rotor_that_needs_more_by_itself_is_weak(rotor):
+    thrusts = np.ones(4)
+    thrusts[rotor - 1] = 1.0 / (1.0 - 0.2)
+    found, weight = best(told(thrusts))
+    assert [(name, int(v["rotor"][0])) for name, v in found.effects] == [("weak_motor", rotor)]
+    assert weight @ found.effects[0][1]["thrust_loss"] == pytest.approx(0.2, abs=0.03)
+
+
+def test_two_rotors_across_from_each_other():
+    thrusts = np.array([1.0, 1.0 / 0.8, 1.0, 1.0 / 0.8])
+    found, _ = best(told(thrusts))
+    assert [int(v["rotor"][0]) for _, v in found.effects] == [2, 4]
+
+
+def test_a_weight_in_front_keeps_yaw():
+    share, forward = 0.12, 0.02
+    half = FLOWN.arm_m / np.sqrt(2.0)
+    front = share * forward / half  # the front pair carries the weight's moment
+    thrusts = 1.0 + share + np.array([front, -front, -front, front])
+    found, weight = best(told(thrusts))
+    assert [name for name, _ in found.effects] == ["mass", "com_offset"]
+    assert weight @ found.effects[0][1]["fraction"] == pytest.approx(share, abs=0.03)
+    assert weight @ found.effects[1][1]["x"] == pytest.approx(share / (1.0 + share) * forward, abs=0.0006)
+
+
+def test_nominal_is_none_and_nonsense_is_unknown():
+    found, _ = best(np.array([0.0, 0.003, -0.003, 0.002, 0.0, 0.0]))
+    assert found.name == "none"
+    found, _ = best(np.array([-0.3, 0.3, -0.3, 0.3, 0.4, 0.3]))
+    assert found.name == "unknown"
+
+
+def test_a_thread_tied_off_centre_turns_the_vehicle():
+    steady = np.zeros((400, at.COUNT))
+    steady[:, at.STEP], steady[:, at.GRAVITY], steady[:, at.HEIGHT] = 0.002, 9.81, 1.0
+    steady[:, [at.ROTATION, at.ROTATION + 4, at.ROTATION + 8]] = 1.0
+    effect, load = get("slung_load"), 0.003
+    values = effect.values({"load": load, "length": 0.63, "x": 0.02, "y": -0.01})
+    last = replay.wrench_of(Active(effect, values), steady)[-1]
+    assert last[2] == pytest.approx(-load * 9.81, rel=0.02)
+    np.testing.assert_allclose(last[3:], [-0.01 * last[2], -0.02 * last[2], 0.0], atol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def pad(flights):
+    folder = flights / "crazypad"
+    if not folder.is_dir():
+        pytest.skip("no CrazyPAD flights")
+    return lambda name: read(folder / f"pad_{name}.csv.gz")
+
+
+@pytest.fixture(scope="module")
+def nominal(pad):
+    return {"E8": [pad(f"normal_flight_E8_log0{i}") for i in range(4)],
+            "E9": [pad(f"normal_flight_E9_log0{i}") for i in range(2)]}
+
+
+@pytest.mark.parametrize(("name", "rotors"), [
+    ("cut_propeller_M3_3mm_3mm_41mm_E8_log01", [3]),
+    ("cut_propeller_M3_4mm_4mm_39mm_E8_log00", [3]),
+    ("cut_M2_3.5mm_3.0mm_40.5mm_M1_3.0mm_3.0mm_41mm_E9_log00", [1, 2]),
+])
+def test_cut_rotors_are_named(pad, nominal, name, rotors):
+    found = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
+    assert found.verdict == "effect"
+    assert [e.name for e in found.effects] == ["weak_motor"] * len(rotors)
+    assert [int(e.parameters["rotor"].value) for e in found.effects] == rotors
+    assert found.gap["after"] < 0.6 * found.gap["before"]
+    assert sum(r.probability for r in found.ranking) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("name", "first"), [
+    ("add_weight_W1_near_M3_M4_E8_log00", "mass"), ("weight_on_string_W2_near_M3_E9_log01", "slung_load")])
+def test_weights_are_named(pad, nominal, name, first):
+    found = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
+    assert found.effects[0].name == first
+    if first == "mass":  # near rotors 3 and 4, on the left
+        assert found.effects[1].parameters["y"].low > 0.0
+
+
+def test_a_further_normal_flight_is_none(pad, nominal):
+    found = diagnose([pad("normal_flight_E9_log02")], FLOWN, nominal["E9"])
+    assert (found.verdict, found.effects, found.ranking[0].name) == ("none", (), "none")
+
+
+def test_flights_of_one_condition_together(pad, nominal):
+    found = diagnose([pad(f"cut_propeller_M3_3mm_E8_log0{i}") for i in (1, 2, 3)], FLOWN, nominal["E8"])
+    assert [(e.name, e.parameters["rotor"].value) for e in found.effects] == [("weak_motor", 3.0)]
