@@ -144,11 +144,19 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     """
     without = set(without)
     out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    if "ground_effect" in out:  # its air is unsteady as well
+        out["ground_effect"] += [(*v, _unsteady()) for v in out["ground_effect"]]
     for name in COMPANIONS:
         if name in out:
             drag = [replace(t, companion=True) for t in terms(COMPANIONS[name])]
             out[name] += [(*v, *drag) for v in out[name]]
     return out
+
+
+def _unsteady() -> Term:
+    """The random part of the ground effect, where and when its mean part acts."""
+    effect = get("ground_effect")
+    return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, "turbulence": 0.0}), True)
 
 
 def twins_of(name: str) -> tuple[frozenset[str], str] | None:

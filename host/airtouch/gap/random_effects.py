@@ -141,17 +141,29 @@ def line_shape(data: Any, i: int, term: Any) -> np.ndarray:
 
 
 def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
+    """The effect run on the flight's own signals with several seeds: one shape of the spectrum a channel,
+
+    at the strength that it has in each block.
+    """
     flight: Flight = data.flights[i]
     study = data.study
-    without = residual(flight, study.vehicle, study.calibration)
-    total = {r: 0.0 for r in data.first[i]}
-    for seed in range(SEEDS):
-        forced = residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
-        change = np.nan_to_num(forced - without)
-        change[flight.phase == GROUND] = 0.0
-        for r, first in data.first[i].items():
-            total[r] = total[r] + (np.abs(blocks(change, first, r)) ** 2).mean(axis=0, keepdims=True) / SEEDS
-    return {r: np.broadcast_to(v, data.base[i][r].shape).copy() for r, v in total.items()}
+    runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
+            for seed in range(SEEDS)]
+    middle = np.mean(runs, axis=0)
+    out = {}
+    for r, first in data.first[i].items():
+        total = 0.0
+        for run in runs:
+            change = np.nan_to_num(run - middle)
+            change[flight.phase == GROUND] = 0.0
+            total = total + np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1)
+        if not np.ndim(total) or not len(total):
+            out[r] = np.zeros(data.base[i][r].shape)
+            continue
+        shape = total.mean(axis=0, keepdims=True)
+        strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
+        out[r] = shape * strength
+    return out
 
 
 __all__ = ["growth", "line_shape", "motors", "normals", "power", "stream"]
