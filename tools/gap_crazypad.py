@@ -39,7 +39,9 @@ def family(condition: str) -> str:
 
 def rotors(condition: str) -> list[int]:
     """The rotors that a condition's name says are damaged."""
-    return sorted({int(x) for x in re.findall(r"M(\d)", condition)}) if family(condition) == "rotor damage" else []
+    if family(condition) != "rotor damage":
+        return []
+    return sorted({int(x) for x in re.findall(r"M(\d)", condition)})
 
 
 def cut_mm(condition: str) -> float:

@@ -5,14 +5,14 @@ import pytest
 
 from airtouch import vehicle
 from airtouch.gap.diagnose import diagnose
-from airtouch.gap.hover_balance import BETWEEN, MIX, Reference, evidence, hypotheses
+from airtouch.gap.hover_balance import BELIEFS, MIX, Reference, evidence, hypotheses
 from airtouch.logs import read
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active, get
 
 FLOWN = vehicle.load("crazyflie-2.1")
-NOMINAL = Reference(np.zeros(6), BETWEEN ** 2)
+NOMINAL = Reference(np.zeros(6), np.array(BELIEFS.between) ** 2)
 
 
 def told(thrusts: np.ndarray) -> np.ndarray:

@@ -17,19 +17,19 @@ LEAST_SHIFT = 0.9  #: posterior probability of an off-centre weight's side, for 
 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
-    """Whether no flight has a gyro, nominal ones are given, and hover is long enough in all."""
-    return bool(nominal) and all(f.rates is None for f in flights) and any(
-        np.isfinite(pattern(f, vehicle)).all() for f in nominal) and any(
-        np.isfinite(pattern(f, vehicle)).all() for f in flights)
+    """Whether no flight has a gyro, and both nominal and other ones hover for long enough."""
+    hovers = lambda some: any(np.isfinite(pattern(f, vehicle)).all() for f in some)
+    return all(f.rates is None for f in flights) and hovers(nominal) and hovers(flights)
 
 
-def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle, notes: Sequence[str] = (),
-              without: Iterable[str] = ()) -> Diagnosis:
+def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle,
+              notes: Sequence[str] = (), without: Iterable[str] = ()) -> Diagnosis:
     """Which of the hypotheses of `hover_balance` the flights' mean pattern fits best."""
     left_out = set(without)
     every = [h for h in hypotheses(vehicle) if not left_out & {h.name, *(name for name, _ in h.effects)}]
-    base = reference(nominal, vehicle)
-    table = np.array([pattern(f, vehicle) for f in flights])
+    voltage = all(f.log.has("vbat_V") for f in (*flights, *nominal))
+    base = reference(np.array([pattern(f, vehicle, voltage) for f in nominal]))
+    table = np.array([pattern(f, vehicle, voltage) for f in flights])
     seen = np.nanmean(table, axis=0)
     logs, weights = evidence(seen, base, every)
     chance = np.exp(logs - logs.max())
@@ -44,7 +44,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         first = "com_offset"
     best = {n: max((i for i, h in enumerate(every) if h.name == n), key=logs.__getitem__) for n in names}
     share = {n: _shrink(seen, base, every[i], weights[i]) for n, i in best.items()}
-    ranking = sorted((Ranked(n, total[n], share[n][1]) for n in names), key=lambda r: (r.name != first, -r.probability))
+    ranking = sorted((Ranked(n, total[n], share[n][1]) for n in names),
+                     key=lambda r: (r.name != first, -r.probability))
     verdict = first if first in ("none", "unknown") else "effect"
     effects = _found(every[best[first]], weights[best[first]]) if verdict == "effect" else ()
     cells = _cells(seen, base, vehicle, every[best[first]], weights[best[first]], len(flights))
@@ -55,10 +56,13 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         alike.append(tuple(sorted({first, *others})))
     wrong = next((n for n in ("com_offset", "slung_load", "mass", "weak_motor") if n in names and n != first
                   and total[n] < 0.1), None)
-    control = {} if verdict != "effect" or wrong is None else {
-        "name": wrong, "before": share[wrong][0][0], "after": share[wrong][0][1], "shrink": share[wrong][1].plain()}
-    said = ["no gyro: judged by the balance of the motors in hover and how unsteady it is", *notes]
-    if not all(f.log.has("vbat_V") for f in (*flights, *nominal)):
+    control = {}
+    if verdict == "effect" and wrong is not None:
+        (gap, left), part = share[wrong]
+        control = {"name": wrong, "before": gap, "after": left, "shrink": part.plain()}
+    said = ["no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that leave "
+            "both as they are were not tried", *notes]
+    if not voltage:
         said.append("no battery voltage in some flights: their lift may differ for that alone")
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), tuple(dict.fromkeys(alike)), cells,
@@ -68,7 +72,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         measure.cannot_of([f.cannot for f in flights]), tuple(f.name for f in flights))
 
 
-def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis, weight: np.ndarray) -> tuple[tuple[float, float], Quantity]:
+def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis,
+            weight: np.ndarray) -> tuple[tuple[float, float], Quantity]:
     """Gap before and after in deviations of the floor, and the share of it that goes, with its interval."""
     apart, spread = (seen - base.mean)[:4], np.sqrt(base.variance[:4])
     rms = lambda x: float(np.sqrt(np.mean((x / spread) ** 2)))
@@ -85,7 +90,7 @@ def _quantile(values: np.ndarray, weight: np.ndarray, q: float) -> float:
 
 
 def _found(h: Hypothesis, weight: np.ndarray) -> list[Found]:
-    """The hypothesis' effects with posterior means and 90 % intervals; a weight that is not off centre has no com_offset."""
+    """The hypothesis' effects with posterior means and 90 % intervals; com_offset only where its side is sure."""
     out = []
     for name, drawn in h.effects:
         if name == "com_offset" and len(h.effects) > 1 and not any(
@@ -104,7 +109,7 @@ def _found(h: Hypothesis, weight: np.ndarray) -> list[Found]:
 
 def _cells(seen: np.ndarray, base: Reference, vehicle: Vehicle, h: Hypothesis, weight: np.ndarray,
            flights: int) -> tuple[Cell, ...]:
-    """The pattern in physical units: forces and angular accelerations in hover, largest over the floor first."""
+    """The pattern as forces and angular accelerations in hover, largest over the floor first."""
     g, half = vehicle.gravity_mps2, vehicle.arm_m / np.sqrt(2.0)
     inertia, lift = vehicle.inertia_kg_m2, vehicle.mass_kg * vehicle.gravity_mps2
     unit = np.array([g, lift * half / inertia[0], lift * half / inertia[1],
