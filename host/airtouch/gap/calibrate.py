@@ -29,6 +29,8 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
     ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
+ODD = 6.0  #: usual deviations from the others' mean by which a nominal flight is left out, and at least
+FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])  #: this, m/s^2 and rad/s^2
 SENSITIVE = 3.0  #: baseline flights whose offsets differ by more than this many deviations are named
 
 
@@ -47,7 +49,12 @@ def declared(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
 
 
 def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Calibration]:
-    """Fit the vehicle to nominal flights, then measure the floor that is left."""
+    """Fit the vehicle to nominal flights, then measure the floor that is left.
+
+    Flights that cannot be nominal like the others (a touch of the ground, a swapped
+    propeller) are left out and named, as long as most agree.
+    """
+    flights, odd = _alike(vehicle, flights)
     study = declared(vehicle, flights)
     chosen, prior = _terms()
     for _ in range(2):
@@ -57,7 +64,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Cali
         found = fit(Data(replace(study, calibration=(), controller=None), flights), whole, chosen, start, prior)
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
-                              tuple(_inconsistent(study, flights)))
+                              (*odd, *_inconsistent(study, flights)))
 
 
 def whole_of(data: Data) -> Part:
@@ -113,6 +120,21 @@ def _quantities(chosen: Sequence[Term], scaled: np.ndarray, covariance: np.ndarr
             if key in term.free:
                 out[f"{term.name}{variant} {key}"] = q
     return out
+
+
+def _alike(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[list[Flight], list[str]]:
+    """The flights whose mean force and torque agree with most others', and words on the rest."""
+    if len(flights) < 3:
+        return list(flights), []
+    means = np.array([residual(f, vehicle)[(f.phase > 0) & f.usable][:, :6].mean(axis=0) for f in flights])
+    away = np.abs(means - np.median(means, axis=0))
+    limit = np.maximum(ODD * 1.4826 * np.median(away, axis=0), FAR)
+    odd = (away > limit).any(axis=1)
+    if odd.sum() > len(flights) // 3:
+        return list(flights), []
+    words = [f"{f.name}: declared nominal, yet unlike the others (lift {m[2] - np.median(means[:, 2]):+.2g} m/s^2); "
+             "left out" for f, m, o in zip(flights, means, odd, strict=True) if o]
+    return [f for f, o in zip(flights, odd, strict=True) if not o], words
 
 
 def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:

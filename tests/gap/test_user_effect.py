@@ -1,0 +1,44 @@
+"""An effect from a page of the docs, in a file of its own: flown, withheld, found again by name."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtouch.gap.diagnose import diagnose
+from airtouch.simulation import batch, effects
+from airtouch.vehicle import load
+
+PAGE = Path(__file__).parents[2] / "host/docs/effects.md"
+FORCE_N = 0.02
+
+
+@pytest.fixture
+def magnet(tmp_path):
+    """The docs' own example, registered for one test."""
+    code = re.search(r"```python\n(\"\"\"A made-up effect.*?)```", PAGE.read_text(encoding="utf-8"), re.S).group(1)
+    file = tmp_path / "magnet.py"
+    file.write_text(code, encoding="utf-8")
+    (effect,) = effects.load_file(file)
+    yield effect
+    effects.unregister(effect.name)
+
+
+def fly(count, seed, chosen=()):
+    return list(batch.flights("diagnosis", count, effects=chosen, seed=seed, workers=1))
+
+
+def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
+    vehicle = load("crazyflie-2.1-flow")
+    nominal, real = fly(4, 1), fly(1, 2, [("magnet", {"force": FORCE_N})])
+    assert len(Path(PAGE).read_text().split("```python")[1].split("```")[0].splitlines()) < 60
+    found = diagnose(real, vehicle, nominal)
+    assert found.verdict == "effect" and found.effects[0].name == "magnet"
+    force = found.effects[0].parameters["force"]
+    np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
+    assert found.shrink.value > 0.8
+    assert abs(found.control["shrink"]["value"]) < 0.2
+    left_out = diagnose(real, vehicle, nominal, without=("magnet",))
+    assert "magnet" not in [r.name for r in left_out.ranking]
+    assert left_out.gap["after"] > found.gap["after"]
