@@ -1,14 +1,16 @@
 """CrazyPAD: every flight diagnosed alone, calibrated on the other normal flights of its drone.
 
-    python tools/gap_crazypad.py FOLDER [--json cases.jsonl]
+    python tools/gap_crazypad.py FOLDER [--json cases.jsonl] [--leave-one-out]
 
 FOLDER holds the flights and their manifest.csv. The label is read after the diagnosis. With
---json, cases that the file holds already are not diagnosed again. Nothing is fitted to
-labels, so that every condition is one that was never seen.
+--json, cases that the file holds already are not diagnosed again. What the diagnosis
+believes beforehand (`hover_balance.Beliefs`) was chosen with these conditions in view;
+--leave-one-out chooses it anew for each condition, from a grid, by the others alone.
 """
 
 import argparse
 import csv
+import itertools
 import json
 import re
 import sys
@@ -19,13 +21,20 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from airtouch import vehicle
+from airtouch.gap import hover_balance
 from airtouch.gap.diagnose import diagnose
+from airtouch.gap.flight import ready
 from airtouch.logs import read
 
 FAMILIES = ("normal", "rotor damage", "added weight", "slung load")
 FAMILY_OF = {"weak_motor": "rotor damage", "mass": "added weight", "com_offset": "added weight",
              "slung_load": "slung load"}
 RESAMPLES = 2000
+SAME = ((0.4, 0.35), (0.3, 0.5))  #: unsteadiness and heave that do not tell defects apart
+GRID = [hover_balance.Beliefs(own=own, worked_on=(0.012, 0.012, 0.012, yaw), hung=hung, **manner)
+        for own, yaw, hung, manner in itertools.product(
+            (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),
+            ({}, {"damaged": SAME, "loaded": SAME, "swinging": SAME}))]
 
 
 def family(condition: str) -> str:
@@ -57,7 +66,7 @@ def answer(case: dict) -> tuple[str, list[int], float]:
     if case["verdict"] != "effect":
         return ("normal" if case["verdict"] == "none" else "unknown"), [], 0.0
     weak = [e["parameters"] for e in case["effects"] if e["name"] == "weak_motor"]
-    return FAMILY_OF.get(names[0], "other"), sorted(int(p["rotor"]["value"]) for p in weak), \
+    return FAMILY_OF.get(names[0], "other"), sorted(round(p["rotor"]["value"]) for p in weak), \
         sum(p["thrust_loss"]["value"] for p in weak)
 
 
@@ -133,6 +142,42 @@ def severity(table: list[dict]) -> float:
     return float(spearmanr(*zip(*cut, strict=True)).statistic) if len(cut) > 2 else float("nan")
 
 
+def left_out(folder: Path) -> list[dict]:
+    """Every flight judged with beliefs that do best on the other conditions."""
+    rows = list(csv.DictReader((folder / "manifest.csv").open()))
+    flown = vehicle.load("crazyflie-2.1")
+    seen = [hover_balance.pattern(ready(read(folder / r["file"]), flown), flown) for r in rows]
+    made = [_judged(rows, seen, flown, beliefs) for beliefs in GRID]
+    out = []
+    for condition in sorted({r["condition"] for r in rows}):
+        others = [[c for c in table if c["condition"] != condition] for table in made]
+        best = max(range(len(GRID)), key=lambda i: balanced(others[i]) + 0.3 * named(others[i]))
+        out += [c for c in made[best] if c["condition"] == condition]
+    return out
+
+
+def _judged(rows: list[dict], seen: list[np.ndarray], flown: vehicle.Vehicle,
+            beliefs: hover_balance.Beliefs) -> list[dict]:
+    every, out = hover_balance.hypotheses(flown, beliefs), []
+    for row, pattern in zip(rows, seen, strict=True):
+        base = np.array([p for r, p in zip(rows, seen, strict=True) if r["drone"] == row["drone"]
+                         and family(r["condition"]) == "normal" and r["file"] != row["file"]])
+        nominal = hover_balance.reference(base, beliefs)
+        logs, weights = hover_balance.evidence(pattern, nominal, every, beliefs)
+        chance = np.exp(logs - logs.max())
+        total: dict[str, float] = {}
+        for h, p in zip(every, chance, strict=True):
+            name = "mass" if h.name == "com_offset" else h.name
+            total[name] = total.get(name, 0.0) + p
+        first = max(total, key=total.__getitem__)
+        i = max((i for i, h in enumerate(every) if h.name == first), key=logs.__getitem__)
+        effects = [{"name": n, "parameters": {k: {"value": float(weights[i] @ v)} for k, v in drawn.items()}}
+                   for n, drawn in every[i].effects]
+        verdict = first if first in ("none", "unknown") else "effect"
+        out.append({**row, "verdict": verdict, "effects": effects})
+    return out
+
+
 def show(table: list[dict]) -> None:
     """The figures, in plain text."""
     columns = (*FAMILIES, "unknown", "other")
@@ -146,8 +191,9 @@ def show(table: list[dict]) -> None:
         print(f"  {key[0]:52s} {key[1]} " + "; ".join(
             g[0] + (f" {g[1]} {g[2]:.2f}" if g[1] else "") for g in group))
     print(f"\n{len(table)} flights; 90 % intervals, conditions resampled")
-    for text, figure in (("balanced accuracy of the family", balanced), ("damaged rotors named exactly", named),
-                         ("only damaged rotors named", some_named), ("severity, Spearman", severity)):
+    figures = {"balanced accuracy of the family": balanced, "damaged rotors named exactly": named,
+               "only damaged rotors named": some_named, "severity, Spearman": severity}
+    for text, figure in figures.items():
         low, high = interval(table, figure)
         print(f"{text:34s} {figure(table):.3f} ({low:.3f} to {high:.3f})")
     for drone in sorted({c["drone"] for c in table}):
@@ -155,18 +201,21 @@ def show(table: list[dict]) -> None:
             part = [c for c in table if c["drone"] == drone and c["condition"].startswith("cut")
                     and ("_M1_" in c["condition"]) == (which == "M1")]
             if len(part) > 5:
-                print(f"severity, {drone}, {'M2 and M1' if which == 'M1' else 'M3'} cut: {severity(part):.3f} "
-                      f"({len(part)} flights)")
+                cut = "M2 and M1" if which == "M1" else "M3"
+                print(f"severity, {drone}, {cut} cut: {severity(part):.3f} ({len(part)} flights)")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--json", type=Path, help="cases already done are read from here, new ones appended")
+    parser.add_argument("--leave-one-out", action="store_true", help="also with beliefs chosen by the others")
     options = parser.parse_args()
     start = time.time()
-    table = cases(options.folder, options.json)
-    show(table)
+    show(cases(options.folder, options.json))
+    if options.leave_one_out:
+        print("\nBeliefs chosen without the condition judged:")
+        show(left_out(options.folder))
     print(f"{time.time() - start:.0f} s")
 
 

@@ -60,8 +60,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     if verdict == "effect" and wrong is not None:
         (gap, left), part = share[wrong]
         control = {"name": wrong, "before": gap, "after": left, "shrink": part.plain()}
-    said = ["no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that leave "
-            "both as they are were not tried", *notes]
+    said = ["no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
+            "leave both as they are were not tried", *notes]
     if not voltage:
         said.append("no battery voltage in some flights: their lift may differ for that alone")
     return Diagnosis(
@@ -90,7 +90,7 @@ def _quantile(values: np.ndarray, weight: np.ndarray, q: float) -> float:
 
 
 def _found(h: Hypothesis, weight: np.ndarray) -> list[Found]:
-    """The hypothesis' effects with posterior means and 90 % intervals; com_offset only where its side is sure."""
+    """The effects, posterior means with 90 % intervals; a weight's com_offset only where its side is sure."""
     out = []
     for name, drawn in h.effects:
         if name == "com_offset" and len(h.effects) > 1 and not any(
