@@ -195,30 +195,77 @@ def blind() -> None:
 @click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1),
               help="How many flights.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
-@click.option("--force", is_flag=True, help="Replace a set in --out.")
-def blind_make(out: Path, flights: int, seed: int, force: bool) -> None:
+@click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Where the key goes; "
+              "default: OUT.key.json beside OUT.")
+@click.option("--force", is_flag=True, help="Replace a set in OUT.")
+def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool) -> None:
     """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart."""
+    from airtouch.cli import gap_show
     from airtouch.gap import blind as sealed
 
-    sealed.make(out, flights, seed, force=force)
-    click.echo(f"{flights} flights in {out}")
+    with gap_show.Bar() as bar:
+        written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
+    click.echo(f"{flights} flights in {out}; the key in {written}")
 
 
 @blind.command("score")
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.argument("answers", type=click.Path(path_type=Path, exists=True))
+@click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Default: beside FOLDER.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
               help="Write every figure.")
-@click.option("--force", is_flag=True, help="Replace the file.")
-def blind_score(folder: Path, answers: Path, json_path: Path | None, force: bool) -> None:
-    """Open the key of the set in FOLDER and score the diagnoses in ANSWERS."""
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write the confusion matrix and the reliability to this PNG.")
+@click.option("--force", is_flag=True, help="Replace the files.")
+def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path | None, plot: Path | None,
+                force: bool) -> None:
+    """Open the key of the set in FOLDER and score the diagnoses in ANSWERS, a folder or a file."""
     from airtouch.gap import blind as sealed
 
-    _check_free(None, json_path, force)
-    table = sealed.score(folder, answers)
-    scores.console().print(table)
+    _check_free(json_path, plot, force)
+    _scored(sealed.score(folder, answers, key), json_path, plot, force)
+
+
+@blind.command("run")
+@click.argument("out", type=click.Path(path_type=Path, file_okay=False))
+@click.option("--flights", "-n", default=480, show_default=True, type=click.IntRange(1),
+              help="How many flights; 42 % have one effect, 42 % none, the rest two.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write every figure; default: OUT/figures.json.")
+def blind_run(out: Path, flights: int, seed: int, workers: int, json_path: Path | None) -> None:
+    """The whole check in the folder OUT: make a set, diagnose it, open the key, score.
+
+    Goes on where it was broken off. Single effects are then diagnosed once more with the
+    effect left out, where `unknown` is right.
+    """
+    from airtouch.cli import gap_show
+    from airtouch.gap import blind_run as whole
+
+    with gap_show.Bar() as bar:
+        found = whole.run(out, flights, seed, workers=workers, progress=bar)
+    _scored(found, json_path or out / "figures.json", out / "figures.png", True)
+
+
+def _scored(found: dict[str, Any], json_path: Path | None, plot: Path | None, force: bool) -> None:
+    """Figures of a blind check on the console and in files."""
+    from rich.table import Table
+
+    from airtouch.logs.files import write_bytes
+    from airtouch.report import blind_figures
+
+    for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.rows(found)),
+                        (("effect", "top-1", "top-3", "parameter error"), blind_figures.effect_rows(found))):
+        table = Table(*heads)
+        for row in rows:
+            table.add_row(*row)
+        scores.console().print(table)
     if json_path:
-        scores.write_json(json_path, table, force)
+        scores.write_json(json_path, found, force)
+    if plot:
+        write_bytes(blind_figures.picture(found), plot, force)
+    _written(json_path, plot)
 
 
 def _check_free(report: Path | None, json_path: Path | None, force: bool) -> None:

@@ -10,6 +10,7 @@ import json
 import secrets
 from collections.abc import Callable, Sequence
 from importlib import resources
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     vehicle = load(VEHICLE)
     text = (resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes()
     write_bytes(text, out / "vehicle.toml", True)
-    cal = [stripped(log) for log in flown(SCENARIO, range(CAL_FIRST, CAL_FIRST + CAL), vehicle=vehicle, seed=seed)]
+    cal = nominal(vehicle, CAL_FIRST, CAL, seed)
     for i, log in enumerate(cal):
         write(log, out / f"cal_{i}.csv.gz", force=True)
     levels = strengths(vehicle, cal, seed, kinds, progress)
@@ -121,12 +122,17 @@ def stripped(log: FlightLog) -> FlightLog:
     return FlightLog({k: v for k, v in log.columns.items() if k not in HIDDEN}, {**kept, "vehicle": VEHICLE})
 
 
+def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
+    """Flights free of effects that end well, from a number on."""
+    every = flown(SCENARIO, range(first, first + 10 * count), vehicle=vehicle, seed=seed, workers=1)
+    return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
+
+
 def strengths(vehicle: Vehicle, cal: Sequence[FlightLog], seed: int, kinds: Sequence[str] | None = None,
               progress: Say = lambda _: None) -> dict[str, tuple[float, ...]]:
     """Three severities of each kind of effect that such flights show at all."""
     study = study_of(vehicle, cal)
-    without = [Data(study, list(measure.usable([stripped(log)], vehicle, [])))
-               for log in flown(SCENARIO, range(NONE_FIRST, NONE_FIRST + 6), vehicle=vehicle, seed=seed)]
+    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 6, seed)]
     found = {}
     for name, kind in KINDS.items():
         if kinds is None or name in kinds:

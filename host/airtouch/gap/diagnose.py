@@ -9,7 +9,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap import advice as advices
 from airtouch.gap import balance_result, calibrate, candidates, measure
 from airtouch.gap.candidates import CLOCK, Term
-from airtouch.gap.fit import Data, Study, fit
+from airtouch.gap.fit import Data, Study, fit, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
@@ -123,7 +123,8 @@ def _effects(data: Data, found: Selection) -> list[Found]:
         if t.companion:
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
-        spread = _spread(found.chosen, t, fitted.covariance[part, part] if part is not None else None)
+        known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
+        spread = _spread(found.chosen, t, known)
         out.append(Found(t.name, t.quantities(x, spread)))
     for t in (t for t in found.chosen.terms if t.kind == CLOCK):
         x = t.scaled(t.values)
@@ -137,14 +138,14 @@ def _middle(chosen: Judged) -> np.ndarray | None:
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
 
 
-def _spread(chosen: Judged, term: Term, covariance: np.ndarray | None) -> np.ndarray:
+def _spread(chosen: Judged, term: Term, covariance: np.ndarray) -> np.ndarray:
     """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement where larger."""
     pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
              if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
     apart = np.zeros((len(term.free), len(term.free)))
     if len(pairs) == 2:
         apart = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
-    return apart if covariance is None else covariance + apart
+    return covariance + apart
 
 
 def _terms(effects: Sequence[Found]) -> list[Term]:

@@ -223,12 +223,15 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     return Fit(tuple(fitted), x, covariance, offsets, gained)
 
 
-def judge(data: Data, part: Part, terms: Sequence[Term]) -> float:
-    """Log likelihood of blocks under effects fitted elsewhere; offsets between flights found anew."""
+def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> float:
+    """Log likelihood of blocks under effects fitted elsewhere; offsets between flights found anew.
+
+    wide: the commands' floor is as uncertain as under random effects, though there are none.
+    """
     problem = problem_of(data, part)
     random = [t for t in terms if t.kind == SPECTRUM]
     active = [t.active() for t in terms if t.kind == MEAN]
-    told, cost = problem.commanded([*active, *(t.active() for t in random)], bool(random))
+    told, cost = problem.commanded([*active, *(t.active() for t in random)], wide or bool(random))
     added = problem.random_power(random) + told
     values, penalty = _without_offsets(problem, problem.values(active), added)
     return problem.likelihood(values, added) - penalty - cost
@@ -428,6 +431,17 @@ def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.n
     best = int(np.argmin(costs))
     found = minimize_scalar(cost, bounds=(grid[max(best - 1, 0)], grid[min(best + 1, 39)]), method="bounded")
     return term.fitted(np.full(len(term.free), float(np.exp(found.x))))
+
+
+def strength_variance(data: Data, part: Part, terms: Sequence[Term], term: Term) -> np.ndarray:
+    """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature; inf where there is none."""
+    x, step = term.scaled(term.values), 0.15
+    at = []
+    for amount in (-step, 0.0, step):
+        moved = term.fitted(x * np.exp(amount))
+        at.append(judge(data, part, [moved if t is term else t for t in terms]))
+    bend = (2.0 * at[1] - at[0] - at[2]) / step ** 2
+    return np.diag(x ** 2 / max(bend, 1e-6))
 
 
 def replace_terms(f: Fit, terms: Sequence[Term]) -> Fit:

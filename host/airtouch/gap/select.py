@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, MEAN, Term
+from airtouch.gap.candidates import CLOCK, MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COUNT
 from airtouch.gap.fit import Data, Fit, Part, Problem, fit, judge, left_over, problem_of
 from airtouch.gap.flight import PERIOD_S
@@ -162,10 +162,15 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str
     else:
         others = [t for t in every if t.kind != CLOCK]
         gain += sum(clock_gain(data, t)[1] for t in held if t.kind == CLOCK)
+        own = 0.0
         for train, test in ((0, 1), (1, 0)):
             found = _refined(data, parts[train], fit(data, parts[train], others, _start(chosen, others, train)))
-            gain += judge(data, parts[test], found.terms) - base[test] if others else 0.0
+            reached = judge(data, parts[test], found.terms) if others else base[test]
+            gain += reached - base[test]
+            own += reached - judge(data, parts[test], _less(found.terms, terms), True)
             fits.append(found)
+        if any(t.kind == SPECTRUM for t in terms):  # the looser floor of the commands is no evidence
+            gain = min(gain, (chosen.gain if chosen else 0.0) + own)
     fitted = list(fits[0].terms) if fits else []
     for t in (t for t in every if t.kind == CLOCK):
         made, more = clock_gain(data, t)
@@ -180,6 +185,12 @@ def _refined(data: Data, part: Part, found: Fit) -> Fit:
     if all(a.free == b.free for a, b in zip(terms, found.terms, strict=True)):
         return found
     return fit(data, part, terms, np.concatenate([t.scaled(t.values) for t in terms if t.kind == MEAN]))
+
+
+def _less(fitted: Sequence[Term], random: Sequence[Term]) -> list[Term]:
+    """Fitted effects without those of `random` that are random."""
+    names = {(t.name, t.values.get("rotor")) for t in random if t.kind == SPECTRUM}
+    return [t for t in fitted if (t.name, t.values.get("rotor")) not in names]
 
 
 def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
@@ -236,7 +247,7 @@ def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
         if extra > 0.0:
             gain = 0.5 * n * ((now / usual) ** 2 - 1.0 - 2.0 * np.log(now / usual))
         return term.fitted(np.array([extra / term.step("rms")])), float(gain)
-    share, usual = float(lost.mean()), max(floor.lost, 1e-3)
+    share, usual = float(lost.mean()), max(floor.lost, 1e-3 if data.study.controller is None else 3e-4)
     if share > usual:
         n = len(lost) / 2.0
         gain = n * (share * np.log(share / usual) + (1.0 - share) * np.log((1.0 - share) / (1.0 - usual)))

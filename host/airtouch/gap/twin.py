@@ -34,6 +34,8 @@ STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
 FINE, REACH = 4, 2  #: points a bin, bins a window's leakage is followed
 UNSTABLE = 30.0  #: nepers of power per rad of phase beyond stability
 FEWEST = 6  #: blocks of nominal flights, for a twin view
+FREEDOM = 20.0  #: of the tails of a block's power
+STEPPED = 5.0  #: times the usual power of its flight: a block in which a set-point stepped
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
 SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
 #: fields of the plant by which effects change the loop
@@ -183,8 +185,17 @@ def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndar
         told = commands(flight, vehicle)[:, :len(AXES)]
         cut = told[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
         made = np.fft.rfft(cut * window[:, None], axis=1)[:, _kept()] * scale
-        kept = flight.memory["twin"] = (first, made)
+        calm = _calm(np.abs(made) ** 2)
+        kept = flight.memory["twin"] = (first[calm], made[calm])
     return kept
+
+
+def _calm(power: np.ndarray) -> np.ndarray:
+    """Blocks (bool) of power (blocks, bins, AXES) like the flight's others: in the rest a set-point stepped."""
+    if len(power) < 3:
+        return np.ones(len(power), bool)
+    usual = np.median(power, axis=0) / np.log(2.0)
+    return ((power / np.maximum(usual, 1e-30)).mean(axis=1) < STEPPED).all(axis=1)
 
 
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> Twin | None:
@@ -192,7 +203,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     every = np.concatenate([block_spectra(f, vehicle)[1] for f in flights]) if flights else np.zeros((0, 1, 3))
     if len(every) < FEWEST:
         return None
-    power = (np.abs(every) ** 2).mean(axis=0)
+    power = typical(np.abs(every) ** 2)
     row = prepare(vehicle, calibration)[0][0]
     documented = [_fit(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
     found = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
@@ -203,6 +214,18 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
                 tuple(c[0] for c in chosen), power, len(every), floor_of(flights, vehicle, calibration))
     model = twin._nominal()
     return replace(twin, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
+
+
+def typical(power: np.ndarray) -> np.ndarray:
+    """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), tails as TwinView has them.
+
+    The mean would follow the few blocks in which a set-point stepped.
+    """
+    found = power.mean(axis=0)
+    for _ in range(12):
+        e = power / found
+        found = found * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
+    return found
 
 
 def _fit(controller: Controller, row: Any, axis: str, power: np.ndarray,

@@ -14,11 +14,10 @@ from airtouch.gap import edge_response
 from airtouch.gap.flight import Flight
 from airtouch.gap.spectra import LENGTH as AIR_LENGTH
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT
-from airtouch.gap.twin import AXES, LENGTH, SHAPES, SPREAD, Twin, block_spectra, frequencies, shapes
+from airtouch.gap.twin import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, Twin, block_spectra, frequencies, shapes
 from airtouch.simulation.effects import Active
 
 FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
-FREEDOM = 20.0
 EDGE_FREEDOM = 6.0
 ROUNDS = 4
 WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold

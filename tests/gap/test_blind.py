@@ -1,0 +1,150 @@
+"""Sealed sets: nothing leaks, the seal holds, scores are right, and a small check of the diagnosis itself."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli.gap import command
+from airtouch.errors import AirTouchError
+from airtouch.gap import blind, blind_run, blind_score
+from airtouch.gap.blind_draw import KINDS
+from airtouch.gap.blind_severity import severities
+
+CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_offset": (5e-4, 1e-3, 2e-3),
+         "rotor_drag": (0.004, 0.008, 0.016), "time_jitter": (0.002, 0.004, 0.006)}
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    """A set of 13 flights, diagnosed and scored."""
+    folder = tmp_path_factory.mktemp("blind") / "set"
+    patch = pytest.MonkeyPatch()
+    patch.setattr(blind, "strengths", lambda *_: CLEAR)
+    found = blind_run.run(folder, 13, seed=3, workers=2, unknown=3)
+    patch.undo()
+    return folder, found
+
+
+def test_diagnosis_names_clear_effects(checked):
+    _, found = checked
+    assert found["diagnosed"] == 13 and found["top_1"]["n"] == 5 and found["false_alarms"]["n"] == 5
+    assert found["top_1"]["hits"] >= 4 and found["top_3"]["hits"] == 5
+    assert found["false_alarms"]["hits"] <= 1
+    assert found["pairs_one_right"]["hits"] == 3
+    assert found["parameters"]["error"]["value"] < 0.25
+    assert found["shrink"]["right"]["value"] > 0.75 and found["shrink"]["wrong"]["value"] < 0.25
+
+
+def test_flights_say_nothing_of_their_effect(checked):
+    folder, _ = checked
+    kept = {p.name.split(".")[0] for p in folder.glob("*.gz")}
+    assert kept == {f"cal_{i}" for i in range(6)} | {f"flight_{i:04d}" for i in range(13)}
+    for path in folder.glob("*.csv.gz"):
+        log = logs.read(path)
+        assert not {"effects", "seed", "scenario", "condition", "flight"} & set(log.meta), path
+        assert log.meta["vehicle"] == "crazyflie-2.1-flow"
+    public = (folder / "sealed.json").read_text()
+    assert not any(name in public for name in CLEAR)
+
+
+def test_the_seal(checked, tmp_path):
+    folder, _ = checked
+    key = blind.key_of(folder)
+    again = blind.score(folder, folder / "answers")  # the same answers may be scored once more
+    assert again["top_1"]["n"] == 5
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps({"cases": [{"flights": ["flight_0000"], "verdict": "none",
+                                            "ranking": [{"name": "none", "probability": 1.0}], "effects": []}]}))
+    with pytest.raises(AirTouchError, match="opened for other answers"):
+        blind.score(folder, other)
+    changed = tmp_path / "key.json"
+    changed.write_bytes(key.read_bytes() + b" ")
+    with pytest.raises(AirTouchError, match="not the key that was sealed"):
+        blind.score(folder, folder / "answers", changed)
+    with pytest.raises(AirTouchError, match="--force"):
+        blind.make(folder, 3)
+    with pytest.raises(AirTouchError, match="no sealed.json"):
+        blind.open_key(tmp_path, "")
+
+
+def test_command_writes_figures(checked, tmp_path):
+    folder, found = checked
+    out, plot = tmp_path / "f.json", tmp_path / "f.png"
+    result = CliRunner().invoke(command, ["blind", "score", str(folder), str(folder / "answers"), "--json", str(out),
+                                          "--plot", str(plot)])
+    assert result.exit_code == 0, result.output
+    assert json.loads(out.read_text())["top_1"] == found["top_1"] and plot.read_bytes().startswith(b"\x89PNG")
+    assert "false alarms" in result.output
+
+
+def test_wilson_and_auroc_in_closed_form():
+    half = blind_score.wilson(5, 10)
+    z2 = 1.959964 ** 2
+    assert half["low"] == pytest.approx(0.5 - np.sqrt(z2 * (z2 + 10)) / (2 * (10 + z2)))
+    assert half["high"] == pytest.approx(1.0 - half["low"])
+    assert blind_score.wilson(0, 10)["low"] == 0.0
+    assert blind_score.wilson(0, 10)["high"] == pytest.approx(z2 / (10 + z2))
+    assert blind_score.auroc([2, 3], [1, 1]) == 1.0 and blind_score.auroc([1], [1]) == 0.5
+    assert blind_score.auroc([0.0, 2.0], [1.0]) == 0.5
+
+
+def answer(name, verdict, ranking, effects=(), without=(), before=2.0, after=1.1):
+    return {"flights": [name], "verdict": verdict, "ranking": [{"name": n, "probability": p} for n, p in ranking],
+            "effects": [{"name": n, "parameters": q} for n, q in effects], "without": list(without),
+            "gap": {"before": before, "after": after}, "control": {"before": before, "after": before}}
+
+
+def test_scores_in_closed_form():
+    def one(name, value, level=0):
+        return {"effects": [{"name": name, "kind": name, "level": level, "values": value}]}
+
+    key = {"answers": {
+        "a": one("mass", {"fraction": 0.1}), "b": one("inertia", {"fraction": 0.5}, 1), "c": {"effects": []},
+        "d": {"effects": one("mass", {})["effects"] + one("inertia", {})["effects"]}, "e": {"effects": []}}}
+    quantity = {"fraction": {"value": 0.6, "low": 0.4, "high": 0.8, "unit": "1"}}
+    cases = [
+        answer("a", "effect", [("thrust_coefficient", 0.9), ("none", 0.1)], [("thrust_coefficient", {})]),
+        answer("b", "effect", [("inertia", 0.8), ("none", 0.2), ("unknown", 0.0)], [("inertia", quantity)]),
+        answer("c", "none", [("none", 1.0)]), answer("e", "unknown", [("unknown", 0.7), ("none", 0.3)]),
+        answer("d", "effect", [("inertia", 0.8)], [("inertia", {}), ("gust", {})]),
+        answer("b", "unknown", [("unknown", 0.6), ("gust", 0.4)], without=["inertia"])]
+    found = blind_score.figures(key, cases)
+    assert (found["top_1"]["hits"], found["top_1"]["n"]) == (2, 2)  # mass and thrust_coefficient are one
+    assert (found["false_alarms"]["hits"], found["false_alarms"]["n"]) == (1, 2)
+    assert found["pairs_exact"]["hits"] == 0 and found["pairs_one_right"]["hits"] == 1
+    assert found["parameters"]["error"]["value"] == pytest.approx(0.2) and found["parameters"]["coverage"]["hits"] == 1
+    assert found["shrink"]["right"]["value"] == pytest.approx(0.9) and found["shrink"]["wrong"]["value"] == 0.0
+    assert found["unknown"]["all"]["auroc"] == 1.0 and found["unknown"]["all"]["wrong_name"]["hits"] == 0
+    assert found["confusion"]["none"] == {"none": 1, "unknown": 1}
+    with pytest.raises(AirTouchError, match="not a flight of this set"):
+        blind_score.figures(key, [answer("z", "none", [("none", 1.0)])])
+
+
+def test_answers_that_are_none(tmp_path):
+    (tmp_path / "x.json").write_text("{}")
+    with pytest.raises(AirTouchError, match="without `flights`"):
+        blind_score.read_answers(tmp_path)
+    (tmp_path / "x.json").write_text("no")
+    with pytest.raises(AirTouchError, match="not the JSON"):
+        blind_score.read_answers(tmp_path)
+
+
+def test_severities_and_strengths():
+    assert severities(0.1, 1.0) == pytest.approx((0.1, 0.2, 0.4))
+    assert severities(0.1, 0.2) == pytest.approx((0.1, np.sqrt(0.02), 0.2))
+    for kind in KINDS.values():
+        rng = np.random.default_rng(0)
+        kind.active(kind.highest, rng)  # within the registry's bounds
+
+
+def test_a_set_is_balanced():
+    levels = {k: (1.0, 2.0, 4.0) for k in ("mass", "thrust_coefficient", "wind", "gust")}
+    cases = blind.draw(100, levels, np.random.default_rng(0))
+    sizes = [len(c) for c in cases]
+    assert (sizes.count(1), sizes.count(0), sizes.count(2)) == (42, 42, 16)
+    assert not any({n for n, _ in c} == {"mass", "thrust_coefficient"} for c in cases)
+    counts = [sum(c == [(n, level)] for c in cases) for n in levels for level in range(3)]
+    assert max(counts) - min(counts) <= 1
