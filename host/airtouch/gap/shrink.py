@@ -14,6 +14,7 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.select import Judged, bands_of
 
 SURE = 4.0  #: standard errors by which a cell must stand over the floor
+FEWEST = 30  #: values in a cell
 DRAWS = 400
 LARGEST = 1e4  #: of a bin's power over the floor: spikes do not make a gap
 
@@ -29,6 +30,8 @@ class Shrink:
 
 def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, seed: int = 0) -> Shrink:
     """The gap over all held-out blocks; each half judged under the fit of the other."""
+    if judged is not None and judged.terms and all(t.name == "time_jitter" for t in judged.terms):
+        return _clock(data)
     before, after = [], []
     for train, test in ((0, 1), (1, 0)):
         problem, values, power = left_over(data, parts[train], ())
@@ -36,7 +39,7 @@ def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, seed: in
         e = np.minimum(np.abs(values) ** 2 / power, LARGEST)
         count = np.bincount(groups, problem.known)
         mean = np.bincount(groups, e * problem.known) / np.maximum(count, 1)
-        large = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2
+        large = (count >= FEWEST) & (mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2)
         problem, values, power = left_over(data, parts[test], ())
         groups = np.minimum(bands_of(problem), len(large) - 1)
         use = problem.known & large[groups]
@@ -57,6 +60,18 @@ def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, seed: in
     low, high = np.percentile(drawn, [5, 95])
     return Shrink(float(np.sqrt(one.mean())), float(np.sqrt(two.mean())),
                   Quantity(_share(one.mean(), two.mean()), float(low), float(high)))
+
+
+def _clock(data: Data) -> Shrink:
+    """Jitter of the logged times: what the rms of one half says of the other's, over the floor's."""
+    usual = max(data.study.floor.clock_s, 2e-4)
+    rms = [float(np.sqrt(np.mean(np.concatenate([h for f in data.flights
+                                                  for h in np.array_split(f.clock_s, 8)[k::2]]) ** 2)))
+           for k in (0, 1)]
+    before = float(np.mean(rms)) / usual
+    after = 1.0 + abs(rms[0] - rms[1]) / usual
+    share = _share(before ** 2, after ** 2)
+    return Shrink(before, after, Quantity(share, share, share))
 
 
 def _share(before: float, after: float) -> float:

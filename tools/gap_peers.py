@@ -1,0 +1,69 @@
+"""The diagnosis on flights made with other people's simulators, each alone: top-1, top-3, shrink.
+
+    python tools/gap_peers.py [FLIGHTS/peers]
+
+Each case is held against the two `cal` flights of its vehicle; the diagnosis never sees the label.
+Twins (mass and thrust_coefficient) count as one.
+"""
+
+import csv
+import os
+import sys
+import time
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from airtouch import vehicle as vehicles
+from airtouch.gap.candidates import twins_of
+from airtouch.gap.diagnose import diagnose
+from airtouch.logs import read
+
+NAMES = {"latency": "sensor_latency", "act_delay": "actuator_delay", "thrust_coeff": "thrust_coefficient"}
+
+
+def same(one: str, two: str) -> bool:
+    """Whether two names are one effect in these logs."""
+    twins = twins_of(one)
+    return one == two or (twins is not None and two in twins[0])
+
+
+def interval(hits: int, n: int) -> str:
+    """95 % interval of a share (Wilson)."""
+    z, p = 1.96, hits / n
+    middle, half = p + z * z / (2 * n), z * ((p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5)
+    low, high = ((middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n))
+    return f"{hits} of {n} ({p:.0%}, 95 % interval {low:.0%} to {high:.0%})"
+
+
+def main(folder: Path) -> None:
+    rows = [r for r in csv.DictReader((folder / "manifest.csv").open()) if not r["file"].startswith("cal")]
+    first = third = 0
+    shrinks, wrong = [], []
+    print("| effect | strength | verdict | named | shrink | with a wrong effect | CPU s |\n|---|---|---|---|---|---|---|")
+    for row in rows:
+        v = row["vehicle"]
+        began = time.process_time()
+        found = diagnose([read(folder / row["file"])], vehicles.load(folder / f"vehicle_{v.lower()}.toml"),
+                         [read(folder / f"cal_{v}_{i}.csv.gz") for i in (0, 1)])
+        true = NAMES.get(row["effect"], row["effect"])
+        ranked = [r.name for r in found.ranking[:3]]
+        first += same(ranked[0], true)
+        third += any(same(r, true) for r in ranked)
+        named = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
+                                                   if q.low is not None) for e in found.effects)
+        control = found.control.get("shrink", {}).get("value")
+        if found.shrink is not None and same(ranked[0], true):
+            shrinks.append(found.shrink.value)
+            wrong += [control] if control is not None else []
+        print(f"| {true} | {float(row['strength']):.3g} {row['unit'].split(',')[0][:24]} | {found.verdict} | {named} | "
+              f"{'' if found.shrink is None else f'{found.shrink.value:.2f}'} | "
+              f"{'' if control is None else f'{control:.2f}'} | {time.process_time() - began:.0f} |", flush=True)
+    print(f"\ntop-1 {interval(first, len(rows))}; top-3 {interval(third, len(rows))}")
+    if shrinks:
+        print(f"shrink with the right effect: median {sorted(shrinks)[len(shrinks) // 2]:.2f}, "
+              f">= 0.80 in {sum(s >= 0.8 for s in shrinks)} of {len(shrinks)}; with a wrong one at most {max(wrong):.2f}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else
+         Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "peers")
