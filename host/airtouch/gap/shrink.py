@@ -14,7 +14,7 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.select import Judged, bands_of
 
 SURE = 4.0  #: standard errors by which a cell must stand over the floor
-FEWEST = 30  #: values in a cell
+FEWEST = 12  #: values in a cell
 DRAWS = 400
 LARGEST = 1e4  #: of a bin's power over the floor: spikes do not make a gap
 
