@@ -13,7 +13,7 @@ from airtouch.gap.fit import Data, Study, fit, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
-from airtouch.gap.select import LEAST_GAIN, UNKNOWN_GAIN, Judged, Selection, halves, probabilities, select
+from airtouch.gap.select import FIRST_GAIN, UNKNOWN_GAIN, Judged, Selection, halves, probabilities, select
 from airtouch.gap.shrink import Shrink, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.logs.flight_log import FlightLog
@@ -166,7 +166,7 @@ def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:
     for name, p in chance.items():
         one = found.singles.get(name)
         share = Quantity(0.0)
-        if one is not None and one.full and one.gain > LEAST_GAIN:
+        if one is not None and one.full and one.gain > FIRST_GAIN:
             share = shrink_of(data, parts, one).share
         out.append(Ranked(name, float(p), share))
     order = {n: j.gain for n, j in found.singles.items()}

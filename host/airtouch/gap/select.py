@@ -22,10 +22,14 @@ from airtouch.gap.twin import COMMAND_ONLY
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
+FIRST_GAIN = 6.0  #: the same for the first effect, against a floor from nominal flights
+#: but for these: commands at 100 Hz hold aliases of a faster loop, which differ from flight to flight
+WAVERING = {"inertia": 24.0, "motor_lag": 16.0}
 LEAST_SHARE = 0.02  #: and as a share of what the effects before it have added
 UNKNOWN_GAIN = 25.0  #: of the free spectrum over the best named effects, for `unknown`
 UNKNOWN_SHARE = 0.2  #: and as a share of the free spectrum's gain over no effect
 MOST_EFFECTS = 3
+HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
 Hypothesis = tuple[Term, ...]
@@ -53,6 +57,7 @@ class Selection:
     steps: tuple[Judged, ...]
     free_before: float
     free_after: float
+    least: Mapping[str, float]  #: gain that each candidate needs
 
     @property
     def chosen(self) -> Judged | None:
@@ -86,29 +91,40 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
            progress: Callable[[str], None] = lambda _: None) -> Selection:
     """Judge every candidate, then add effects one by one while held-out data ask for them."""
     parts = halves(data)
-    base = [judge(data, p, ()) for p in parts]
+    base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]  # none, as sure of the commands' floor
     screen = Screen(data)
     singles = _round(data, parts, base, screen, candidates, None, progress)
     steps: list[Judged] = []
-    best = _best_of(singles)
+    best = _best_of(singles, {name: needed(data, name) for name in singles})
     while best is not None and len(steps) < MOST_EFFECTS:
         before = steps[-1].gain if steps else 0.0
-        if best.gain - before < max(LEAST_GAIN, LEAST_SHARE * before):
+        of_clock = sum(clock_gain(data, t)[1] for t in (steps[-1].terms if steps else ()) if t.kind == CLOCK)
+        least = needed(data, best.name) if not steps else max(LEAST_GAIN, LEAST_SHARE * (before - of_clock))
+        if best.gain - before < least:
             break
         steps.append(best)
         if len(steps) < MOST_EFFECTS:
             more = _round(data, parts, base, screen, candidates, best, progress)
             best = _best_of(more)
     return Selection(singles, tuple(steps), free_gain(data, parts, None),
-                     free_gain(data, parts, steps[-1] if steps else None))
+                     free_gain(data, parts, steps[-1] if steps else None),
+                     {name: needed(data, name) for name in singles})
 
 
-def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
-    """The best of those that were fitted, and not only looked at."""
-    return max((j for j in judged.values() if j.full), key=lambda j: j.gain, default=None)
+def needed(data: Data, name: str) -> float:
+    """Held-out log likelihood that a first effect must gain: less where nominal flights gave the floor."""
+    if data.study.controller is None:
+        return LEAST_GAIN
+    return WAVERING.get(name, FIRST_GAIN)
 
 
-def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Screen,
+def _best_of(judged: Mapping[str, Judged], least: Mapping[str, float] | None = None) -> Judged | None:
+    """The best of those that were fitted, and not only looked at; first those that gain as much as they need."""
+    return max((j for j in judged.values() if j.full),
+               key=lambda j: (least is None or j.gain >= least[j.name], j.gain), default=None)
+
+
+def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], screen: Screen,
            candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
            progress: Callable[[str], None]) -> dict[str, Judged]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full."""
@@ -123,16 +139,18 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Scr
     looked, sure = [], []
     for name, variants in candidates.items():
         progress(name)
-        for terms in variants:
-            if any((t.name, t.values.get("rotor")) in have for t in terms):
+        hopeless = False
+        for terms in _middle_first(variants):
+            if hopeless or any((t.name, t.values.get("rotor")) in have for t in terms):
                 continue
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
                 gain, start = first_order(screen, parts, left, added, terms, held)
                 looked.append(Judged(name, (*held, *terms), before + gain, full=False))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen))
+                hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
     looked = _best_variants(looked)
-    worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * LEAST_GAIN)]
+    worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
     fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen) for j in worth]
     best: dict[str, Judged] = {}
     for j in (*sure, *fitted, *(j for j in looked if j not in worth)):
@@ -143,6 +161,13 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[float], screen: Scr
     return best
 
 
+def _middle_first(variants: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Variants with the middle one of a random effect's three first: where that is hopeless all are."""
+    if len(variants) > 2 and variants[1][0].kind == SPECTRUM:
+        return [variants[1], variants[0], *variants[2:]]
+    return list(variants)
+
+
 def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
     """The best of each candidate's variants of one length, best first."""
     kept: dict[tuple[str, int], Judged] = {}
@@ -151,7 +176,7 @@ def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
     return list(kept.values())
 
 
-def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str, held: Hypothesis,
+def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], name: str, held: Hypothesis,
              terms: Hypothesis, chosen: Judged | None) -> Judged:
     """Fit on each half, judge on the other."""
     every = (*held, *terms)
@@ -162,15 +187,11 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[float], name: str
     else:
         others = [t for t in every if t.kind != CLOCK]
         gain += sum(clock_gain(data, t)[1] for t in held if t.kind == CLOCK)
-        own = 0.0
+        against = base[any(t.kind == SPECTRUM for t in others)]
         for train, test in ((0, 1), (1, 0)):
             found = _refined(data, parts[train], fit(data, parts[train], others, _start(chosen, others, train)))
-            reached = judge(data, parts[test], found.terms) if others else base[test]
-            gain += reached - base[test]
-            own += reached - judge(data, parts[test], _less(found.terms, terms), True)
+            gain += judge(data, parts[test], found.terms) - against[test] if others else 0.0
             fits.append(found)
-        if any(t.kind == SPECTRUM for t in terms):  # the looser floor of the commands is no evidence
-            gain = min(gain, (chosen.gain if chosen else 0.0) + own)
     fitted = list(fits[0].terms) if fits else []
     for t in (t for t in every if t.kind == CLOCK):
         made, more = clock_gain(data, t)
@@ -185,12 +206,6 @@ def _refined(data: Data, part: Part, found: Fit) -> Fit:
     if all(a.free == b.free for a, b in zip(terms, found.terms, strict=True)):
         return found
     return fit(data, part, terms, np.concatenate([t.scaled(t.values) for t in terms if t.kind == MEAN]))
-
-
-def _less(fitted: Sequence[Term], random: Sequence[Term]) -> list[Term]:
-    """Fitted effects without those of `random` that are random."""
-    names = {(t.name, t.values.get("rotor")) for t in random if t.kind == SPECTRUM}
-    return [t for t in fitted if (t.name, t.values.get("rotor")) not in names]
 
 
 def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
@@ -254,11 +269,19 @@ def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
     return term.fitted(np.array([share / term.step("share")])), float(gain)
 
 
+def _against_none(gain: float, least: float, many: int = 1, lowest: float | None = None) -> float:
+    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little."""
+    if gain < least:
+        return TEMPERATURE * (gain - least - np.log(many))
+    return gain - (least if lowest is None else lowest)
+
+
 def probabilities(selection: Selection) -> dict[str, float]:
     """Of every single candidate, `none` and `unknown`; they sum to 1."""
     names = list(selection.singles)
-    score = np.array([selection.singles[n].gain - LEAST_GAIN for n in names]
-                     + [0.0, selection.free_before - UNKNOWN_GAIN])
+    lowest = min(selection.least.values(), default=0.0)
+    score = np.array([_against_none(selection.singles[n].gain, selection.least[n], len(names), lowest) for n in names]
+                     + [0.0, _against_none(selection.free_before, UNKNOWN_GAIN)])
     if selection.chosen is not None and selection.explained:
         first = selection.steps[0].name
         score[-1] = min(score[-1], score[names.index(first)] - 3.0 * TEMPERATURE)
