@@ -121,6 +121,7 @@ def _effects(data: Data, found: Selection) -> list[Found]:
         if part is not None:
             place += len(t.free)
         if t.companion:
+            out = [_with_random_part(e, t) for e in out]
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
         known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
@@ -131,6 +132,14 @@ def _effects(data: Data, found: Selection) -> list[Found]:
         n = sum(len(f) for f in data.flights)
         out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
     return out
+
+
+def _with_random_part(effect: Found, part: Term) -> Found:
+    """An effect with the parameters that its random part was fitted with."""
+    if effect.name != part.name:
+        return effect
+    return Found(effect.name, {**effect.parameters, **{k: replace(effect.parameters[k], value=part.values[k])
+                                                       for k in part.free}})
 
 
 def _middle(chosen: Judged) -> np.ndarray | None:
