@@ -20,7 +20,6 @@ from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
 from tools import stack
 from tools.emulator import build
-from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 
 ROOT = Path(__file__).parents[2]

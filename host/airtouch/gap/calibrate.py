@@ -16,7 +16,7 @@ from airtouch.gap.channels import COUNT, residual
 from airtouch.gap.fit import Data, Part, Study, fit
 from airtouch.gap.flight import Flight
 from airtouch.gap.result import Quantity
-from airtouch.gap.spectra import Floor, floor_of, sensor_power, starts, AIR, REST
+from airtouch.gap.spectra import Floor, floor_of, sensor_power, AIR, REST
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -152,6 +152,3 @@ def _inconsistent(study: Study, flights: Sequence[Flight]) -> list[str]:
         if far[i] > 2.0 * SENSITIVE:
             notes.append(f"{f.name}: declared nominal, yet its {names[i]} is {far[i]:.0f} deviations from the others'")
     return notes
-
-
-__all__ = ["Calibration", "calibrated", "declared", "sensor_noise", "starts", "whole_of"]

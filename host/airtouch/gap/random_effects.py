@@ -12,10 +12,8 @@ from scipy.ndimage import median_filter
 from airtouch.gap.channels import COUNT, residual
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.spectra import blocks, frequencies
-from airtouch.simulation import motors
-from airtouch.simulation.flight import prepare
 from airtouch.simulation import rigid_body
-from airtouch.simulation.random_stream import stream, normals
+from airtouch.simulation.flight import prepare
 
 SEEDS = 4
 GROUP = 3  #: blocks, as in the two halves of the data: a line must stand out in both
@@ -164,6 +162,3 @@ def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
         strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
         out[r] = shape * strength
     return out
-
-
-__all__ = ["growth", "line_shape", "motors", "normals", "power", "stream"]

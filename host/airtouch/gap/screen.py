@@ -4,7 +4,7 @@ One replay for each free parameter, shared by both halves of the data; candidate
 well here are then fitted in full.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -88,6 +88,3 @@ def _changes(term: Term) -> bool:
     """Whether an effect changes anything while its free parameters are neutral (a shape that is not)."""
     return not all(p.neutral is not None or p.name in term.free for p in term.effect.parameters) \
         and term.effect.settings is not None
-
-
-__all__ = ["Mapping", "Screen", "first_order"]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.simulation import controller, loop
 from airtouch.simulation import effects as registry

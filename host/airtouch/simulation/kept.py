@@ -7,7 +7,7 @@ with the same numbers as in one call.
 import math
 
 import numpy as np
-from numba import float64, from_dtype, int64, types, uint64
+from numba import float64, from_dtype, int64, types
 
 from airtouch.simulation import contact, controller, estimator, rigid_body, sensors, world
 from airtouch.simulation.compiled import jit
