@@ -7,13 +7,13 @@ where it gains much on top of the best named effects, something is left that the
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, MEAN, SPECTRUM, Term
+from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COUNT
-from airtouch.gap.fit import Data, Fit, Part, Problem, fit, judge, left_over, problem_of
+from airtouch.gap.fit import Data, Fit, Part, Problem, fit, judge, left_over
 from airtouch.gap.flight import PERIOD_S
 from airtouch.gap.screen import Screen, first_order
 from airtouch.gap.spectra import AIR, REST, frequencies
@@ -24,7 +24,8 @@ GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
 FIRST_GAIN = 6.0  #: the same for the first effect, against a floor from nominal flights
 #: but for these: commands at 100 Hz hold aliases of a faster loop, which differ from flight to flight
-WAVERING = {"inertia": 24.0, "motor_lag": 16.0}
+WAVERING = {"inertia": 24.0, "motor_lag": 16.0, "vibration": 12.0}
+PRICE = 0.9  #: of each further parameter of an effect
 LEAST_SHARE = 0.02  #: and as a share of what the effects before it have added
 UNKNOWN_GAIN = 25.0  #: of the free spectrum over the best named effects, for `unknown`
 UNKNOWN_SHARE = 0.2  #: and as a share of the free spectrum's gain over no effect
@@ -99,7 +100,9 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     while best is not None and len(steps) < MOST_EFFECTS:
         before = steps[-1].gain if steps else 0.0
         of_clock = sum(clock_gain(data, t)[1] for t in (steps[-1].terms if steps else ()) if t.kind == CLOCK)
-        least = needed(data, best.name) if not steps else max(LEAST_GAIN, LEAST_SHARE * (before - of_clock))
+        least = needed(data, best.name)
+        if steps:
+            least = max(LEAST_GAIN, least, LEAST_SHARE * (before - of_clock))
         if best.gain - before < least:
             break
         steps.append(best)
@@ -145,7 +148,7 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
                 continue
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
                 gain, start = first_order(screen, parts, left, added, terms, held)
-                looked.append(Judged(name, (*held, *terms), before + gain, full=False))
+                looked.append(Judged(name, (*held, *terms), before + gain - _price(terms), full=False))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen))
                 hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
@@ -158,7 +161,16 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         need = LEAST_GAIN if old is not None and len(j.terms) > len(old.terms) else 0.0
         if old is None or (j.full, j.gain) > (old.full, old.gain + need):
             best[j.name] = j
+    for name, other in COMPANIONS.items():
+        both, alone = best.get(name), best.get(other)
+        if both and alone and len(both.terms) > len(held) + 1 and both.gain < alone.gain + LEAST_GAIN:
+            best[name] = replace(both, gain=min(both.gain, alone.gain - 1.0))  # it is the companion that gains
     return best
+
+
+def _price(terms: Sequence[Term]) -> float:
+    """Held-out log likelihood that parameters beyond an effect's first must earn."""
+    return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
 
 
 def _middle_first(variants: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -192,6 +204,7 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]],
             found = _refined(data, parts[train], fit(data, parts[train], others, _start(chosen, others, train)))
             gain += judge(data, parts[test], found.terms) - against[test] if others else 0.0
             fits.append(found)
+        gain -= _price(others)
     fitted = list(fits[0].terms) if fits else []
     for t in (t for t in every if t.kind == CLOCK):
         made, more = clock_gain(data, t)
