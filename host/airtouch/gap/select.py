@@ -22,7 +22,7 @@ from airtouch.gap.twin import COMMAND_ONLY
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
-FIRST_GAIN = 6.0  #: the same for the first effect, against a floor from nominal flights
+FIRST_GAIN = 10.0  #: the same for the first effect, against a floor from nominal flights
 #: but for these: commands at 100 Hz hold aliases of a faster loop, which differ from flight to flight
 WAVERING = {"inertia": 24.0, "motor_lag": 16.0, "vibration": 12.0}
 PRICE = 0.9  #: of each further parameter of an effect
