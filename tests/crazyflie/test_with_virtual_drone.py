@@ -69,8 +69,14 @@ def fly(virtual, hop, cache, out, *more):
 
 
 def on_the_ground(virtual):
-    row = virtual.drone.row
-    return height(virtual) < 0.1 and not row[loop.PWM:loop.PWM + 4].any() and not virtual.drone.info() >> 7 & 1
+    """Whether it stands with its motors off, now or within the seconds that a busy machine may need for its last step."""
+    until = time.monotonic() + 5.0
+    while time.monotonic() < until:
+        row = virtual.drone.row
+        if height(virtual) < 0.1 and not row[loop.PWM:loop.PWM + 4].any() and not virtual.drone.info() >> 7 & 1:
+            return True
+        time.sleep(0.05)
+    return False
 
 
 def height(virtual):
