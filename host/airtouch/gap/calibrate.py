@@ -58,10 +58,9 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Cali
     study = declared(vehicle, flights)
     chosen, prior = _terms()
     for _ in range(2):
-        data = Data(study, flights)
-        whole = whole_of(data)
+        data = Data(replace(study, calibration=(), controller=None), flights)
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
-        found = fit(Data(replace(study, calibration=(), controller=None), flights), whole, chosen, start, prior)
+        found = fit(data, whole_of(data), chosen, start, prior)
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from airtouch.gap.result import Quantity
+from airtouch.gap.result import Found, Quantity
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, get
 
@@ -157,6 +157,14 @@ def _unsteady() -> Term:
     """The random part of the ground effect, where and when its mean part acts."""
     effect = get("ground_effect")
     return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, "turbulence": 0.0}), True)
+
+
+def term_of(effect: Found) -> Term:
+    """An effect as a diagnosis names it, as a term with its values."""
+    given = {k: q.value for k, q in effect.parameters.items()}
+    right = min(terms(effect.name), key=lambda t: sum(abs(given.get(k, v) - v) for k, v in t.values.items()
+                                                      if k not in t.free))
+    return replace(right, values={**right.values, **given})
 
 
 def twins_of(name: str) -> tuple[frozenset[str], str] | None:

@@ -47,11 +47,10 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     data = _data(study, some)
     found = select(data, candidates.every(without), say)
     say("how far")
-    parts = halves(data)
     ranking, overall = _ranking(data, found)
     effects = _effects(data, found)
     verdict = _verdict(found)
-    named = [t for t in _terms(effects)] if verdict == "effect" else []
+    named = [candidates.term_of(e) for e in effects] if verdict == "effect" else []
     cells = where(gap_map(study, seen, nominal, named))
     alike = _alike(found)
     notes = [n for f in seen for n in f.notes] + left_out
@@ -59,7 +58,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += measure.differences(study, nominal)
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
-    control = _control(data, parts, found) if verdict == "effect" else {}
+    control = _control(data, found) if verdict == "effect" else {}
     return Diagnosis(
         verdict, tuple(effects) if verdict == "effect" else (), tuple(ranking), alike, tuple(cells),
         {"before": overall.before, "after": overall.after if verdict == "effect" else overall.before,
@@ -83,7 +82,7 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     return Diagnosis(
         verdict, tuple(_effects(data, found)) if named else (), tuple(ranking), _alike(found), (),
         {"before": overall.before, "after": overall.after if named else overall.before, "floor": 1.0},
-        overall.share if named else None, _control(data, halves(data), found) if named else {}, "",
+        overall.share if named else None, _control(data, found) if named else {}, "",
         flights=tuple(f.name for f in flights))
 
 
@@ -157,18 +156,9 @@ def _spread(chosen: Judged, term: Term, covariance: np.ndarray) -> np.ndarray:
     return covariance + apart
 
 
-def _terms(effects: Sequence[Found]) -> list[Term]:
-    out = []
-    for e in effects:
-        values = {k: q.value for k, q in e.parameters.items()}
-        term = candidates.terms(e.name)[0]
-        out.append(replace(term, values={**term.values, **values}))
-    return out
-
-
 def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:
     """Every candidate with probability and shrink, best first; and the shrink of what was chosen."""
-    parts = halves(data)
+    parts = found.parts
     chance = probabilities(found)
     overall = shrink_of(data, parts, found.chosen)
     out = []
@@ -199,14 +189,14 @@ def _alike(found: Selection) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _control(data: Data, parts: Sequence, found: Selection) -> dict[str, object]:
+def _control(data: Data, found: Selection) -> dict[str, object]:
     """The gap with a deliberately wrong effect in the model."""
     taken = {n for g in _alike(found) for n in g} | {s.name for s in found.steps}
     every = candidates.every()
     for name in WRONG:
         if name in every and name not in taken:
-            fits = tuple(fit(data, p, every[name][0]) for p in parts)
-            done = shrink_of(data, parts, Judged(name, fits[0].terms, 0.0, fits))
+            fits = tuple(fit(data, p, every[name][0]) for p in found.parts)
+            done = shrink_of(data, found.parts, Judged(name, fits[0].terms, 0.0, fits))
             return {"name": name, "before": done.before, "after": done.after, "shrink": done.share.plain()}
     return {}
 
@@ -216,16 +206,12 @@ def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], f
     """The shrink with the vehicle as calibrated (or declared, without baseline) and as its file declares it."""
     if not nominal or found.chosen is None:
         return {"declared": _plain(overall)}
-    data = Data(_declared(vehicle, nominal), some)
+    data = Data(calibrate.declared(vehicle, nominal), some)
     parts = halves(data)
-    terms = tuple(replace(t, values=dict(t.values)) for t in found.chosen.terms if t.kind != CLOCK)
+    terms = tuple(t for t in found.chosen.terms if t.kind != CLOCK)
     fits = tuple(fit(data, p, terms, _middle(found.chosen)) for p in parts)
     one = shrink_of(data, parts, Judged(found.chosen.name, terms, 0.0, fits))
     return {"declared": _plain(one), "calibrated": _plain(overall)}
-
-
-def _declared(vehicle: Vehicle, nominal: Sequence[Flight]) -> Study:
-    return calibrate.declared(vehicle, nominal)
 
 
 def _plain(shrink: Shrink) -> dict[str, object]:

@@ -7,13 +7,13 @@ random ones by their strength; what differs from flight to flight (offsets) has 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from airtouch.gap import random_effects
-from airtouch.gap.candidates import CLOCK, MEAN, SPECTRUM, Term
+from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COMMAND, COUNT, residual
 from airtouch.gap.flight import Flight
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, Floor, blocks, judged, starts
@@ -228,24 +228,26 @@ def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> 
 
     wide: the commands' floor is as uncertain as under random effects, though there are none.
     """
+    problem, values, added, price = _explained(data, part, terms, wide)
+    return problem.likelihood(values, added) - price
+
+
+def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem, what is left (flattened, offsets taken off) and the power that it should have."""
+    problem, values, added, _ = _explained(data, part, terms)
+    return problem, values, problem.power + added
+
+
+def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
+               ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
+    """What effects leave of a part, the power that they add, and what offsets and the commands' floor cost."""
     problem = problem_of(data, part)
     random = [t for t in terms if t.kind == SPECTRUM]
     active = [t.active() for t in terms if t.kind == MEAN]
     told, cost = problem.commanded([*active, *(t.active() for t in random)], wide or bool(random))
     added = problem.random_power(random) + told
     values, penalty = _without_offsets(problem, problem.values(active), added)
-    return problem.likelihood(values, added) - penalty - cost
-
-
-def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem, what is left (flattened, offsets taken off) and the power that it should have."""
-    problem = problem_of(data, part)
-    random = [t for t in terms if t.kind == SPECTRUM]
-    active = [t.active() for t in terms if t.kind == MEAN]
-    told, _ = problem.commanded([*active, *(t.active() for t in random)], bool(random))
-    added = problem.random_power(random) + told
-    values, _ = _without_offsets(problem, problem.values(active), added)
-    return problem, values, problem.power + added
+    return problem, values, added, penalty + cost
 
 
 def _start(problem: Problem, mean: Sequence[Term]) -> np.ndarray:
@@ -442,11 +444,3 @@ def strength_variance(data: Data, part: Part, terms: Sequence[Term], term: Term)
         at.append(judge(data, part, [moved if t is term else t for t in terms]))
     bend = (2.0 * at[1] - at[0] - at[2]) / step ** 2
     return np.diag(x ** 2 / max(bend, 1e-6))
-
-
-def replace_terms(f: Fit, terms: Sequence[Term]) -> Fit:
-    """A fit with other terms."""
-    return replace(f, terms=tuple(terms))
-
-
-__all__ = ["CLOCK", "Data", "Fit", "Part", "Problem", "Study", "fit", "judge", "left_over", "spectra"]

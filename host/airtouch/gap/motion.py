@@ -88,13 +88,13 @@ def rotor_heights(log: FlightLog, turn: np.ndarray, rotor_x: np.ndarray, rotor_y
         ahead = along[:, :1] * rotor_x + along[:, 1:] * rotor_y
         step[moving] = ahead[moving] / size[moving, None] ** 2 / period_s
     rise = turn[:, 2, :1] * rotor_x + turn[:, 2, 1:2] * rotor_y
-    top = _altitude(log, height, period_s) - height
-    here = _altitude(log, height, period_s)
+    here = _altitude(log, height)
+    top = here - height
     shifted = np.column_stack([np.interp(index + np.clip(step[:, i], -100, 100), index, top) for i in range(4)])
     return np.maximum(here[:, None] - shifted + rise, 0.0)
 
 
-def _altitude(log: FlightLog, height: np.ndarray, period_s: float) -> np.ndarray:
+def _altitude(log: FlightLog, height: np.ndarray) -> np.ndarray:
     """Height over the floor (n,): the logged one, else the down range without its steps."""
     if log.has(POSITION[2]):
         return held(log[POSITION[2]])

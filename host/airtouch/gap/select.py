@@ -51,13 +51,15 @@ class Judged:
 class Selection:
     """singles: the best variant of every candidate; steps: effects added one after another;
 
-    free_before, free_after: gain of the free spectrum over nothing and over the last step.
+    free_before, free_after: gain of the free spectrum over nothing and over the last step;
+    parts: the two halves that they were fitted and judged on.
     """
 
     singles: Mapping[str, Judged]
     steps: tuple[Judged, ...]
     free_before: float
     free_after: float
+    parts: tuple[Part, Part]
     least: Mapping[str, float]  #: gain that each candidate needs
 
     @property
@@ -110,7 +112,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
             more = _round(data, parts, base, screen, candidates, best, progress)
             best = _best_of(more)
     return Selection(singles, tuple(steps), free_gain(data, parts, None),
-                     free_gain(data, parts, steps[-1] if steps else None),
+                     free_gain(data, parts, steps[-1] if steps else None), parts,
                      {name: needed(data, name) for name in singles})
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch import __version__
 from airtouch.gap import calibrate, measure, random_effects, words
 from airtouch.gap.band_sums import BANDS_HZ
-from airtouch.gap.candidates import MEAN, SPECTRUM, Term, terms
+from airtouch.gap.candidates import MEAN, SPECTRUM, Term, term_of
 from airtouch.gap.channels import CHANNELS, residual
 from airtouch.gap.fit import Data, Study
 from airtouch.gap.flight import Flight
@@ -90,15 +90,6 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, flights: Sequence[FlightLo
                          [f.name for f in nominal]),
         command=command)
     write_bytes(page.encode(), path, force)
-
-
-def term_of(effect: Found) -> Term:
-    """An effect as a diagnosis names it, as a term with its values."""
-    given = {k: q.value for k, q in effect.parameters.items()}
-    some = terms(effect.name)
-    right = min(some, key=lambda t: sum(abs(given.get(k, v) - v) for k, v in t.values.items()
-                                        if k not in t.free))
-    return Term(right.effect, right.kind, right.free, {**right.values, **given})
 
 
 def _page(**context: Any) -> str:

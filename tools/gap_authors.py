@@ -1,0 +1,42 @@
+"""The authors' flights against the simulator: the three questions of host/docs/gap-real.md, one report each.
+
+    python tools/gap_authors.py [FLIGHTS/airtouch] [OUT]
+
+Writes all.html, close.html and wind.html (with .json) to OUT, out/gap-authors by default.
+"""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+VEHICLE = "crazyflie-2.1-flow"
+
+
+def questions(folder: Path) -> dict[str, tuple[list[str], list[str]]]:
+    """For each question its flights and its baseline, clean flights of the manifest flown straight."""
+    rows = [r for r in csv.DictReader((folder / "manifest.csv").open()) if r["use"] == "clean"]
+
+    def some(height: str, wind: str = "none", day: str = "") -> list[str]:
+        return [str(folder / r["file"]) for r in rows if r["wind"] == wind and r["angle_deg"] == "0"
+                and height in ("", r["height"]) and day in r["file"]]
+
+    low = some("low")
+    return {"all": (low, []), "close": (low[:10], some("h80")),
+            "wind": (some("low", "wind"), some("", day="_0103-"))}
+
+
+def main(folder: Path, out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    for name, (flights, baseline) in questions(folder).items():
+        print(f"## {name}: {len(flights)} flights, {len(baseline)} nominal", flush=True)
+        subprocess.run([str(Path(sys.executable).with_name("airtouch")), "gap", "diagnose", *flights, "--vehicle", VEHICLE,
+                        *(["--baseline", *baseline] if baseline else []), "--json", str(out / f"{name}.json"),
+                        "--report", str(out / f"{name}.html"), "--force"], check=True)
+
+
+if __name__ == "__main__":
+    flights = Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch"
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else flights,
+         Path(sys.argv[2]) if len(sys.argv) > 2 else Path("out/gap-authors"))
