@@ -132,7 +132,7 @@ def strengths(vehicle: Vehicle, cal: Sequence[FlightLog], seed: int, kinds: Sequ
               progress: Say = lambda _: None) -> dict[str, tuple[float, ...]]:
     """Three severities of each kind of effect that such flights show at all."""
     study = study_of(vehicle, cal)
-    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 6, seed)]
+    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 8, seed)]
     found = {}
     for name, kind in KINDS.items():
         if kinds is None or name in kinds:
