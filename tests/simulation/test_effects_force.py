@@ -104,6 +104,30 @@ def test_wind_gives_the_tilt_that_drag_implies(steady):
     assert log["roll_rad"].mean() == pytest.approx(math.atan(0.0147 * 0.5 / weight), rel=0.03)
 
 
+def test_wind_above_the_centre_of_mass_tips_the_vehicle_over(signals):
+    """Moment = lever x force, for any attitude: wind to the left lowers the left side."""
+    angle = 0.4
+    signals[:, at.ROTATION:at.ROTATION + 9] = (1, 0, 0, 0, math.cos(angle), -math.sin(angle),
+                                               0, math.sin(angle), math.cos(angle))
+    values = {"x": 0.3, "y": 0.8, "drag": 0.0147, "lever": 0.02}
+    got = wrench("wind", values, signals)[0]
+    force = 0.0147 * np.array([0.3, 0.8 * math.cos(angle), 0.0])
+    np.testing.assert_allclose(got[:3], force, atol=1e-15)
+    np.testing.assert_allclose(got[3:], np.cross([0, 0, 0.02], force), atol=1e-15)
+    assert got[3] < 0.0
+    plain = wrench("wind", {**values, "lever": 0.0}, signals)[0]
+    assert not plain[3:].any() and np.array_equal(plain[:3], got[:3])
+
+
+def test_rotors_on_the_lee_side_hold_against_wind_above_the_centre_of_mass(steady, vehicle):
+    """Hover: torque of the rotors = minus the moment of the wind."""
+    log = steady({"wind": {"x": 0.0, "y": 1.0, "drag": 0.0147, "lever": 0.03}})
+    still = steady({"wind": {"x": 0.0, "y": 1.0, "drag": 0.0147}})
+    roll = [(t := vehicle.thrust(one.stack(PWM)).mean(axis=0))[2] + t[3] - t[0] - t[1] for one in (log, still)]
+    torque = vehicle.arm_m / math.sqrt(2.0) * (roll[0] - roll[1])
+    assert torque == pytest.approx(0.0147 * 1.0 * 0.03, rel=0.05)
+
+
 def test_gusts_have_the_dryden_spectrum(signals):
     signals = np.repeat(signals[:1], 200_000, axis=0)
     signals[:, at.STEP] = 0.01
