@@ -102,7 +102,8 @@ def test_bad_effects_get_one_clear_line(text, said):
 
 
 def test_command_line_form():
-    assert effects.parse("wind:x=0.3m/s, y=-1 m/s")[1] == {"x": 0.3, "y": -1.0, "z": 0.0, "drag": 0.0147}
+    assert effects.parse("wind:x=0.3m/s, y=-1 m/s")[1] == {"x": 0.3, "y": -1.0, "z": 0.0, "drag": 0.0147,
+                                                             "lever": 0.0}
     assert effects.parse("weak_motor:rotor=2,thrust_loss=0.1") == ("weak_motor", {"rotor": 2.0,
             "thrust_loss": 0.1})
     assert effects.parse("mass") == ("mass", {"fraction": 0.1})

@@ -32,6 +32,7 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "ground_effect": tuple({"fade": x} for x in (0.0, 0.06)),
     "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
     "slung_load": tuple({"length": x} for x in (0.1, 0.2, 0.4)),
+    "wind": ({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
     "gust": tuple({"length": x} for x in (0.2, 0.5, 1.5)),
     "motor_noise": tuple({"time": x} for x in (0.005, 0.02, 0.1)),
     "battery_sag": tuple({"charge": x, "capacity": c} for x in (0.95, 0.8, 0.6, 0.4) for c in (0.2, 1.0)),
@@ -46,6 +47,10 @@ TWINS = (
     (frozenset({"mass", "thrust_coefficient"}),
      "add a fast climb or drop: the same thrust moves a heavier vehicle less, in proportion to its mass only "
      "where an outside force acts; weigh the vehicle, or run one motor on a scale"),
+    # one push against the speed; below 0.5 m/s flapping's moment (15 mm of lever) is lost in the torque's floor
+    (frozenset({"rotor_drag", "blade_flapping"}),
+     "fly at 1.5 m/s or more, with climbs and drops at speed: flapping's push grows with thrust, the rotors' drag "
+     "with rotor speed, and only flapping pitches the vehicle, if the drag acts at the centre of mass"),
 )
 
 
@@ -147,7 +152,7 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     if "ground_effect" in out:  # its air is unsteady as well
         out["ground_effect"] += [(*v, _unsteady()) for v in out["ground_effect"]]
     for name in COMPANIONS:
-        if name in out:
+        if name in out and COMPANIONS[name] not in without:
             drag = [replace(t, companion=True) for t in terms(COMPANIONS[name])]
             out[name] += [(*v, *drag) for v in out[name]]
     return out
