@@ -1,25 +1,25 @@
 """Spectra that random effects add to the gap, for a flight as it was flown.
 
-White noise and lines of the IMU in closed form; random forces by running the effect
-itself on the flight's signals with several seeds.
+White noise of the IMU and the rotors' lines in closed form; random forces by running the
+effect itself on the flight's signals with several seeds.
 """
 
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.signal import freqz
 
-from airtouch.gap.channels import COUNT, residual
+from airtouch.gap.channels import COUNT, FORCE, RATE, TORQUE, residual
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.spectra import blocks, frequencies
-from airtouch.simulation import rigid_body
+from airtouch.gap.loop_model import AXES, spectra
+from airtouch.gap.response import FIRST_BIN
+from airtouch.gap.spectra import AIR, blocks, frequencies
+from airtouch.gap.vibration_lines import lines
+from airtouch.simulation import rigid_body, sensors
 from airtouch.simulation.flight import prepare
 
 SEEDS = 4
-GROUP = 3  #: blocks, as in the two halves of the data: a line must stand out in both
-LOWEST_LINE = 8  #: bins of 0.39 Hz
-NEIGHBOURS = 41  #: bins among whose median a line stands out
-PEAK = 3.0  #: times that median
+SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
 def growth(term: Any, x: float) -> float:
@@ -47,27 +47,64 @@ def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
 def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
     shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
     maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
-    if maker is None:
-        return _by_running(data, i, term)
-    return maker(data, i, term, shape)
+    made = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
+    response = data.study.response
+    if response is not None and term.name not in SENSED and data.flights[i].rates is not None:
+        made[AIR][:, FIRST_BIN:, TORQUE] *= np.abs(response.outside[FIRST_BIN:]) ** 2
+    return made
 
 
 def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+    """White noise of gyro and accelerometer, the latter as its low-pass and the log's fold leave it."""
     row = prepare(data.study.vehicle, ())[0][0]
     extra = term.values["factor"] ** 2 - 1.0
     out = {}
     for r in shape:
         f = frequencies(r)
         made = np.zeros((len(f), COUNT))
-        made[:, 0:3] = extra * 2.0 * PERIOD_S * np.asarray(row["acc_noise"]) ** 2
-        difference = 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2 / PERIOD_S ** 2
-        gyro = extra * 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
-        made[:, 3:6] = difference[:, None] * gyro
-        made[:, 6:9] = gyro
-        if data.flights[i].rates is None:
-            made[:, 3:9] = 0.0
-        out[r] = np.broadcast_to(made, shape[r]).copy()
+        made[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
+        if data.flights[i].rates is not None:
+            gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
+            made[:, TORQUE] = _difference(r)[:, None] * gyro
+            made[:, RATE] = gyro
+            if r == AIR:
+                beyond = np.nan_to_num(data.study.floor.power[r][:, TORQUE]) - made[:, TORQUE]
+                made[:, TORQUE] += _gyro_share(data.study) * np.maximum(beyond, 0.0)
+        out[r] = np.broadcast_to(extra * made, shape[r]).copy()
     return out
+
+
+def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
+    """PSD (bins,), 1/Hz, of the accelerometer's noise of rms 1 as logged: white, through its low-pass, folded."""
+    whole = np.concatenate([f, 1.0 / PERIOD_S - f, 1.0 / PERIOD_S + f, 2.0 / PERIOD_S - f, 2.0 / PERIOD_S + f])
+    b = np.zeros(5)
+    sensors.lowpass_coefficients(float(row["acc_lowpass"]), float(row["step"]), b)
+    _, passed = freqz(b[:3], [1.0, b[3], b[4]], worN=whole, fs=1.0 / float(row["step"]))
+    total = (np.abs(passed) ** 2).reshape(5, -1).mean(axis=0)
+    return 2.0 * PERIOD_S * total / sensors.noise_gain(b) ** 2
+
+
+def _gyro_share(study: Any) -> np.ndarray:
+    """Share (bins, 3) of the gyro's noise in what moves the roll and pitch commands of nominal flights.
+
+    The commands' noise is what the floor of the angular acceleration holds beyond the gyro's own.
+    """
+    f = frequencies(AIR)
+    share = np.zeros((len(f), 3))
+    twin = study.controller
+    if twin is None:
+        return share
+    row = prepare(study.vehicle, study.calibration)[0][0]
+    for i, axis in enumerate(AXES[1:]):
+        strength, made = twin.strengths[i + 1], spectra(twin.controllers[i + 1], row, axis, f)
+        share[:, i] = strength[0] * made[0] / np.maximum(strength @ made, 1e-300)
+    return share
+
+
+def _difference(regime: str) -> np.ndarray:
+    """PSD (bins,) of differences over a sample, 1/s^2, of what is white; the lowest bin as its window leaks."""
+    f = frequencies(regime)
+    return 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2 / PERIOD_S ** 2
 
 
 def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
@@ -96,46 +133,15 @@ def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndar
 
 
 def _vibration(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
-    """Narrow lines where this flight's own spectrum stands out of its neighbourhood, if anywhere."""
-    out = {}
-    for r in shape:
-        made = np.zeros(shape[r])
-        if r == "air" and len(data.base[i][r]):
-            made[:] = line_shape(data, i, term)
-        out[r] = made
+    """The rotors' lines: as strong on each axis of the accelerometer, and on the gyro's differences."""
+    out = {r: np.zeros(s) for r, s in shape.items()}
+    if not len(data.base[i][AIR]):
+        return out
+    line = lines(data).power[i][:, :, None] * term.values["amplitude"] ** 2
+    out[AIR][:, :, FORCE] = line
+    if data.flights[i].rates is not None:
+        out[AIR][:, :, TORQUE] = term.values["gyro"] ** 2 * _difference(AIR)[:, None] * line
     return out
-
-
-def line_shape(data: Any, i: int, term: Any) -> np.ndarray:
-    """(bins, COUNT): power of lines of unit amplitude, at the bins where they are."""
-    every = np.abs(data.base[i]["air"][:, :, :6]) ** 2
-    spectrum = every.mean(axis=0)
-    made = np.zeros((len(spectrum), COUNT))
-    floor = data.study.floor.power["air"][:, :6]
-    halves = [every[(np.arange(len(every)) // GROUP) % 2 == k] for k in (0, 1)]
-    if min(len(h) for h in halves) == 0:
-        return made
-    with np.errstate(invalid="ignore", divide="ignore"):
-        over = np.min([np.nan_to_num(h.mean(axis=0) / floor)[:, :3].sum(axis=1) for h in halves], axis=0)
-    over = np.maximum(over - 3.0, 0.0)
-    over[:LOWEST_LINE] = 0.0
-    around = median_filter(over, NEIGHBOURS, mode="nearest")
-    shape = np.where(over > PEAK * around + 0.5, over - around, 0.0)
-    shape[shape < 0.05 * shape.max(initial=0.0)] = 0.0
-    if shape.sum() <= 0.0:
-        return made
-    shape /= max(shape.sum(), 1e-12)
-    f = frequencies("air")
-    width = f[1]
-    amplitude = term.values["amplitude"]
-    each = np.nan_to_num((spectrum * (shape > 0)[:, None])[:, :3].sum(axis=0))
-    split = each / max(each.sum(), 1e-12)
-    made[:, :3] = shape[:, None] * split * 3.0 * amplitude ** 2 / 2.0 / width
-    gyro = np.nan_to_num((spectrum * (shape > 0)[:, None])[:, 3:6].sum(axis=0))
-    if data.flights[i].rates is not None and gyro.sum() > 0:
-        rate = term.values["gyro"] ** 2 * 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2 / PERIOD_S ** 2
-        made[:, 3:6] = (shape * rate)[:, None] * split * 3.0 * amplitude ** 2 / 2.0 / width
-    return made
 
 
 def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
