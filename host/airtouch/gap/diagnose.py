@@ -134,11 +134,20 @@ def _effects(data: Data, found: Selection) -> list[Found]:
 
 
 def _with_random_part(effect: Found, part: Term) -> Found:
-    """An effect with the parameters that its random part was fitted with."""
+    """An effect with its random part as fitted, so that it can be switched on as it stands.
+
+    The part was fitted at its own strength (1, of the published curve), while the effect has one strength for
+    mean and random part: the part's parameters are divided by it. A mean too weak to carry them within their
+    bounds is raised to the least that does.
+    """
     if effect.name != part.name:
         return effect
-    return Found(effect.name, {**effect.parameters, **{k: replace(effect.parameters[k], value=part.values[k])
-                                                       for k in part.free}})
+    own, given = part.values["strength"], effect.parameters["strength"]
+    limits = {p.name: p.high for p in part.effect.parameters}
+    strength = max(given.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
+    raised = replace(given, value=strength, high=max(given.high, strength))
+    scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
+    return Found(effect.name, {**effect.parameters, "strength": raised, **scaled})
 
 
 def _middle(chosen: Judged) -> np.ndarray | None:
