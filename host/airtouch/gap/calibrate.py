@@ -15,6 +15,7 @@ from airtouch.gap.candidates import Term, terms
 from airtouch.gap.channels import COUNT, residual
 from airtouch.gap.fit import Data, Part, Study, fit
 from airtouch.gap.flight import Flight
+from airtouch.gap.generic import usual_of
 from airtouch.gap.result import Quantity
 from airtouch.gap.spectra import Floor, floor_of, sensor_power, AIR, REST
 from airtouch.simulation.effects import Active
@@ -62,6 +63,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Cali
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
         found = fit(data, whole_of(data), chosen, start, prior)
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
+    study = replace(study, usual=usual_of(Data(study, flights)))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))
 

@@ -13,7 +13,7 @@ from airtouch.gap.fit import Data, Study, fit, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
-from airtouch.gap.select import FIRST_GAIN, UNKNOWN_GAIN, Judged, Selection, halves, probabilities, select
+from airtouch.gap.select import FIRST_GAIN, Judged, Selection, halves, probabilities, select
 from airtouch.gap.shrink import Shrink, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.logs.flight_log import FlightLog
@@ -102,9 +102,9 @@ def _some(flights: Sequence[Flight]) -> list[Flight]:
 
 
 def _verdict(found: Selection) -> str:
-    if found.chosen is None:
-        return "unknown" if found.free_before > UNKNOWN_GAIN else "none"
-    return "effect" if found.explained else "unknown"
+    if not found.explained:
+        return "unknown"
+    return "none" if found.chosen is None else "effect"
 
 
 def _effects(data: Data, found: Selection) -> list[Found]:

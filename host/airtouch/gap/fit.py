@@ -8,6 +8,7 @@ random ones by their strength; what differs from flight to flight (offsets) has 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -40,6 +41,7 @@ class Study:
     calibration: tuple[Active, ...]
     controller: Twin | None
     floor: Floor
+    usual: Any = None  #: generic.Usual of the nominal flights
 
 
 @dataclass

@@ -1,9 +1,9 @@
 """Which effect: every candidate fitted on some blocks and judged on others, one against another.
 
 Two halves of the flights (of the blocks, for a few flights) take turns at fitting and
-judging. `none` is the hypothesis of no effect. `unknown` is a free spectrum: any power in
-any channel and band. It costs many parameters, so a named effect that is right beats it;
-where it gains much on top of the best named effects, something is left that they do not explain.
+judging. `none` is the hypothesis of no effect. `unknown` is a model without names
+(gap.generic): it needs more parameters, so a named effect that is right beats it; where it gains
+much on top of the named effects, or more alone than they do, something is left that they do not explain.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term
-from airtouch.gap.channels import COUNT
-from airtouch.gap.fit import Data, Fit, Part, Problem, fit, judge, left_over
-from airtouch.gap.flight import PERIOD_S
+from airtouch.gap.clock import clock_gain, clock_left
+from airtouch.gap.fit import Data, Fit, Part, fit, judge, left_over
+from airtouch.gap.generic import generic_gain
 from airtouch.gap.screen import Screen, first_order
-from airtouch.gap.spectra import AIR, REST, frequencies
+from airtouch.gap.spectra import AIR, REST
 from airtouch.gap.twin import COMMAND_ONLY
 
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
 FIRST_GAIN = 10.0  #: the same for the first effect, against a floor from nominal flights
@@ -27,8 +26,9 @@ FIRST_GAIN = 10.0  #: the same for the first effect, against a floor from nomina
 WAVERING = {"inertia": 24.0, "motor_lag": 16.0, "vibration": 12.0}
 PRICE = 0.9  #: of each further parameter of an effect
 LEAST_SHARE = 0.02  #: and as a share of what the effects before it have added
-UNKNOWN_GAIN = 25.0  #: of the free spectrum over the best named effects, for `unknown`
-UNKNOWN_SHARE = 0.2  #: and as a share of the free spectrum's gain over no effect
+#: gain of a nameless model over the effects named, for `unknown`, where nominal flights gave the floor, and else
+UNKNOWN_GAIN, UNKNOWN_ALONE = 6.0, 25.0
+UNKNOWN_SHARE = 0.05  #: and as a share of what the effects named gain: an amplitude modelled to a fifth leaves this
 MOST_EFFECTS = 3
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
@@ -51,8 +51,9 @@ class Judged:
 class Selection:
     """singles: the best variant of every candidate; steps: effects added one after another;
 
-    free_before, free_after: gain of the free spectrum over nothing and over the last step;
-    parts: the two halves that they were fitted and judged on.
+    free_before, free_after: gain of the nameless model over no effect and over the last step;
+    parts: the two halves that they were fitted and judged on; named: gain of the last step over
+    no effect as free_before has it; floor: whether nominal flights gave the floor.
     """
 
     singles: Mapping[str, Judged]
@@ -61,6 +62,8 @@ class Selection:
     free_after: float
     parts: tuple[Part, Part]
     least: Mapping[str, float]  #: gain that each candidate needs
+    named: float
+    floor: bool
 
     @property
     def chosen(self) -> Judged | None:
@@ -68,9 +71,20 @@ class Selection:
         return self.steps[-1] if self.steps else None
 
     @property
+    def left(self) -> float:
+        """Log likelihood that a nameless model gains: on top of the effects named, or alone over them."""
+        alone = self.free_before - self.named
+        return float(np.logaddexp(self.free_after, alone)) if self.steps else self.free_before
+
+    @property
+    def allowed(self) -> float:
+        """What may be left where the effects named are right."""
+        return max(UNKNOWN_GAIN if self.floor else UNKNOWN_ALONE, UNKNOWN_SHARE * self.named)
+
+    @property
     def explained(self) -> bool:
         """Whether what is left is the floor, or close to it."""
-        return self.free_after < max(UNKNOWN_GAIN, UNKNOWN_SHARE * self.free_before)
+        return self.left < self.allowed
 
 
 def halves(data: Data) -> tuple[Part, Part]:
@@ -111,9 +125,21 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         if len(steps) < MOST_EFFECTS:
             more = _round(data, parts, base, screen, candidates, best, progress)
             best = _best_of(more)
-    return Selection(singles, tuple(steps), free_gain(data, parts, None),
-                     free_gain(data, parts, steps[-1] if steps else None), parts,
-                     {name: needed(data, name) for name in singles})
+    before, after, named = _nameless(data, parts, base, steps[-1] if steps else None)
+    return Selection(singles, tuple(steps), before, after, parts, {name: needed(data, name) for name in singles},
+                     named, data.study.controller is not None)
+
+
+def _nameless(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]],
+              last: Judged | None) -> tuple[float, float, float]:
+    """Gain of a model without names over no effect and over those of `last`, and theirs over no effect."""
+    before = sum(generic_gain(data, parts, [(), ()])) + clock_left(data, ())
+    if last is None:
+        return before, before, 0.0
+    fits = [f.terms for f in last.fits] or [(), ()]
+    after = sum(generic_gain(data, parts, fits)) + clock_left(data, [t.name for t in last.terms])
+    wide = any(t.kind == SPECTRUM for t in last.terms)  # judged against none that is as unsure of the commands
+    return before, after, last.gain + (sum(base[1]) - sum(base[0]) if wide else 0.0)
 
 
 def needed(data: Data, name: str) -> float:
@@ -232,58 +258,6 @@ def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarr
     return np.concatenate([known, np.full(size - len(known), 0.05)])
 
 
-def bands_of(problem: Problem) -> np.ndarray:
-    """A group number for each flattened value: view, regime, channel and band."""
-    groups = []
-    for _, regime, chosen in problem.part.pieces:
-        f = frequencies(regime)
-        band = np.digitize(f, BANDS_HZ) - 1
-        table = band[:, None] * COUNT + np.arange(COUNT) + (1000 if regime == REST else 0)
-        groups.append(np.tile(table[problem.keep[regime]], int(chosen.sum())))
-    twin = np.digitize(problem.twin.frequency, BANDS_HZ) * COUNT + problem.twin.channel + 2000 \
-        if len(problem.twin) else np.zeros(0)
-    return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
-
-
-def free_gain(data: Data, parts: Sequence[Part], chosen: Judged | None) -> float:
-    """Held-out log likelihood that a free spectrum adds to a hypothesis: what it does not explain."""
-    total = 0.0
-    for train, test in ((0, 1), (1, 0)):
-        terms = chosen.fits[train].terms if chosen and chosen.fits else ()
-        problem, values, power = left_over(data, parts[train], terms)
-        e = np.where(problem.known, np.abs(values) ** 2 / power, 0.0)
-        groups = bands_of(problem)
-        size = groups.max(initial=0) + 1
-        count = np.bincount(groups, problem.known, size)
-        mean = np.bincount(groups, e, size) / np.maximum(count, 1.0)
-        factor = np.where(count > 0, np.maximum(mean, 1.0), 1.0)
-        problem, values, power = left_over(data, parts[test], terms)
-        groups = np.minimum(bands_of(problem), size - 1)
-        with_free = problem.likelihood(values, power * factor[groups] - problem.power)
-        total += with_free - problem.likelihood(values, power - problem.power)
-    return total
-
-
-def clock_gain(data: Data, term: Term) -> tuple[Term, float]:
-    """Effects on the logged times alone: jitter of their rms, or the share of lost samples."""
-    gain = 0.0
-    floor = data.study.floor
-    clock = np.concatenate([f.clock_s for f in data.flights])
-    lost = np.concatenate([f.lost for f in data.flights]).astype(float)
-    if term.name == "time_jitter":
-        usual, now = max(floor.clock_s, 2e-4), max(float(np.std(clock)), 1e-9)
-        extra = np.sqrt(max(now ** 2 - usual ** 2, 0.0))
-        n = len(clock) * PERIOD_S / 0.1  # arrival times hang together for a tenth of a second
-        if extra > 0.0:
-            gain = 0.5 * n * ((now / usual) ** 2 - 1.0 - 2.0 * np.log(now / usual))
-        return term.fitted(np.array([extra / term.step("rms")])), float(gain)
-    share, usual = float(lost.mean()), max(floor.lost, 1e-3 if data.study.controller is None else 3e-4)
-    if share > usual:
-        n = len(lost) / 2.0
-        gain = n * (share * np.log(share / usual) + (1.0 - share) * np.log((1.0 - share) / (1.0 - usual)))
-    return term.fitted(np.array([share / term.step("share")])), float(gain)
-
-
 def _against_none(gain: float, least: float, many: int = 1, lowest: float | None = None) -> float:
     """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little."""
     if gain < least:
@@ -292,15 +266,16 @@ def _against_none(gain: float, least: float, many: int = 1, lowest: float | None
 
 
 def probabilities(selection: Selection) -> dict[str, float]:
-    """Of every single candidate, `none` and `unknown`; they sum to 1."""
+    """Of every single candidate, `none` and `unknown`; they sum to 1.
+
+    `unknown` has one half where as much is left as is allowed, and odds that grow with its square.
+    """
     names = list(selection.singles)
     lowest = min(selection.least.values(), default=0.0)
     score = np.array([_against_none(selection.singles[n].gain, selection.least[n], len(names), lowest) for n in names]
-                     + [0.0, _against_none(selection.free_before, UNKNOWN_GAIN)])
-    if selection.chosen is not None and selection.explained:
-        first = selection.steps[0].name
-        score[-1] = min(score[-1], score[names.index(first)] - 3.0 * TEMPERATURE)
-    elif selection.chosen is not None or selection.free_before > UNKNOWN_GAIN:
-        score[-1] = max(score[-1], score[:-2].max(initial=0.0) + 3.0 * TEMPERATURE)
+                     + [0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
-    return dict(zip([*names, "none", "unknown"], weight / weight.sum(), strict=True))
+    odds = (np.logaddexp(selection.left, 0.0) / selection.allowed) ** 2
+    unknown = odds / (1.0 + odds)
+    known = (1.0 - unknown) * weight / weight.sum()
+    return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.fit import Data, Part, left_over
+from airtouch.gap.generic import bands_of
 from airtouch.gap.result import Quantity
-from airtouch.gap.select import Judged, bands_of
+from airtouch.gap.select import Judged
 
 SURE = 4.0  #: standard errors by which a cell must stand over the floor
 FEWEST = 12  #: values in a cell
