@@ -1,0 +1,130 @@
+"""tools/gap_training.py: what is flown and tested, and its figures, against closed forms and other ways round."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.detector.dataset import Condition, FlightFile
+from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.detector.summary import summarise
+from airtouch.errors import AirTouchError
+from airtouch.gap.candidates import _unsteady
+from airtouch.gap.diagnose import _with_random_part
+from airtouch.gap.result import Found, Quantity
+from airtouch.logs.flight_log import PWM
+from airtouch.simulation import batch, effects, replay, scenario
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Active
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
+import gap_passes  # noqa: E402
+import gap_training  # noqa: E402
+
+
+def test_nothing_added_is_the_scenario_with_everything_off(tmp_path):
+    own = scenario.load("paper-mixed")
+    off = batch.simulate(replace(own, table={**own.table, "effects": {}}), seeds=2, seed=3)
+    made = gap_training.flown(gap_training.scene_text([]), 2, 3, tmp_path)
+    for one, two in zip(off, made, strict=True):
+        assert two.meta["effects"] == []
+        assert all(np.array_equal(one[c], two[c], equal_nan=True) for c in one.columns)
+
+
+def test_effects_are_flown_as_found():
+    given = [("weak_motor", {"rotor": 2, "thrust_loss": 0.07}), ("gust", {"rms": 0.2}),
+             ("weak_motor", {"rotor": 3, "thrust_loss": -0.02})]
+    scene = scenario.parse(gap_training.scene_text(given), "made")
+    on = scenario.draw_flight(scene, 0, 5).effects
+    assert sorted(name for name, _ in on) == ["gust", "weak_motor", "weak_motor"]
+    assert {v["rotor"]: v["thrust_loss"] for n, v in on if n == "weak_motor"} == {2: 0.07, 3: -0.02}
+
+
+def test_effects_are_added_one_after_another_and_once():
+    def effect(name, **values):
+        return {"name": name, "parameters": {k: {"value": v} for k, v in values.items()}}
+
+    found = {"all": {"effects": [effect("gust", rms=0.1), effect("weak_motor", rotor=1, thrust_loss=0.1)]},
+             "close": {"effects": [effect("gust", rms=0.9), effect("weak_motor", rotor=4, thrust_loss=0.2)]},
+             "calibration": [["weak_motor", {"rotor": 1, "thrust_loss": 0.5}], ["inertia", {"fraction": 0.1}]]}
+    rows = gap_training.chain(found)
+    assert [len(on) for _, on in rows] == [0, 1, 2, 3, 4]
+    assert rows[-1][1] == [("gust", {"rms": 0.1}), ("weak_motor", {"rotor": 1, "thrust_loss": 0.1}),
+                           ("weak_motor", {"rotor": 4, "thrust_loss": 0.2}), ("inertia", {"fraction": 0.1})]
+
+
+def test_no_flight_is_in_two_groups():
+    flights = {FlightFile(Path(f"{i}.csv"), Condition(fold=i % 5)): None for i in range(20)}
+    one, two = gap_training.cut(flights, ["013", "24"])
+    assert not set(one) & set(two) and len(one) + len(two) == 20
+    assert {f.condition.fold for f in one} == {0, 1, 3}
+    for wrong in (["01", "123", "4"], ["01", "23"]):
+        with pytest.raises(AirTouchError, match="fold"):
+            gap_training.cut(flights, wrong)
+
+
+def _scores(seed):
+    rng = np.random.default_rng(seed)
+    edges = [tuple(EdgeScore("entry", 100, 90, "entry", 0.1, float(e)) if e > 0 else EdgeScore("entry", 100)
+                   for e in rng.normal(0.05, 0.05, 4)) for _ in range(12)]
+    return [FlightScore(f"{i}", Condition(), e, tuple(range(rng.integers(0, 3))), 5, 30.0, (3, 4, 5, 9))
+            for i, e in enumerate(edges)]
+
+
+def test_two_equal_trainings_say_no_more_than_one():
+    """Flights are drawn whole: the same scores twice leave figures and intervals as they are."""
+    once = _scores(1)
+    twice = gap_training.together([once, once])
+    for name in ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy"):
+        assert summarise(twice)[name] == pytest.approx(summarise(once)[name])
+        assert summarise(twice)["intervals"][name] == pytest.approx(summarise(once)["intervals"][name])
+
+
+def test_trainings_are_averaged_by_edge():
+    one, two = _scores(1), _scores(2)
+    every = [abs(e.error_m) for s in (*one, *two) for e in s.edges if e.error_m is not None]
+    assert summarise(gap_training.together([one, two]))["mean_abs_error_m"] == pytest.approx(np.mean(every))
+
+
+def test_half_the_swing_is_six_decibels_apart(tmp_path):
+    text = gap_training.scene_text([("motor_noise", {"rms": 0.02})])
+    made = gap_training.flown(text, 3, 0, tmp_path)
+    half = [log.with_columns({c: 0.5 * log[c] for c in log.columns if c.startswith(("acc", "gyro")) or c in PWM})
+            for log in made]
+    assert gap_passes.apart_db(half, made) == pytest.approx([20 * np.log10(2)] * 2, abs=0.01)
+    assert gap_passes.apart_db(made, made) == pytest.approx([0.0, 0.0])
+
+
+def test_the_pieces_of_a_pass_share_no_sample(tmp_path):
+    for log in gap_training.flown(gap_training.scene_text([]), 3, 0, tmp_path):
+        entry, leave = (e.sample for e in logs.true_edges(log))
+        over, before = gap_passes.pieces(log)
+        assert before["t_s"][-1] < over["t_s"][0] < log["t_s"][entry] < log["t_s"][leave] < over["t_s"][-1]
+        assert logs.airborne(before).all() and not logs.true_edges(before)
+    assert gap_passes.pieces(log.slice(0, entry)) is None
+
+
+@pytest.mark.parametrize("mean", [0.0, 0.4, 1.7])
+def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
+    """Switched on as reported, the random force is the one that was fitted, whatever the mean's strength."""
+    signals = np.zeros((400, at.COUNT))
+    signals[:, at.STEP], signals[:, at.THRUST:at.THRUST + 4] = 0.01, 0.09
+    signals[:, at.ROTOR_RADIUS], signals[:, at.ROTOR_SPACING] = 0.0235, 0.065
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4], signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = 0.04, 0.3
+    for name in ("LOWER_FACTOR", "LOWER_ROUGHNESS", "UPPER_FACTOR", "UPPER_ROUGHNESS"):
+        signals[:, getattr(at, name):getattr(at, name) + 4] = 1.0
+
+    def force(values):
+        return replay.wrench_of(Active(effects.get("ground_effect"), values), signals, 3)
+
+    part = replace(_unsteady(), values={**_unsteady().values, "turbulence": 0.25})
+    named = Found("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
+                                                                          "turbulence": 0.0}.items()})
+    made = {k: q.value for k, q in _with_random_part(named, part).parameters.items()}
+    fitted = force(part.values) - force({**part.values, "turbulence": 0.0})
+    assert np.abs(fitted).max() > 1e-4
+    assert force(made) - force({**made, "turbulence": 0.0}) == pytest.approx(fitted, abs=1e-9)
+    assert made["strength"] == max(mean, 0.25 / 3.0)

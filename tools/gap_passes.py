@@ -1,0 +1,50 @@
+"""A pass over a platform: its pieces to diagnose, and its spectra as a detector sees them."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy.signal import welch
+
+from airtouch import logs
+from airtouch.detector import channels
+from airtouch.logs.flight_log import FlightLog
+
+BANDS_HZ = (0.7, 2.0, 6.0, 12.0, 25.0, 50.1)
+WINDOW = 128  #: samples of a spectrum
+MARGIN = 100  #: samples around the platform that belong to the pass: the least that is diagnosed is 3 s
+SETTLED = 300  #: samples after the motors start that are left out
+SHORTEST_BEFORE, SHORTEST_OVER = 400, 100  #: samples
+
+
+def _edges(log: FlightLog) -> tuple[int, int]:
+    """Samples of the first entry and its exit; zeros where there are none."""
+    return tuple([*(e.sample for e in logs.true_edges(log)), 0, 0][:2])
+
+
+def pieces(log: FlightLog) -> tuple[FlightLog, FlightLog] | None:
+    """(around the platform, in free air before it): two pieces of one flight; None where one is too short."""
+    entry, leave = _edges(log)
+    start = int(np.argmax(logs.airborne(log))) + SETTLED
+    if entry - MARGIN - start < SHORTEST_BEFORE or leave - entry < SHORTEST_OVER:
+        return None
+    return log.slice(entry - MARGIN, leave + MARGIN), log.slice(start, entry - MARGIN)
+
+
+def spectra(log: FlightLog) -> np.ndarray:
+    """dB (2, bands, 9) of the nine channels in the 3 s before an entry and from it to the exit; NaN if short."""
+    out = np.full((2, len(BANDS_HZ) - 1, 9), np.nan)
+    entry, leave = _edges(log)
+    values = channels.nine_channels(log)
+    for k, (a, b) in enumerate(((max(entry - 320, 0), entry - 20), (entry, leave))):
+        if b - a >= WINDOW and np.isfinite(values[a:b]).all():
+            f, power = welch(values[a:b], 100.0, nperseg=WINDOW, axis=0)
+            for i, (low, high) in enumerate(pairwise(BANDS_HZ)):
+                out[k, i] = 10.0 * np.log10(power[(f >= low) & (f < high)].mean(axis=0) + 1e-12)
+    return out
+
+
+def apart_db(made: Sequence[FlightLog], real: Sequence[FlightLog]) -> np.ndarray:
+    """Mean absolute difference (2,) of two sets' median spectra, dB: before and over the platform."""
+    one, two = (np.nanmedian([spectra(log) for log in some], axis=0) for some in (made, real))
+    return np.nanmean(np.abs(one - two), axis=(1, 2))
