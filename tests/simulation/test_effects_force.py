@@ -143,6 +143,25 @@ def test_gusts_have_the_dryden_spectrum(signals):
         assert np.std(10 * np.log10(measured / formula)) < 1.5
 
 
+def test_gusts_above_the_centre_of_mass_and_small_eddies_turn_the_vehicle(signals):
+    """Roll, pitch: lever x force. Yaw: mean x^2 of the rotors x drag x r_g with the spectrum of MIL-F-8785C."""
+    signals = np.repeat(signals[:1], 200_000, axis=0)
+    signals[:, at.STEP] = 0.01
+    tau, rms, drag, speed = 0.4, 0.4, 0.01, 1.25
+    plain = {"rms": rms, "length": tau * speed, "airspeed": speed, "drag": drag}
+    calm, got = (wrench("gust", values, signals) for values in (plain, {**plain, "lever": 0.02, "shear": 1.0}))
+    assert np.array_equal(got[:, :3], calm[:, :3]) and not calm[:, 3:].any()
+    np.testing.assert_allclose(got[:, 3:5], 0.02 * np.stack([-got[:, 1], got[:, 0]], axis=1), atol=1e-15)
+    f, power = welch(got[:, 5], fs=100.0, nperseg=8192)
+    band = (f > 0.05) & (f < 3.0)
+    w = 2 * np.pi * f[band]
+    across = 2 * rms**2 * tau * (1 + 3 * (w * tau) ** 2) / (1 + (w * tau) ** 2) ** 2
+    turning = across * (w / speed) ** 2 / (1 + (3 * signals[0, at.ROTOR_SPACING] / (np.pi * speed) * w) ** 2)
+    apart = np.mean(signals[0, at.ROTOR_X:at.ROTOR_X + 4] ** 2)
+    decibel = 10 * np.log10(power[band] / (turning * (drag * apart) ** 2))
+    assert abs(np.mean(decibel)) < 0.4 and np.std(decibel) < 1.5
+
+
 def test_blade_flapping_tilts_the_thrust_back(signals):
     signals[:, at.VELOCITY] = 2.0
     got = wrench("blade_flapping", {"tilt": 0.01, "hub": 0.005, "above": 0.01}, signals)[0]
