@@ -25,6 +25,7 @@ GROUPS = 3000  #: numbers that `bands_of` gives are below it
 NOTHING = 1e-9  #: variance of a coefficient that has no scatter
 ROUNDS = 3
 MOST_COLUMNS = 4  #: of one channel
+SURE = 3.0  #: standard deviations by which coefficients must scatter more than chance has them do
 SCATTER = 0.15  #: of the logarithm of power between nominal flights, believed like
 BELIEF = 2.0  #: that many of them
 CHANCE = 4.0  #: gain on the half that it is found on by which a column or a band is used: about one by chance
@@ -238,11 +239,13 @@ def usual_of(data: Data) -> Usual:
     n = len(halves)
     if n < 2:
         return nothing_usual()
-    columns = np.zeros((CHANNELS, len(BASIS)))
+    columns, surprise = np.zeros((2, CHANNELS, len(BASIS)))
     for h in halves:
         for cell in h.cells:
             found, variance = _one_by_one(h, cell)
             columns[cell.channel] += (found ** 2 - variance) / (n - 1)
+            surprise[cell.channel] += found ** 2 / variance / n
+    columns[surprise < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
     few = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
     usual = Usual(np.sqrt(np.maximum(few * columns, 0.0)), nothing_usual().power)
     log_power, chance = np.zeros((len(halves), GROUPS)), np.full((len(halves), GROUPS), np.nan)
@@ -263,15 +266,14 @@ def usual_of(data: Data) -> Usual:
 
 
 def _one_by_one(half: _Half, cell: _Cell) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficient and variance (columns,) of every column of a cell, each beside the offsets alone."""
+    """Coefficient and variance (columns,) of every column of a cell, each beside free offsets alone."""
     n = len(BASIS)
     left = half.without(cell, np.zeros(n), nothing_usual())[0]
     normal, right = half.system(cell, half.values[cell.own], left)
     found, variance = np.zeros(n), np.zeros(n)
     for k in range(n):
         here = [k, *range(n, len(right))]
-        precision = np.concatenate([[1e-12], 1.0 / cell.offsets ** 2])
-        inverse = np.linalg.inv(normal[np.ix_(here, here)] + np.diag(precision + 1e-9 * np.diag(normal)[here]))
+        inverse = np.linalg.inv(normal[np.ix_(here, here)] + np.diag(1e-12 + 1e-9 * np.diag(normal)[here]))
         found[k], variance[k] = (inverse @ right[here])[0], inverse[0, 0]
     return found, variance
 

@@ -3,7 +3,7 @@
 Two halves of the flights (of the blocks, for a few flights) take turns at fitting and
 judging. `none` is the hypothesis of no effect. `unknown` is a model without names
 (gap.generic): it needs more parameters, so a named effect that is right beats it; where it gains
-much on top of the named effects, or more alone than they do, something is left that they do not explain.
+much on top of the named effects, something is left that they do not explain.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,7 +28,8 @@ PRICE = 0.9  #: of each further parameter of an effect
 LEAST_SHARE = 0.02  #: and as a share of what the effects before it have added
 #: gain of a nameless model over the effects named, for `unknown`, where nominal flights gave the floor, and else
 UNKNOWN_GAIN, UNKNOWN_ALONE = 6.0, 25.0
-UNKNOWN_SHARE = 0.05  #: and as a share of what the effects named gain: an amplitude modelled to a fifth leaves this
+#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random, since
+UNKNOWN_SHARE, UNKNOWN_RANDOM = 0.1, 0.2  #: the shape of its spectrum is assumed, not measured
 MOST_EFFECTS = 3
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
@@ -52,8 +53,7 @@ class Selection:
     """singles: the best variant of every candidate; steps: effects added one after another;
 
     free_before, free_after: gain of the nameless model over no effect and over the last step;
-    parts: the two halves that they were fitted and judged on; named: gain of the last step over
-    no effect as free_before has it; floor: whether nominal flights gave the floor.
+    parts: the two halves that they were fitted and judged on; floor: whether nominal flights gave it.
     """
 
     singles: Mapping[str, Judged]
@@ -62,7 +62,6 @@ class Selection:
     free_after: float
     parts: tuple[Part, Part]
     least: Mapping[str, float]  #: gain that each candidate needs
-    named: float
     floor: bool
 
     @property
@@ -71,20 +70,17 @@ class Selection:
         return self.steps[-1] if self.steps else None
 
     @property
-    def left(self) -> float:
-        """Log likelihood that a nameless model gains: on top of the effects named, or alone over them."""
-        alone = self.free_before - self.named
-        return float(np.logaddexp(self.free_after, alone)) if self.steps else self.free_before
-
-    @property
     def allowed(self) -> float:
-        """What may be left where the effects named are right."""
-        return max(UNKNOWN_GAIN if self.floor else UNKNOWN_ALONE, UNKNOWN_SHARE * self.named)
+        """Log likelihood that a nameless model may gain on top of the effects named where they are right."""
+        if self.chosen is None:
+            return UNKNOWN_GAIN if self.floor else UNKNOWN_ALONE
+        share = UNKNOWN_RANDOM if any(t.kind == SPECTRUM for t in self.chosen.terms) else UNKNOWN_SHARE
+        return max(UNKNOWN_GAIN if self.floor else UNKNOWN_ALONE, share * self.chosen.gain)
 
     @property
     def explained(self) -> bool:
         """Whether what is left is the floor, or close to it."""
-        return self.left < self.allowed
+        return self.free_after < self.allowed
 
 
 def halves(data: Data) -> tuple[Part, Part]:
@@ -125,21 +121,17 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         if len(steps) < MOST_EFFECTS:
             more = _round(data, parts, base, screen, candidates, best, progress)
             best = _best_of(more)
-    before, after, named = _nameless(data, parts, base, steps[-1] if steps else None)
+    before = _nameless(data, parts, None)
+    after = _nameless(data, parts, steps[-1]) if steps else before
     return Selection(singles, tuple(steps), before, after, parts, {name: needed(data, name) for name in singles},
-                     named, data.study.controller is not None)
+                     data.study.controller is not None)
 
 
-def _nameless(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]],
-              last: Judged | None) -> tuple[float, float, float]:
-    """Gain of a model without names over no effect and over those of `last`, and theirs over no effect."""
-    before = sum(generic_gain(data, parts, [(), ()])) + clock_left(data, ())
-    if last is None:
-        return before, before, 0.0
-    fits = [f.terms for f in last.fits] or [(), ()]
-    after = sum(generic_gain(data, parts, fits)) + clock_left(data, [t.name for t in last.terms])
-    wide = any(t.kind == SPECTRUM for t in last.terms)  # judged against none that is as unsure of the commands
-    return before, after, last.gain + (sum(base[1]) - sum(base[0]) if wide else 0.0)
+def _nameless(data: Data, parts: tuple[Part, Part], chosen: Judged | None) -> float:
+    """Held-out log likelihood that a model without names adds to a hypothesis, the logged times' included."""
+    fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
+    named = [t.name for t in chosen.terms] if chosen else ()
+    return sum(generic_gain(data, parts, fits)) + clock_left(data, named)
 
 
 def needed(data: Data, name: str) -> float:
@@ -272,10 +264,10 @@ def probabilities(selection: Selection) -> dict[str, float]:
     """
     names = list(selection.singles)
     lowest = min(selection.least.values(), default=0.0)
-    score = np.array([_against_none(selection.singles[n].gain, selection.least[n], len(names), lowest) for n in names]
-                     + [0.0])
+    singles = selection.singles
+    score = np.array([_against_none(singles[n].gain, selection.least[n], len(names), lowest) for n in names] + [0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
-    odds = (np.logaddexp(selection.left, 0.0) / selection.allowed) ** 2
+    odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
     unknown = odds / (1.0 + odds)
     known = (1.0 - unknown) * weight / weight.sum()
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
