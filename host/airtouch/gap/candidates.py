@@ -33,7 +33,7 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
     "slung_load": tuple({"length": x} for x in (0.1, 0.2, 0.4)),
     "wind": ({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
-    "gust": (*({"length": x} for x in (0.2, 0.5, 1.5)), {"length": 0.2, "lever": 0.015, "shear": 1.0}),
+    "gust": tuple({"length": x} for x in (0.2, 0.5, 1.5)),
     "motor_noise": tuple({"time": x} for x in (0.005, 0.02, 0.1)),
     "battery_sag": tuple({"charge": x, "capacity": c} for x in (0.95, 0.8, 0.6, 0.4) for c in (0.2, 1.0)),
 }
@@ -47,9 +47,9 @@ TWINS = (
     (frozenset({"mass", "thrust_coefficient"}),
      "add a fast climb or drop: the same thrust moves a heavier vehicle less, in proportion to its mass only "
      "where an outside force acts; weigh the vehicle, or run one motor on a scale"),
-    # one push against the speed; below 0.5 m/s flapping's moment (lever 15 mm) drowns in the torque's floor
+    # one push against the speed; below 0.5 m/s flapping's moment (lever 15 mm) drowns in the floor
     (frozenset({"rotor_drag", "blade_flapping"}),
-     "fly at 1.5 m/s or more, with climbs and drops at speed: flapping's push grows with thrust, the rotors' drag "
+     "fly at 1.5 m/s or more, with climbs and drops at speed: flapping's push grows with thrust, rotor drag "
      "with rotor speed, and only flapping pitches the vehicle, if the drag acts at the centre of mass"),
 )
 
