@@ -72,10 +72,11 @@ class Selection:
     @property
     def allowed(self) -> float:
         """Log likelihood that a nameless model may gain on top of the effects named where they are right."""
-        if self.chosen is None:
-            return UNKNOWN_GAIN if self.floor else UNKNOWN_ALONE
-        share = UNKNOWN_RANDOM if any(t.kind == SPECTRUM for t in self.chosen.terms) else UNKNOWN_SHARE
-        return max(UNKNOWN_GAIN if self.floor else UNKNOWN_ALONE, share * self.chosen.gain)
+        if not self.floor:
+            return max(UNKNOWN_ALONE, UNKNOWN_RANDOM * self.free_before)
+        random = self.chosen is not None and any(t.kind == SPECTRUM for t in self.chosen.terms)
+        share = UNKNOWN_RANDOM if random else UNKNOWN_SHARE
+        return max(UNKNOWN_GAIN, share * (self.chosen.gain if self.chosen else 0.0))
 
     @property
     def explained(self) -> bool:
