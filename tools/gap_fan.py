@@ -1,0 +1,55 @@
+"""The authors' flight past a fan, block by block, beside the calm flights of its day.
+
+    python tools/gap_fan.py [FLIGHTS/airtouch]
+
+For each flight: mean roll and yaw torque of the commands, and how many blocks of 2.56 s have
+more than FAR times the floor's power of roll or yaw torque between 0.6 and 12 Hz.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.gap import calibrate, measure
+from airtouch.gap.fit import Data
+from airtouch.gap.flight import GROUND, PERIOD_S
+from airtouch.gap.spectra import AIR, frequencies
+from airtouch.logs import read
+from airtouch.simulation import rigid_body
+from gap_authors import VEHICLE, questions
+
+BAND_HZ, FAR = (0.6, 12.0), 5.0
+
+
+def main(folder: Path) -> None:
+    vehicle = vehicles.load(VEHICLE)
+    fan, calm = (list(measure.usable([read(Path(p)) for p in group], vehicle, []))
+                 for group in questions(folder)["wind"])
+    study, _ = calibrate.calibrated(vehicle, calm)
+    f = frequencies(AIR)
+    inside = (f >= BAND_HZ[0]) & (f < BAND_HZ[1])
+    arm = vehicle.arm_m / np.sqrt(2.0)
+    print("| flight | roll, yaw torque told, rad/s^2 | far blocks | from, s | highest power over floor |")
+    print("|---|---|---|---|---|")
+    for flight in sorted((*calm, *fan), key=lambda one: Path(one.name).name):
+        data = Data(study, [flight])
+        power = np.abs(data.base[0][AIR][:, inside, 3:6]) ** 2 / study.floor.power[AIR][inside, 3:6]
+        over = np.nanmean(power, axis=1)
+        far = (over[:, [0, 2]] > FAR).any(axis=1)
+        seconds = data.first[0][AIR][far] * PERIOD_S
+        told = vehicle.thrust(flight.pwm[flight.phase != GROUND]).mean(axis=0)
+        roll = arm * (told[2] + told[3] - told[0] - told[1]) / vehicle.inertia_kg_m2[0]
+        yaw = -vehicle.yaw_torque_over_thrust_m * (told @ np.array(rigid_body.SPIN))
+        yaw /= vehicle.inertia_kg_m2[2]
+        when = ", ".join(f"{s:.0f}" for s in seconds)
+        print(f"| {Path(flight.name).name} | {roll:.1f}, {yaw:.1f} | {far.sum()} of {len(far)} | {when} | "
+              f"{over[:, 0].max():.0f}, {over[:, 2].max():.0f} |")
+
+
+if __name__ == "__main__":
+    flights = Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch"
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else flights)
