@@ -12,14 +12,12 @@ from scipy.signal import freqz
 from airtouch.gap.channels import COUNT, FORCE, RATE, TORQUE, residual
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop_model import AXES, spectra
-from airtouch.gap.response import FIRST_BIN
 from airtouch.gap.spectra import AIR, blocks, frequencies
 from airtouch.gap.vibration_lines import lines
 from airtouch.simulation import rigid_body, sensors
 from airtouch.simulation.flight import prepare
 
 SEEDS = 4
-SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
 def growth(term: Any, x: float) -> float:
@@ -47,11 +45,7 @@ def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
 def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
     shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
     maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
-    made = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
-    response = data.study.response
-    if response is not None and term.name not in SENSED and data.flights[i].rates is not None:
-        made[AIR][:, FIRST_BIN:, TORQUE] *= np.abs(response.outside[FIRST_BIN:]) ** 2
-    return made
+    return _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
 
 
 def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
