@@ -12,9 +12,9 @@ from airtouch.logs.flight_log import FlightLog
 
 BANDS_HZ = (0.7, 2.0, 6.0, 12.0, 25.0, 50.1)
 WINDOW = 128  #: samples of a spectrum
-MARGIN = 100  #: samples around the platform that belong to the pass: the least that is diagnosed is 3 s
+BEFORE, AFTER = 500, 100  #: samples around the platform that belong to the pass
 SETTLED = 300  #: samples after the motors start that are left out
-SHORTEST_BEFORE, SHORTEST_OVER = 400, 100  #: samples
+SHORTEST_FREE, SHORTEST_OVER = 400, 100  #: samples
 
 
 def _edges(log: FlightLog) -> tuple[int, int]:
@@ -23,12 +23,16 @@ def _edges(log: FlightLog) -> tuple[int, int]:
 
 
 def pieces(log: FlightLog) -> tuple[FlightLog, FlightLog] | None:
-    """(around the platform, in free air before it): two pieces of one flight; None where one is too short."""
+    """(the pass, free air before it): two pieces of one flight; None where one is too short.
+
+    The pass begins well before the platform, so that noise that is there only close to a surface is not taken
+    for noise that is always there.
+    """
     entry, leave = _edges(log)
     start = int(np.argmax(logs.airborne(log))) + SETTLED
-    if entry - MARGIN - start < SHORTEST_BEFORE or leave - entry < SHORTEST_OVER:
+    if entry - BEFORE - start < SHORTEST_FREE or leave - entry < SHORTEST_OVER:
         return None
-    return log.slice(entry - MARGIN, leave + MARGIN), log.slice(start, entry - MARGIN)
+    return log.slice(entry - BEFORE, leave + AFTER), log.slice(start, entry - BEFORE)
 
 
 def spectra(log: FlightLog) -> np.ndarray:

@@ -4,7 +4,7 @@
 
 1. Diagnosis. The folds of the authors' clean flights are cut in two groups (--groups). Those of a group are
    diagnosed twice: whole flights against the simulator, without a baseline (what every flight has that it lacks);
-   then the seconds around the platform of low passes, with free air earlier in the same flights as baseline
+   then low passes over the platform, from 5 s before it, with free air earlier in the same flights as baseline
    (what is there only close to a surface, which the rest of the flight would drown; same day, propellers and
    battery). Kept in OUT/diagnosis_*.json until --again; --diagnose stops there.
 2. Training. `best` on flights simulated without any effect, then with the effects that were named added one after
@@ -41,7 +41,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 
 VEHICLE = "crazyflie-2.1-flow"
-MOST, MOST_PASSES = 7, 12  #: flights and passes that are diagnosed, evenly chosen: it judges on 260 s
+MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly chosen: it judges on 260 s
 Effects = list[tuple[str, dict[str, float]]]
 Flights = Mapping[dataset.FlightFile, FlightLog]
 
