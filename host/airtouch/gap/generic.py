@@ -268,14 +268,15 @@ def usual_of(data: Data) -> Usual:
 
 
 def _one_by_one(half: _Half, cell: _Cell) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficient and variance (columns,) of every column of a cell, each beside free offsets alone."""
+    """Coefficient and variance (columns,) of every column of a cell, each beside the offsets alone."""
     n = len(BASIS)
     left = half.without(cell, np.zeros(n), nothing_usual())[0]
     normal, right = half.system(cell, half.values[cell.own], left)
     found, variance = np.zeros(n), np.zeros(n)
     for k in range(n):
         here = [k, *range(n, len(right))]
-        inverse = np.linalg.inv(normal[np.ix_(here, here)] + np.diag(1e-12 + 1e-9 * np.diag(normal)[here]))
+        precision = np.concatenate([[1e-12], 1.0 / cell.offsets ** 2])
+        inverse = np.linalg.inv(normal[np.ix_(here, here)] + np.diag(precision + 1e-9 * np.diag(normal)[here]))
         found[k], variance[k] = (inverse @ right[here])[0], inverse[0, 0]
     return found, variance
 
