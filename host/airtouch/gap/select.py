@@ -132,7 +132,7 @@ def _nameless(data: Data, parts: tuple[Part, Part], chosen: Judged | None) -> fl
     """Held-out log likelihood that a model without names adds to a hypothesis, the logged times' included."""
     fits = [f.terms for f in chosen.fits] if chosen and chosen.fits else [(), ()]
     named = [t.name for t in chosen.terms] if chosen else ()
-    return sum(generic_gain(data, parts, fits)) + clock_left(data, named)
+    return max(sum(generic_gain(data, parts, fits)), 0.0) + clock_left(data, named)
 
 
 def needed(data: Data, name: str) -> float:
