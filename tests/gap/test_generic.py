@@ -53,9 +53,9 @@ def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_be
     rng = np.random.default_rng(1)
     n, groups = 4000, np.repeat([3, 7], 2000)
     power = np.where(groups == 3, 2.5, 0.4) * rng.exponential(size=n)
-    free, level = generic._factors(power, np.full(n, 1e6), groups, *generic.LOOSE)
+    free, level = generic._factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, *generic.LOOSE)
     np.testing.assert_allclose(free[[3, 7]], np.log([2.5, 0.4]), atol=4.0 / np.sqrt(2000))
-    still, at_rest = generic._factors(power, np.full(n, 1e6), groups, np.zeros(generic.GROUPS),
+    still, at_rest = generic._factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, np.zeros(generic.GROUPS),
                                       np.full(generic.GROUPS, 1e-6))
     np.testing.assert_allclose(still[[3, 7]], 0.0, atol=1e-3)
     expected = [0.5 * 2000 * (f - 1.0 - np.log(f)) for f in (2.5, 0.4)]  # Kullback-Leibler, half overlapping blocks

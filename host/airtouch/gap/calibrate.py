@@ -2,7 +2,9 @@
 
 "System identification can manufacture agreement": a diagnosis is therefore made in two
 arms, with the vehicle as declared and as calibrated here. Only the vehicle is calibrated
-(rotors, lag, delay, inertia, drag, IMU), never its surroundings, each with a prior.
+(rotors, lag, delay, drag, IMU), never its surroundings, each with a prior; lag and delay by
+what thrust does, as aliases of the commands drown the torque (gap.response). Inertia shows
+in the torque alone: it stays as declared.
 """
 
 from collections.abc import Sequence
@@ -12,13 +14,16 @@ import numpy as np
 
 from airtouch.gap import twin
 from airtouch.gap.candidates import Term, terms
-from airtouch.gap.channels import COUNT, residual
+from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.fit import Data, Part, Study, fit
 from airtouch.gap.flight import Flight
 from airtouch.gap.generic import usual_of
 from airtouch.gap.result import Quantity
-from airtouch.gap.spectra import Floor, floor_of, sensor_power, AIR, REST
+from airtouch.gap.loop_model import sensitivity
+from airtouch.gap.response import Response, response_of
+from airtouch.gap.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.simulation.effects import Active
+from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
 #: effect, its variant, and the prior's standard deviation of each free parameter in its own unit
@@ -26,7 +31,6 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     *(("weak_motor", {"rotor": i}, {"thrust_loss": 0.1}) for i in (1, 2, 3, 4)),
     ("motor_lag", {}, {"factor": 0.5}),
     ("actuator_delay", {}, {"delay": 0.005}),
-    ("inertia", {}, {"fraction": 0.3}),
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
     ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
@@ -59,7 +63,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Cali
     study = declared(vehicle, flights)
     chosen, prior = _terms()
     for _ in range(2):
-        data = Data(replace(study, calibration=(), controller=None), flights)
+        data = Data(replace(study, calibration=(), controller=None, response=None), flights, slow=True)
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
         found = fit(data, whole_of(data), chosen, start, prior)
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
@@ -76,8 +80,9 @@ def whole_of(data: Data) -> Part:
 
 def sensor_noise(vehicle: Vehicle) -> np.ndarray:
     """White noise (COUNT,) that the vehicle's sensors are declared to have, rms at 100 Hz."""
-    gyro = np.full(3, vehicle.gyro_noise_rms_radps)
-    return np.concatenate([np.full(3, vehicle.acc_noise_rms_mps2), gyro, gyro, np.zeros(COUNT - 9)])
+    acc = vehicle.acc_noise_rms_mps2 * np.array(vehicle.acc_noise_ratio)
+    gyro = vehicle.gyro_noise_rms_radps * np.array(vehicle.gyro_noise_ratio)
+    return np.concatenate([acc, gyro, gyro, np.zeros(COUNT - 9)])
 
 
 def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[Flight]) -> Study:
@@ -89,8 +94,26 @@ def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[
             table[:, 6:9] = 1e6
         return Study(vehicle, calibration, None, Floor(power, {AIR: 8, REST: 8}, np.zeros(COUNT), 0.0, 0.0))
     law = twin.identify(flights, vehicle, calibration)
-    left = [residual(f, vehicle, calibration, law) for f in flights]
-    return Study(vehicle, calibration, law, floor_of(flights, left, least))
+    left = [np.nan_to_num(residual(f, vehicle, calibration)) for f in flights]
+    first = [{r: starts(f, r) for r in (AIR, REST)} for f in flights]
+    made = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(left, first, strict=True)]
+    answer = _response(vehicle, calibration, law, flights, first, made)
+    return Study(vehicle, calibration, law, floor_of(flights, left, made, least), answer)
+
+
+def _response(vehicle: Vehicle, calibration: tuple[Active, ...], law: twin.Twin | None, flights: Sequence[Flight],
+              first: Sequence[dict[str, np.ndarray]], made: Sequence[dict[str, np.ndarray]]) -> Response | None:
+    """How the gyro follows the commands, taken off `made` in place; None without gyro or loop model."""
+    if law is None or any(f.rates is None for f in flights):
+        return None
+    loop = sensitivity(law.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
+    turning = [blocks(angular_acceleration(f), s[AIR], AIR) for f, s in zip(flights, first, strict=True)]
+    answer = response_of(turning, [m[AIR][:, :, TORQUE] for m in made], loop)
+    for measured, m in zip(turning, made, strict=True):
+        if answer is not None:
+            quiet = answer.quiet(measured - m[AIR][:, :, TORQUE])
+            m[AIR] = answer.applied(quiet, measured, m[AIR], m[AIR], m[AIR], m[AIR])
+    return answer
 
 
 def _terms() -> tuple[list[Term], np.ndarray]:

@@ -66,12 +66,18 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
         force = np.where(rest[:, None], up + row["acc_bias"], force)
         turning = np.where(rest[:, None], 0.0, turning)
     out[:, FORCE] = flight.acceleration - force
-    if flight.rates is None:
-        out[:, TORQUE] = -turning
-    else:
-        out[:-1, TORQUE] = np.diff(flight.rates, axis=0) / PERIOD_S - turning[:-1]
+    out[:, TORQUE] = angular_acceleration(flight) - turning
+    if flight.rates is not None:
         out[-1, TORQUE] = 0.0
         out[:, RATE] = flight.rates - row["gyro_bias"]
     if controller is not None:
         out[:, COMMAND] = controller.commands_without(flight, active)
+    return out
+
+
+def angular_acceleration(flight: Flight) -> np.ndarray:
+    """Differences of the gyro (n, 3), rad/s^2; zero where there is none, which holds at low frequency."""
+    out = np.zeros((len(flight), 3))
+    if flight.rates is not None:
+        out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
     return out

@@ -6,18 +6,22 @@ tail stands in for it. Mean effects are fitted by Gauss-Newton on the whitened s
 random ones by their strength; what differs from flight to flight (offsets) has a prior.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
+from scipy.special import exp1
 
 from airtouch.gap import random_effects
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
-from airtouch.gap.channels import COMMAND, COUNT, residual
+from airtouch.gap.channels import COMMAND, COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.flight import Flight
-from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, Floor, blocks, judged, starts
+from airtouch.gap.motion import held
+from airtouch.gap.response import FIRST_BIN, Response
+from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, Floor, blocks, frequencies, judged, starts
 from airtouch.gap.twin import COMMAND_ONLY, Twin
 from airtouch.gap.twin_view import TwinView
 from airtouch.simulation.effects import Active
@@ -25,10 +29,12 @@ from airtouch.vehicle import Vehicle
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 ITERATIONS = 8
+ROUNDS = 4  #: in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
+DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
 FREEDOM = 12.0  #: of the Student-like tail at most
 KEPT, KEPT_SAMPLES = 64, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
 
@@ -41,25 +47,56 @@ class Study:
     calibration: tuple[Active, ...]
     controller: Twin | None
     floor: Floor
+    response: Response | None = None
     usual: Any = None  #: generic.Usual of the nominal flights
 
 
 @dataclass
 class Data:
-    """Flights with their blocks and the spectra of the gap before any effect is added."""
+    """Flights with their blocks and the spectra of the gap before any effect is added.
+
+    slow: torque counts below the bins in which commands hold aliases only.
+    """
 
     study: Study
     flights: Sequence[Flight]
+    slow: bool = False
     first: list[dict[str, np.ndarray]] = field(default_factory=list)
     base: list[dict[str, np.ndarray]] = field(default_factory=list)
+    turning: list[np.ndarray] = field(default_factory=list)  #: spectra in the air of the measured angular acceleration
+
+    quiet: list[np.ndarray] = field(default_factory=list)  #: blocks in the air and axes where no set-point stepped
 
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
+        self.turning = [blocks(angular_acceleration(f), b[AIR], AIR) for f, b in zip(self.flights, self.first, strict=True)]
+        if self.study.response is not None:
+            self.quiet = [self.study.response.quiet(t - b[AIR][:, :, TORQUE])
+                          for t, b in zip(self.turning, _replayed(self, ()), strict=True)]
         self.base = spectra(self, ())
 
 
 def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap with effects in the model, by flight and regime; commands are the twin view's."""
+    """Spectra of the gap with effects in the model, by flight and regime; commands are the twin view's.
+
+    Where nominal flights tell how the gyro follows the commands, torque is compared with what that leaves to expect.
+    """
+    response = data.study.response
+    replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
+    every = _replayed(data, replayed)
+    if response is None:
+        return every
+    law = data.study.controller
+    beside = [a for a in replayed if not law.changes_loop((a,))]
+    through = [a for a in beside if a.effect.wrench is None]
+    change = law.torque_change(active, frequencies(AIR))
+    sets = zip(data.flights, data.quiet, data.turning, *(_replayed(data, s) for s in ((), through, beside)), every, strict=True)
+    return [e if f.rates is None else {**e, AIR: response.applied(q, m, n[AIR], d[AIR], o[AIR], e[AIR], change)}
+            for f, q, m, n, d, o, e in sets]
+
+
+def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+    """Spectra of what was measured minus what the model makes of the logged commands."""
     study, out = data.study, []
     kept = data.__dict__.setdefault("_spectra", {})
     key = tuple((a.effect.name, *a.values.values()) for a in active)
@@ -67,11 +104,11 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
         return kept[key]
     for flight, first in zip(data.flights, data.first, strict=True):
         left = residual(flight, study.vehicle, (*study.calibration, *active))
-        left = np.where(flight.lost[:, None], 0.0, left)
+        left = held(np.where(flight.lost[:, None], np.nan, left))
         out.append({r: blocks(left, first[r], r) for r in first})
-    if sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
+    if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
         if len(kept) >= KEPT:
-            kept.pop(next(iter(kept)))
+            kept.pop(next(k for k in kept if k))
         kept[key] = out
     return out
 
@@ -103,6 +140,8 @@ class Problem:
         self.keep = {r: judged(r) for r in (AIR, REST)}
         for keep in self.keep.values():
             keep[:, COMMAND] = False  # the twin view judges them
+        if data.slow:
+            self.keep[AIR][FIRST_BIN:, TORQUE] = False
         self.twin = TwinView(data.study.controller, data.flights, data.first, part.pieces)
         self.power = self._gather([{r: np.broadcast_to(data.study.floor.power[r], s[r].shape) for r in s}
                                    for s in data.base]).real
@@ -118,12 +157,14 @@ class Problem:
         nu = [np.full(self._size(p), np.clip(3.0 * counts[p[1]], 2.0, FREEDOM)) for p in part.pieces]
         self.freedom = np.concatenate(nu) if nu else np.zeros(0)
         self.own = len(self.base)  #: elements of the replay view; those of the twin view follow
+        self.torque = (self.channel >= TORQUE.start) & (self.channel < TORQUE.stop)
         twin = self.twin
         self.power = np.concatenate([self.power, twin.floor])
         self.base = np.concatenate([self.base, twin.values])
         self.known = np.concatenate([self.known, np.ones(len(twin), bool)])
         self.channel = np.concatenate([self.channel, twin.channel]).astype(int)
         self.flight = np.concatenate([self.flight, twin.flight]).astype(int)
+        self.tail = np.concatenate([tail(self.freedom), twin.freedom])  #: the twin's floor has its tails in it
         self.freedom = np.concatenate([self.freedom, twin.freedom])
 
     def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
@@ -135,7 +176,7 @@ class Problem:
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """Spectra with effects in the model, flattened."""
-        seen = [a for a in active if a.effect.name not in COMMAND_ONLY]
+        seen = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
         own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
         return np.where(self.known, self._with_twin(own, self.twin.moved(active)), 0.0)
 
@@ -145,7 +186,16 @@ class Problem:
     def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
         power, cost = self.twin.power(active, wide)
-        return np.concatenate([np.zeros(self.own), power - self.twin.floor]), cost
+        return np.concatenate([self._doubt(active), power - self.twin.floor]), cost
+
+    def _doubt(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (own,) of what the loop model may be wrong by in the torque that it changes."""
+        law = self.data.study.controller
+        loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
+        if not self.own or not loop or not law.changes_loop(loop):
+            return np.zeros(self.own)
+        change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
+        return DOUBT ** 2 * np.abs(change) ** 2 * self.torque
 
     def constant(self) -> list[tuple[np.ndarray, float]]:
         """Spectra of a unit offset in each of the OFFSETS channels of each flight, with its prior's deviation."""
@@ -181,8 +231,19 @@ class Problem:
     def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         power = self.power + added
         e = np.abs(values) ** 2 / power
-        nu = self.freedom
-        return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + (nu + 1.0) * np.log1p(e / nu)), 0.0)
+        tails = (self.freedom + 1.0) * np.log1p(e / self.tail)
+        return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + tails), 0.0)
+
+
+def tail(freedom: np.ndarray) -> np.ndarray:
+    """Scale (n,) of tails whose likelihood is highest at the mean of exponential power: E[(nu + 1) e / (tail + e)] = 1."""
+    return np.array([_tail(nu) for nu in np.unique(freedom)])[np.unique(freedom, return_inverse=True)[1]] \
+        if len(freedom) else freedom
+
+
+@functools.cache
+def _tail(nu: float) -> float:
+    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
 
 
 def problem_of(data: Data, part: Part) -> Problem:
@@ -209,7 +270,9 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     for _ in range(2 if mean and random else 1):
         x, offsets, covariance, values = _gauss_newton(problem, mean, x, added, prior, bool(random))
         told, cost = problem.commanded(_active(mean, x), bool(random))
-        random = [_strength(problem, random, i, values, told) for i in range(len(random))]
+        for _ in range(ROUNDS if len(random) > 1 else 1):
+            for i in range(len(random)):
+                random[i] = _strength(problem, random, i, values, told)
         added = problem.random_power(random) if random else 0.0
     if random:
         told, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
@@ -292,7 +355,7 @@ def _limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
 def _weights(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
     power = problem.power + added
     e = np.abs(values) ** 2 / power
-    return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.freedom + e) / power * problem.known
+    return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
 
 
 def _solve(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,

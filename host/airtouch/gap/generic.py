@@ -109,8 +109,8 @@ class _Half:
 
     def system(self, cell: _Cell, values: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix and right-hand side for values of a cell; tails as those of what is left of them."""
-        nu, power = self.problem.freedom[cell.own], self.power[cell.own]
-        weights = OVERLAP_WEIGHT * (nu + 1.0) / (nu + np.abs(left) ** 2 / power) / power
+        nu, tail, power = self.problem.freedom[cell.own], self.problem.tail[cell.own], self.power[cell.own]
+        weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + np.abs(left) ** 2 / power) / power
         weighted = cell.columns.conj().T * weights
         return 2.0 * (weighted @ cell.columns).real, 2.0 * (weighted @ values).real
 
@@ -122,14 +122,14 @@ class _Half:
             normal, right = self.system(cell, values, left)
             x = np.linalg.solve(normal + np.diag(precision), right)
             left = values - cell.columns @ x
-        nu = self.problem.freedom[cell.own]
-        tails = (nu + 1.0) * np.log1p(np.abs(left) ** 2 / self.power[cell.own] / nu)
+        nu, tail = self.problem.freedom[cell.own], self.problem.tail[cell.own]
+        tails = (nu + 1.0) * np.log1p(np.abs(left) ** 2 / self.power[cell.own] / tail)
         return left, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
-    def powers(self, left: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Power of what is left over what it should be, freedom and group of the values that are known."""
+    def powers(self, left: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Power of what is left over what it should be, freedom, tail and group of the values that are known."""
         known = self.problem.known
-        return np.abs(left[known]) ** 2 / self.power[known], self.problem.freedom[known], self.groups[known]
+        return np.abs(left[known]) ** 2 / self.power[known], self.problem.freedom[known], self.problem.tail[known], self.groups[known]
 
 
 def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:
@@ -179,8 +179,8 @@ def _gain(told: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
     return 0.5 * float(right[free] @ np.linalg.solve(told[np.ix_(free, free)], right[free]))
 
 
-def _factors(e: np.ndarray, nu: np.ndarray, groups: np.ndarray, middle: np.ndarray, spread: np.ndarray,
-             ) -> tuple[np.ndarray, np.ndarray]:
+def _factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.ndarray, middle: np.ndarray,
+             spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log likelihood there."""
     out = middle.copy()
     count = np.bincount(groups, minlength=GROUPS)
@@ -188,11 +188,11 @@ def _factors(e: np.ndarray, nu: np.ndarray, groups: np.ndarray, middle: np.ndarr
     mean_nu = np.bincount(groups, nu / (nu + 3.0), GROUPS)
     for _ in range(8):
         scaled = e * np.exp(-out[groups])
-        push = np.bincount(groups, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (nu + scaled) - 1.0), GROUPS)
+        push = np.bincount(groups, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
         out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * mean_nu + precision), -1.5, 1.5)
     out[count == 0] = middle[count == 0]
     scaled = e * np.exp(-out[groups])
-    level = np.bincount(groups, -OVERLAP_WEIGHT * (out[groups] + (nu + 1.0) * np.log1p(scaled / nu)), GROUPS)
+    level = np.bincount(groups, -OVERLAP_WEIGHT * (out[groups] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
     return out, level - 0.5 * (out - middle) ** 2 * precision
 
 
@@ -255,8 +255,8 @@ def usual_of(data: Data) -> Usual:
         left = h.values.copy()
         for cell in h.cells:
             left[cell.own] = h.without(cell, np.zeros(len(BASIS)), usual)[0]
-        e, nu, groups = h.powers(left)
-        log_power[i] = _factors(e, nu, groups, *LOOSE)[0]
+        e, nu, tail, groups = h.powers(left)
+        log_power[i] = _factors(e, nu, tail, groups, *LOOSE)[0]
         count = np.bincount(groups, OVERLAP_WEIGHT * nu / (nu + 3.0), GROUPS)
         chance[i, count > 0.0] = 1.0 / count[count > 0.0]
     there = np.isfinite(chance)

@@ -5,16 +5,19 @@ documented gains, and `cascade`, any proportional cascade (rate, angle, velocity
 gains are found from flights. Commands are in newtons per motor.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flight import PERIOD_S
 
 DEGREES = 180.0 / np.pi
 FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequency (500 Hz controller)
 AXES = ("thrust", "roll", "pitch")
+YAW_HZ = 1.0  #: usual bandwidth of a yaw loop, which AXES leave out
 OUTER_S = 0.01  #: period of the firmware's position loop and of its flow readings
 
 
@@ -84,6 +87,37 @@ def excess_phase(c: Controller, row: Any, axis: str) -> float:
     return float(-np.pi - turned[last[-1]]) if len(last) else -np.pi
 
 
+def sensitivity(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> np.ndarray:
+    """Share (bins, 3) of an outside roll, pitch, yaw torque that turns the vehicle in spite of the loop.
+
+    controllers: of AXES. f: Hz (bins,).
+    """
+    f = np.maximum(f, 0.05)
+    s = 2j * np.pi * f
+    out = [1.0 / (1.0 + _open_loop(c, row, axis, f, s)) for c, axis in zip(controllers[1:], AXES[1:], strict=True)]
+    return np.stack([*out, s / (s + 2.0 * np.pi * YAW_HZ)], axis=1)
+
+
+def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray,
+                        width: float = 0.0) -> np.ndarray:
+    """Angular acceleration (..., bins) to be expected for a logged command, rad/s^2 per N: S_yu / S_uu of roll or pitch
+
+    for noise of given strengths (..., sources); width: of neighbouring bins of f that are
+    smoothed over, standard deviation.
+    """
+    logged, turned = _transfers(c, row, axis, np.maximum(f, 0.05))
+    cross, power = strengths @ (turned * logged.conj()), strengths @ spectra(c, row, axis, f)
+    if width > 0.0:
+        cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))
+    return cross / power
+
+
+def torque_per_command(row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N."""
+    s = 2j * np.pi * np.maximum(f, 0.05)
+    return s * _parts(firmware(row, axis), row, axis, np.maximum(f, 0.05), s)[0]
+
+
 def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
     """Plant, and the controller's rate (climb), angle (height), velocity paths, its filter, and all together."""
     hold = np.sinc(f * c.period_s) * np.exp(-0.5 * s * c.period_s)
@@ -115,23 +149,36 @@ def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray)
 
 
 def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """Power (sources, bins) of the logged command for noise of unit power, without aliases."""
     f = np.maximum(f, 0.05)
-    s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-    plant, rate, angle, velocity, filtered, whole = _parts(c, row, axis, f, s)
-    size = 1.0 / (1.0 + plant * whole)
     if axis == "thrust":
+        s, low = 2j * np.pi * f, np.maximum(f, 0.3)
+        plant, rate, angle, velocity, filtered, whole = _parts(c, row, axis, f, s)
+        size = 1.0 / (1.0 + plant * whole)
         climbs = np.abs((rate + angle / s) * size) ** 2
         return np.array([np.abs(rate * size) ** 2, climbs / low ** 2, climbs / low ** 4,
                          np.abs(whole / s * size) ** 2])
+    return np.abs(_transfers(c, row, axis, f)[0]) ** 2
+
+
+def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration."""
+    s, low = 2j * np.pi * f, np.maximum(f, 0.3)
+    plant, rate, angle, velocity, filtered, whole = _parts(c, row, axis, f, s)
+    size = 1.0 / (1.0 + plant * whole)
     share = kicked = np.ones_like(s)
     if c.on_error:  # set-points of the outer loop come as steps; the log takes the sample on which they do
         share = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
         kicked = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * OUTER_S)) / c.period_s
-    outer = np.abs(kicked / share - plant * whole * size) ** 2
-    seen = [] if c.lowpass_hz else [np.abs(angle * size) ** 2]
-    return np.array([np.abs((rate + angle / s) * filtered * size) ** 2, *seen,
-                     outer * np.abs(velocity / low) ** 2, outer * np.abs(velocity / low ** 2) ** 2,
-                     outer * np.abs(angle / low ** 2) ** 2, np.abs(whole / s * size) ** 2])
+    outer = kicked / share - plant * whole * size
+    gyro, torque = -(rate + angle / s) * filtered * size, -whole / s * size
+    paths = np.array([velocity / low, velocity / low ** 2, angle / low ** 2])
+    seen = [] if c.lowpass_hz else [angle * size]
+    logged = np.array([gyro, *seen, *(outer * paths), torque])
+    turned = s * plant * np.array([gyro, *seen, *(size * paths), torque])
+    turned[0] += s
+    turned[-1] += 1.0
+    return logged, turned
 
 
 def _delayed(s: np.ndarray, delay: float, step: float) -> np.ndarray:

@@ -18,6 +18,7 @@ from airtouch.simulation import rigid_body, sensors
 from airtouch.simulation.flight import prepare
 
 SEEDS = 4
+SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
 def growth(term: Any, x: float) -> float:
@@ -45,7 +46,11 @@ def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
 def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
     shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
     maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
-    return _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
+    made = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
+    response = data.study.response
+    if response is not None and data.flights[i].rates is not None:
+        made[AIR][:, :, TORQUE] *= response.added(data.quiet[i], term.name in SENSED)
+    return made
 
 
 def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:

@@ -83,21 +83,21 @@ class Floor:
     lost: float
 
 
-def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], least: np.ndarray) -> Floor:
+def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra: Sequence[dict[str, np.ndarray]],
+             least: np.ndarray) -> Floor:
     """The floor of flights declared nominal, from what the calibrated model leaves of them.
 
-    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at
-    100 Hz (angular acceleration: of its difference), below which the floor never goes.
+    residuals: (n, COUNT) for each flight; spectra: of their blocks by regime; least (COUNT,): white noise
+    that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of its difference),
+    below which the floor never goes.
     """
     power, count = {}, {}
     for regime in (AIR, REST):
-        first = [starts(f, regime) for f in flights]
-        spectra = [blocks(np.nan_to_num(r), s, regime) for r, s in zip(residuals, first, strict=True)]
-        every = np.concatenate(spectra) if spectra else np.zeros((0, 1, COUNT))
+        every = np.concatenate([s[regime] for s in spectra]) if spectra else np.zeros((0, 1, COUNT))
         sensor = sensor_power(least, regime)
         count[regime] = len(every)
         if len(every) >= 4:
-            mean = (np.abs(every) ** 2).mean(axis=0)
+            mean = np.nan_to_num(np.nanmean(np.abs(every) ** 2, axis=0))
             power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
         else:
             power[regime] = 2.0 * sensor
@@ -119,7 +119,7 @@ def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
 
 
 def _smooth(power: np.ndarray) -> np.ndarray:
-    """Averaged over neighbouring bins in the logarithm, the lowest two left as they are."""
-    out = np.exp(gaussian_filter1d(np.log(np.maximum(power, 1e-300)), 1.5, axis=0, mode="nearest"))
-    out[:2] = np.maximum(power[:2], out[:2])
+    """Averaged over neighbouring bins in the logarithm, the lowest two (the means) left as they are."""
+    out = power.copy()
+    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], 1e-300)), 1.5, axis=0, mode="nearest"))
     return out

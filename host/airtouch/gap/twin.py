@@ -8,7 +8,7 @@ then multiplies them by the ratio of the modelled spectra with and without it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -17,7 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.edge_response import EdgeFloor, floor_of
 from airtouch.gap.flight import PERIOD_S, Flight
-from airtouch.gap.loop_model import AXES, Controller, excess_phase, firmware, spectra
+from airtouch.gap.loop_model import AXES, Controller, excess_phase, firmware, spectra, torque_per_command, turning_per_command
 from airtouch.logs.segments import KINDS
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -41,8 +41,24 @@ SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers 
 #: fields of the plant by which effects change the loop
 FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "height_gain",
           "motor_rise", "motor_fall", "inertia", "mass", "gain", "gyro_noise")
+#: those of the roll and pitch loops that change it, not its noise
+LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise", "motor_fall",
+               "inertia")
+SMOOTH = 2.0  #: bins: a block's window and `response.SMOOTH`
+MOST_CHANGE = 5.0  #: of the share of torque
 #: effects that change the commands alone: replayed motor commands hold nothing of them
 COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
+
+
+class Change(NamedTuple):
+    """By what effects multiply the torque of a command, complex (bins, 1), and by what the share of the commanded
+
+    torque that turns the vehicle, (2, bins, 3), which the loop model had at `before`: level, and stepped.
+    """
+
+    motors: np.ndarray
+    share: np.ndarray
+    before: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -70,6 +86,37 @@ class Twin:
             if len(kept) > 500:
                 kept.clear()
             kept[key] = self._power(row) / self._nominal()
+        return kept[key]
+
+    def torque_change(self, active: Sequence[Active], f: np.ndarray) -> Change | None:
+        """How effects change what the vehicle does upon a logged command; None where they leave the loop as it is."""
+        if not self.changes_loop(active):
+            return None
+        row, first = (prepare(self.vehicle, c)[0][0] for c in ((*self.calibration, *active), self.calibration))
+        after, before = self._shares(row, f), self._shares(first, f)
+        share = after / before
+        motors = torque_per_command(row, AXES[1], f) / torque_per_command(first, AXES[1], f)
+        return Change(motors[:, None], share / np.maximum(np.abs(share) / MOST_CHANGE, 1.0), before)
+
+    def changes_loop(self, active: Sequence[Active]) -> bool:
+        """Whether effects change the roll and pitch loops."""
+        row, first = (prepare(self.vehicle, c)[0][0] for c in ((*self.calibration, *active), self.calibration))
+        return not all(np.array_equal(row[k], first[k]) for k in LOOP_FIELDS)
+
+    def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
+        """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""
+        key = ("share", *np.round(np.concatenate([np.ravel(row[k]) for k in LOOP_FIELDS]), 12))
+        kept = self.__dict__.setdefault("_kept", {})
+        if key not in kept:
+            made = np.ones((2, len(f), 3), complex)
+            for i, axis in enumerate(AXES[1:]):
+                every = self.strengths[i + 1]
+                steps = np.full(len(every), 1e-30)
+                steps[-4:-1] = every[-4:-1]  # of the velocity and angle paths
+                c = firmware(row, axis) if self.by_firmware else self.controllers[i + 1]
+                turning = turning_per_command(c, row, axis, np.stack([every, steps]), f, SMOOTH)
+                made[:, :, i] = turning / torque_per_command(row, axis, f)
+            kept[key] = made
         return kept[key]
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:

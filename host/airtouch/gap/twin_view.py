@@ -21,6 +21,7 @@ FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
 EDGE_FREEDOM = 6.0
 ROUNDS = 4
 WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold
+DOUBT = 0.1  #: of the logarithm of a change of the spectra by effects: the loop model is no better
 NOTHING = np.zeros(0)
 
 
@@ -131,6 +132,7 @@ class TwinView:
         """Log of the floor's correction (bins, axes), its cost, and what `slopes` needs."""
         e0 = np.abs(s) ** 2 / (self.twin.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
+        spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
         count = OVERLAP_WEIGHT * len(s)
         normal = count * self.shapes @ self.shapes.T + np.diag(1.0 / spread ** 2)
         covariance = np.linalg.inv(normal)

@@ -1,0 +1,99 @@
+"""How the gyro follows logged commands: against the closed forms of errors in variables and of a closed loop."""
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.gap import loop_model
+from airtouch.gap.channels import COUNT, TORQUE
+from airtouch.gap.response import FIRST_BIN, response_of
+from airtouch.gap.spectra import AIR, frequencies
+from airtouch.simulation.effects import Active, get
+from airtouch.simulation.flight import prepare
+
+BINS = len(frequencies(AIR))
+
+
+def noise(rng, size, rms=1.0):
+    return rms * (rng.normal(size=size) + 1j * rng.normal(size=size)) / np.sqrt(2.0)
+
+
+def flights(rng, true, alias, count=12, blocks=12):
+    """Spectra measured and modelled: the vehicle feels `true` of what the log says, the rest is folded noise."""
+    felt = [noise(rng, (blocks, BINS, 3), true) for _ in range(count)]
+    logged = [t + noise(rng, t.shape, alias) for t in felt]
+    return felt, logged
+
+
+def test_share_is_that_of_errors_in_variables():
+    rng = np.random.default_rng(1)
+    felt, logged = flights(rng, 1.0, 2.0)
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    np.testing.assert_allclose(response.steady.told.real, 1.0 / (1.0 + 4.0), atol=0.05)
+    np.testing.assert_allclose(response.steady.told.imag, 0.0, atol=0.05)
+
+
+def test_a_weaker_response_earns_nothing_on_nominal_flights():
+    """With q = 1 half the response halves what folded noise leaves; with q as measured it adds to it."""
+    rng = np.random.default_rng(2)
+    felt, logged = flights(rng, 1.0, 2.0)
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    y, w = (x[0] for x in flights(rng, 1.0, 2.0, 1))
+    table = lambda torque: np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
+                                           np.zeros((*torque.shape[:2], COUNT - 6))], axis=2)
+    nominal, weaker = table(y - w), table(y - 0.5 * w)
+    size = lambda x: np.mean(np.abs(x[:, FIRST_BIN:, TORQUE]) ** 2)
+    quiet = response.quiet(w)
+    assert quiet.all()
+    assert size(weaker) < 0.6 * size(nominal)
+    assert size(response.applied(quiet, y, nominal, weaker, weaker, weaker)) > size(response.applied(quiet, y, nominal, nominal, nominal, nominal))
+
+
+def test_means_stay_as_they_are():
+    rng = np.random.default_rng(3)
+    felt, logged = flights(rng, 1.0, 2.0)
+    left = [f - w for f, w in zip(felt, logged, strict=True)]
+    response = response_of(felt, left, np.zeros((BINS, 3)))
+    every = np.zeros((12, BINS, COUNT), complex)
+    every[:, :, TORQUE] = left[0]
+    out = response.applied(response.quiet(logged[0]), felt[0], every, every, every, every)
+    np.testing.assert_array_equal(out[:, :FIRST_BIN], every[:, :FIRST_BIN])
+
+
+def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_own():
+    rng = np.random.default_rng(4)
+    felt, logged = flights(rng, 1.0, 2.0, 12, 20)
+    for f, w in zip(felt, logged, strict=True):  # every fourth block: a kick of which a third turns the vehicle
+        kick = noise(rng, (5, BINS, 3), 30.0)
+        w[::4] += kick
+        f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    np.testing.assert_array_equal(response.quiet(logged[0])[:, 0], np.arange(20) % 4 != 0)
+    np.testing.assert_allclose(np.abs(response.stepped.told), 1.0 / 3.0, atol=0.05)
+    left = 1.0 - 0.2, 1.0 + 9.0 + 4.0 / 9.0  # of power: what errors in variables leave; kick's own scatter and aliases
+    np.testing.assert_allclose(np.median(response.stepped.weight), np.sqrt(left[0] / left[1]), rtol=0.1)
+
+
+def test_turning_under_an_outside_torque_is_the_closed_loop_s():
+    """No gyro noise, no steps, no folds: u = -(whole / s) d / (1 + L), the vehicle turns by d / (1 + L)."""
+    row = prepare(vehicles.load("crazyflie-2.1-flow"), ())[0][0]
+    c = loop_model.Controller(0.01, 6.0, 0.4)
+    f = np.geomspace(0.8, 20.0, 12)
+    s = 2j * np.pi * f
+    plant, *_, whole = loop_model._parts(c, row, "roll", f, s)
+    strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    turning = loop_model.turning_per_command(c, row, "roll", strengths, f)
+    np.testing.assert_allclose(turning, -s / whole, rtol=1e-9)
+
+
+def test_more_inertia_leaves_more_of_an_outside_torque():
+    vehicle = vehicles.load("crazyflie-2.1-flow")
+    f = frequencies(AIR)
+    inertia = get("inertia")
+    heavy = Active(inertia, inertia.values({"fraction": 1.0}))
+    axes = {}
+    for name, active in (("usual", ()), ("heavy", (heavy,))):
+        row = prepare(vehicle, active)[0][0]
+        axes[name] = np.abs(loop_model.sensitivity([loop_model.firmware(row, a) for a in loop_model.AXES], row, f))
+    low = (f > 0.5) & (f < 3.0)
+    assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
+    assert np.all(axes["usual"][f > 40.0] > 0.9)
