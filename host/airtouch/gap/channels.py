@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.flight import PERIOD_S, Flight
+from airtouch.gap.motion import held
 from airtouch.gap.twin import Twin
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
@@ -80,4 +81,4 @@ def angular_acceleration(flight: Flight) -> np.ndarray:
     out = np.zeros((len(flight), 3))
     if flight.rates is not None:
         out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
-    return out
+    return held(np.where(flight.lost[:, None], np.nan, out))

@@ -16,11 +16,13 @@ from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
 from airtouch.gap.select import FIRST_GAIN, Judged, Selection, halves, probabilities, select
 from airtouch.gap.shrink import Shrink, shrink_of
 from airtouch.gap.spectra import AIR
+from airtouch.gap.twin import Twin
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 260.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
+ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
 WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 
@@ -124,7 +126,7 @@ def _effects(data: Data, found: Selection) -> list[Found]:
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
         known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
-        spread = _spread(found.chosen, t, known)
+        spread = _spread(data.study.controller, found.chosen, t, known)
         out.append(Found(t.name, t.quantities(x, spread)))
     for t in (t for t in found.chosen.terms if t.kind == CLOCK):
         x = t.scaled(t.values)
@@ -155,14 +157,16 @@ def _middle(chosen: Judged) -> np.ndarray | None:
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
 
 
-def _spread(chosen: Judged, term: Term, covariance: np.ndarray) -> np.ndarray:
-    """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement where larger."""
+def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray) -> np.ndarray:
+    """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement and the model's doubt."""
     pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
              if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
     apart = np.zeros((len(term.free), len(term.free)))
     if len(pairs) == 2:
         apart = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
-    return covariance + apart
+    assumed = term.kind == candidates.SPECTRUM or (law is not None and law.changes_loop((term.active(),)))
+    doubt = np.diag((ASSUMED * term.scaled(term.values)) ** 2) if assumed else 0.0
+    return covariance + apart + doubt
 
 
 def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:

@@ -25,6 +25,8 @@ LEAST_GOOD = 0.5  #: part of a column's values that must be there
 SETTLED_S = 1.0  #: after the motors have stopped, in which it may still bounce
 KNOCK = 7.0  #: usual deviations
 CONTACT_S = 0.3  #: left out around the moments at which the vehicle touches the ground
+JOLT = 40.0  #: usual deviations in flight: it hit something (set-points that step reach 35)
+MOST_JOLTED = 0.1  #: of a flight; more is no accident
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
     rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
     usable = ~lost & ~_near_contact(phase, pwm) & ~_knocks(force, (phase == GROUND) & (pwm.max(axis=1) <= 0.0))
+    usable &= ~_jolts(force, rates, phase != GROUND)
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
                   tuple(notes), tuple(cannot))
 
@@ -175,6 +178,18 @@ def _knocks(force: np.ndarray, rest: np.ndarray) -> np.ndarray:
         usual = 1.4826 * np.median(away, axis=0)
         out[rest] = (away > KNOCK * np.maximum(usual, 1e-3)).any(axis=1)
     return out
+
+
+def _jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.ndarray:
+    """Samples (n,) around those at which the vehicle hit something in flight."""
+    out = np.zeros(len(air), bool)
+    turning = np.zeros((len(air), 0)) if rates is None else np.diff(rates, axis=0, prepend=rates[:1])
+    for values in (*force.T, *turning.T):
+        away = np.abs(values - np.median(values[air]))
+        out |= air & (away > JOLT * max(1.4826 * float(np.median(away[air])), 1e-6))
+    wide = int(CONTACT_S / PERIOD_S)
+    out = np.convolve(out, np.ones(2 * wide + 1), "same") > 0.5
+    return out if out[air].mean() < MOST_JOLTED else np.zeros_like(out)
 
 
 def _period(time: np.ndarray) -> float:

@@ -106,10 +106,19 @@ def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarra
     smoothed over, standard deviation.
     """
     logged, turned = _transfers(c, row, axis, np.maximum(f, 0.05))
-    cross, power = strengths @ (turned * logged.conj()), strengths @ spectra(c, row, axis, f)
+    cross = turned * logged.conj()
+    for k in FOLDS[1:] if c.period_s < 0.5 * PERIOD_S else ():  # noise of the gyro folds into log and command alike
+        folded = _transfers(c, row, axis, np.maximum(np.abs(f + k / PERIOD_S), 0.05))[0][0]
+        cross[0] += _difference(f) * np.where(f + k / PERIOD_S < 0.0, folded, folded.conj())
+    cross, power = strengths @ cross, strengths @ spectra(c, row, axis, f)
     if width > 0.0:
         cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))
     return cross / power
+
+
+def _difference(f: np.ndarray) -> np.ndarray:
+    """Of two samples of the log over their distance in time, at the middle between them, 1/s."""
+    return 2j * np.sin(np.pi * f * PERIOD_S) / PERIOD_S
 
 
 def torque_per_command(row: Any, axis: str, f: np.ndarray) -> np.ndarray:
@@ -176,7 +185,7 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     seen = [] if c.lowpass_hz else [angle * size]
     logged = np.array([gyro, *seen, *(outer * paths), torque])
     turned = s * plant * np.array([gyro, *seen, *(size * paths), torque])
-    turned[0] += s
+    turned[0] += _difference(f)
     turned[-1] += 1.0
     return logged, turned
 

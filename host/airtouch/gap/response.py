@@ -133,7 +133,7 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: np.ndarray, flo
 def _quiet(modelled: np.ndarray, usual: np.ndarray) -> np.ndarray:
     """Blocks whose modelled torque (blocks, bins, 3) is as strong as usual, for nominal flights or for this one."""
     size = (np.abs(modelled) ** 2 / np.maximum(usual, 1e-30))[:, QUIET_BINS].mean(axis=1)
-    return size < STEPPED * np.maximum(np.median(size, axis=0), 1.0) if len(size) else np.zeros((0, 3), bool)
+    return size < STEPPED * np.maximum(np.quantile(size, 0.25, axis=0), 1.0) if len(size) else np.zeros((0, 3), bool)
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

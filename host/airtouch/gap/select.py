@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term
+from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, twins_of
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.fit import Data, Fit, Part, fit, judge, left_over
 from airtouch.gap.generic import generic_gain
@@ -21,15 +21,14 @@ from airtouch.gap.twin import COMMAND_ONLY
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
-FIRST_GAIN = 10.0  #: the same for the first effect, against a floor from nominal flights
-#: but for these: commands at 100 Hz hold aliases of a faster loop, which differ from flight to flight
-WAVERING = {"inertia": 24.0, "motor_lag": 16.0, "vibration": 12.0}
+FIRST_GAIN = 8.0  #: the same for the first effect, against a floor from nominal flights
 PRICE = 0.9  #: of each further parameter of an effect
-LEAST_SHARE = 0.02  #: and as a share of what the effects before it have added
+LEAST_SHARE = 0.01  #: and as a share of what the effects before it have added
+LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
 #: gain of a nameless model over the effects named, for `unknown`, where nominal flights gave the floor, and else
-UNKNOWN_GAIN, UNKNOWN_ALONE = 6.0, 25.0
-#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random, since
-UNKNOWN_SHARE, UNKNOWN_RANDOM = 0.1, 0.2  #: the shape of its spectrum is assumed, not measured
+UNKNOWN_GAIN, UNKNOWN_ALONE = 14.0, 25.0
+#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or
+UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectrum is assumed, not measured
 MOST_EFFECTS = 3
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
@@ -46,6 +45,7 @@ class Judged:
     gain: float
     fits: tuple[Fit, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
+    choice: float = 0.0  #: of the gain, what the choice of the effects' variants has cost
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ class Selection:
     """singles: the best variant of every candidate; steps: effects added one after another;
 
     free_before, free_after: gain of the nameless model over no effect and over the last step;
-    parts: the two halves that they were fitted and judged on; floor: whether nominal flights gave it.
+    parts: the two halves that they were fitted and judged on; floor: whether nominal flights gave it;
+    assumed: whether a chosen effect is random or changes the loop.
     """
 
     singles: Mapping[str, Judged]
@@ -61,8 +62,9 @@ class Selection:
     free_before: float
     free_after: float
     parts: tuple[Part, Part]
-    least: Mapping[str, float]  #: gain that each candidate needs
+    least: float  #: gain that a first effect needs
     floor: bool
+    assumed: bool
 
     @property
     def chosen(self) -> Judged | None:
@@ -73,9 +75,8 @@ class Selection:
     def allowed(self) -> float:
         """Log likelihood that a nameless model may gain on top of the effects named where they are right."""
         if not self.floor:
-            return max(UNKNOWN_ALONE, UNKNOWN_RANDOM * self.free_before)
-        random = self.chosen is not None and any(t.kind == SPECTRUM for t in self.chosen.terms)
-        share = UNKNOWN_RANDOM if random else UNKNOWN_SHARE
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before)
+        share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
         return max(UNKNOWN_GAIN, share * (self.chosen.gain if self.chosen else 0.0))
 
     @property
@@ -109,23 +110,29 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     screen = Screen(data)
     singles = _round(data, parts, base, screen, candidates, None, progress)
     steps: list[Judged] = []
-    best = _best_of(singles, {name: needed(data, name) for name in singles})
+    best = _best_of(singles, needed(data))
     while best is not None and len(steps) < MOST_EFFECTS:
-        before = steps[-1].gain if steps else 0.0
-        of_clock = sum(clock_gain(data, t)[1] for t in (steps[-1].terms if steps else ()) if t.kind == CLOCK)
-        least = needed(data, best.name)
-        if steps:
-            least = max(LEAST_GAIN, least, LEAST_SHARE * (before - of_clock))
-        if best.gain - before < least:
-            break
         steps.append(best)
+        best = None
         if len(steps) < MOST_EFFECTS:
-            more = _round(data, parts, base, screen, candidates, best, progress)
-            best = _best_of(more)
+            more = _round(data, parts, base, screen, candidates, steps[-1], progress)
+            best = max((j for j in more.values() if j.full and j.gain - steps[-1].gain >= _needed_beside(data, steps[-1], j)),
+                       key=lambda j: j.gain, default=None)
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
-    return Selection(singles, tuple(steps), before, after, parts, {name: needed(data, name) for name in singles},
-                     data.study.controller is not None)
+    last = steps[-1].terms if steps else ()
+    return Selection(singles, tuple(steps), before, after, parts, needed(data), data.study.controller is not None,
+                     _assumes(data, last))
+
+
+def _assumes(data: Data, terms: Sequence[Term]) -> bool:
+    """Whether the spectrum of effects is assumed: they are random or change the loop."""
+    return any(t.kind == SPECTRUM for t in terms) or _changes_loop(data, terms)
+
+
+def _changes_loop(data: Data, terms: Sequence[Term]) -> bool:
+    law = data.study.controller
+    return law is not None and any(law.changes_loop((t.active(),)) for t in terms if t.kind == MEAN)
 
 
 def _nameless(data: Data, parts: tuple[Part, Part], chosen: Judged | None) -> float:
@@ -135,17 +142,23 @@ def _nameless(data: Data, parts: tuple[Part, Part], chosen: Judged | None) -> fl
     return max(sum(generic_gain(data, parts, fits)), 0.0) + clock_left(data, named)
 
 
-def needed(data: Data, name: str) -> float:
+def needed(data: Data) -> float:
     """Held-out log likelihood that a first effect must gain: less where nominal flights gave the floor."""
-    if data.study.controller is None:
-        return LEAST_GAIN
-    return WAVERING.get(name, FIRST_GAIN)
+    return LEAST_GAIN if data.study.controller is None else FIRST_GAIN
 
 
-def _best_of(judged: Mapping[str, Judged], least: Mapping[str, float] | None = None) -> Judged | None:
-    """The best of those that were fitted, and not only looked at; first those that gain as much as they need."""
-    return max((j for j in judged.values() if j.full),
-               key=lambda j: (least is None or j.gain >= least[j.name], j.gain), default=None)
+def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
+    """Held-out log likelihood that a further effect must gain: more where others have gained much, as no model is exact."""
+    names = {t.name for t in held.terms}
+    new = [t for t in more.terms if t.name not in names]
+    of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
+    share = LOOP_SHARE if _assumes(data, held.terms) and _changes_loop(data, new) else LEAST_SHARE
+    return max(LEAST_GAIN, share * (held.gain - of_clock))
+
+
+def _best_of(judged: Mapping[str, Judged], least: float) -> Judged | None:
+    """The best of those that were fitted, and not only looked at; None where it does not gain enough."""
+    return max((j for j in judged.values() if j.full and j.gain >= least), key=lambda j: j.gain, default=None)
 
 
 def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], screen: Screen,
@@ -155,6 +168,7 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
     before = chosen.gain if chosen else 0.0
     held = chosen.terms if chosen else ()
     have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
+    twins = {n for t in held if not t.companion and (group := twins_of(t.name)) for n in group[0] if n != t.name}
     left, added = [], []
     for k, part in enumerate(parts):
         problem, values, power = left_over(data, part, chosen.fits[1 - k].terms if chosen and chosen.fits else ())
@@ -165,17 +179,19 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         progress(name)
         hopeless = False
         for terms in _middle_first(variants):
-            if hopeless or any((t.name, t.values.get("rotor")) in have for t in terms):
+            if hopeless or name in twins or any((t.name, t.values.get("rotor")) in have for t in terms):
                 continue
+            choice = np.log(sum(len(v) == len(terms) for v in variants))  # among so many; else many would beat one
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
                 gain, start = first_order(screen, parts, left, added, terms, held)
-                looked.append(Judged(name, (*held, *terms), before + gain - _price(terms), full=False))
+                looked.append(Judged(name, (*held, *terms), before + gain - _price(terms) - choice, full=False))
             else:
-                sure.append(_crossed(data, parts, base, name, held, terms, chosen))
+                sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
                 hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
     looked = _best_variants(looked)
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
-    fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen) for j in worth]
+    fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen,
+                       np.log(sum(len(v) == len(j.terms) - len(held) for v in candidates[j.name]))) for j in worth]
     best: dict[str, Judged] = {}
     for j in (*sure, *fitted, *(j for j in looked if j not in worth)):
         old = best.get(j.name)
@@ -185,7 +201,7 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
     for name, other in COMPANIONS.items():
         both, alone = best.get(name), best.get(other)
         if both and alone and len(both.terms) > len(held) + 1 and both.gain < alone.gain + LEAST_GAIN:
-            best[name] = replace(both, gain=min(both.gain, alone.gain - 1.0))  # it is the companion that gains
+            best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))  # it is the companion that gains
     return best
 
 
@@ -210,10 +226,11 @@ def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
 
 
 def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], name: str, held: Hypothesis,
-             terms: Hypothesis, chosen: Judged | None) -> Judged:
-    """Fit on each half, judge on the other."""
+             terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
+    """Fit on each half, judge on the other; choice: what the choice of this variant costs."""
     every = (*held, *terms)
     timed = [t for t in terms if t.kind == CLOCK]
+    paid = choice + (chosen.choice if chosen else 0.0)
     gain, fits = 0.0, []
     if chosen and not [t for t in terms if t.kind != CLOCK]:
         gain, fits = chosen.gain, list(chosen.fits)
@@ -225,13 +242,13 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]],
             found = _refined(data, parts[train], fit(data, parts[train], others, _start(chosen, others, train)))
             gain += judge(data, parts[test], found.terms) - against[test] if others else 0.0
             fits.append(found)
-        gain -= _price(others)
+        gain -= _price(found.terms if others else ()) + paid
     fitted = list(fits[0].terms) if fits else []
     for t in (t for t in every if t.kind == CLOCK):
         made, more = clock_gain(data, t)
         fitted.append(made)
         gain += more if t in timed else 0.0
-    return Judged(name, tuple(fitted), gain, tuple(fits))
+    return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid)
 
 
 def _refined(data: Data, part: Part, found: Fit) -> Fit:
@@ -251,11 +268,11 @@ def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarr
     return np.concatenate([known, np.full(size - len(known), 0.05)])
 
 
-def _against_none(gain: float, least: float, many: int = 1, lowest: float | None = None) -> float:
+def _against_none(gain: float, least: float, many: int = 1) -> float:
     """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little."""
     if gain < least:
         return TEMPERATURE * (gain - least - np.log(many))
-    return gain - (least if lowest is None else lowest)
+    return gain - least
 
 
 def probabilities(selection: Selection) -> dict[str, float]:
@@ -264,9 +281,8 @@ def probabilities(selection: Selection) -> dict[str, float]:
     `unknown` has one half where as much is left as is allowed, and odds that grow with its square.
     """
     names = list(selection.singles)
-    lowest = min(selection.least.values(), default=0.0)
     singles = selection.singles
-    score = np.array([_against_none(singles[n].gain, selection.least[n], len(names), lowest) for n in names] + [0.0])
+    score = np.array([_against_none(singles[n].gain, selection.least, len(names)) for n in names] + [0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
     odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
     unknown = odds / (1.0 + odds)

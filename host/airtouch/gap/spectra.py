@@ -59,12 +59,17 @@ def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
 
 
 def judged(regime: str) -> np.ndarray:
-    """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only."""
+    """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only.
+
+    In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.
+    """
     f = frequencies(regime)[:, None]
     keep = np.array([[c.low_hz <= x <= c.high_hz for c in CHANNELS] for x in f[:, 0]])
     if regime == REST:
         force_or_rate = np.array([c.name.startswith(("force", "rate")) for c in CHANNELS])
         keep = np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
+    else:
+        keep[:, [c.name for c in CHANNELS].index("rate_z")] = False
     return keep
 
 

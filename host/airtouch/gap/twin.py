@@ -89,12 +89,15 @@ class Twin:
         return kept[key]
 
     def torque_change(self, active: Sequence[Active], f: np.ndarray) -> Change | None:
-        """How effects change what the vehicle does upon a logged command; None where they leave the loop as it is."""
+        """How effects change what the vehicle does upon a logged command; None where they leave the loop as it is.
+
+        A controller no faster than the log folds nothing: there the motors alone count.
+        """
         if not self.changes_loop(active):
             return None
         row, first = (prepare(self.vehicle, c)[0][0] for c in ((*self.calibration, *active), self.calibration))
         after, before = self._shares(row, f), self._shares(first, f)
-        share = after / before
+        share = after / before if self.by_firmware else np.ones_like(before)
         motors = torque_per_command(row, AXES[1], f) / torque_per_command(first, AXES[1], f)
         return Change(motors[:, None], share / np.maximum(np.abs(share) / MOST_CHANGE, 1.0), before)
 
