@@ -66,7 +66,7 @@ def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarra
             gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
             made[:, TORQUE] = _difference(r)[:, None] * gyro
             made[:, RATE] = gyro
-            if r == AIR:
+            if r == AIR and r in data.study.floor.power:
                 beyond = np.nan_to_num(data.study.floor.power[r][:, TORQUE]) - made[:, TORQUE]
                 made[:, TORQUE] += _gyro_share(data.study) * np.maximum(beyond, 0.0)
         out[r] = np.broadcast_to(extra * made, shape[r]).copy()
