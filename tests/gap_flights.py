@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.channels import residual
-from airtouch.gap.fit import Study
+from airtouch.gap.data import Study
 from airtouch.gap.flight import PERIOD_S, Flight
 from airtouch.gap.spectra import Floor
 from airtouch.logs.flight_log import FlightLog

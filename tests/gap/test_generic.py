@@ -7,6 +7,7 @@ import pytest
 
 from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, candidates, clock, fit, flight, generic
+from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
 from airtouch.gap.select import halves
 from airtouch.simulation import effects, scenario
@@ -45,7 +46,7 @@ def study():
 
 
 def gain_of(study, flights):
-    data = fit.Data(study, flights)
+    data = Data(study, flights)
     return sum(generic.generic_gain(data, halves(data), [(), ()]))
 
 
@@ -86,7 +87,7 @@ def test_nominal_flights_of_other_seeds_have_nothing_left(study):
 def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways):
     """Its coefficient is force per mass; with the effect in the registry it is named instead."""
     one = flown(1, 45, {"sideways": {"push": PUSH}})
-    data = fit.Data(study, one)
+    data = Data(study, one)
     found = [generic._chosen(generic._Half(data, p, ()), 1, study.usual)[generic.BASIS.index("vx")]
              for p in halves(data)]
     np.testing.assert_allclose(found, PUSH / VEHICLE.mass_kg, rtol=0.35)
@@ -98,7 +99,7 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
 
 
 def test_an_effect_with_its_name_beats_the_model_without(study):
-    data = fit.Data(study, flown(1, 47, {"com_offset": {"x": 0.001, "y": 0.0}}))
+    data = Data(study, flown(1, 47, {"com_offset": {"x": 0.001, "y": 0.0}}))
     parts = halves(data)
     (term,) = candidates.terms("com_offset")
     fits = [fit.fit(data, p, (term,)) for p in parts]

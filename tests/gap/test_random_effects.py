@@ -10,7 +10,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, flight, random_effects, vibration_lines
 from airtouch.gap.candidates import every, terms
 from airtouch.gap.diagnose import _effects
-from airtouch.gap.fit import Data
+from airtouch.gap.data import Data
 from airtouch.gap.select import select
 from airtouch.gap.spectra import AIR, REST, frequencies
 from airtouch.simulation.batch import flights as simulated

@@ -7,6 +7,7 @@ from scipy.signal import welch
 from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, edge_response, fit, flight, loop_model, select, twin
 from airtouch.gap.candidates import terms
+from airtouch.gap.data import Data
 from airtouch.simulation import scenario
 from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import activate
@@ -35,7 +36,7 @@ def study():
 
 def found(study, flights, name):
     """Held-out gain and the mean of the two halves' fitted values, of the effect's best variant."""
-    data = fit.Data(study, flights)
+    data = Data(study, flights)
     halves = select.halves(data)
     best = (-np.inf, {})
     for term in terms(name):

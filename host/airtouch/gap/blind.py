@@ -20,7 +20,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap import calibrate, measure
 from airtouch.gap.blind_draw import KINDS, Kind
 from airtouch.gap.blind_severity import severities, weakest
-from airtouch.gap.fit import Data, Study
+from airtouch.gap.data import Data, Study
 from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown

@@ -18,7 +18,8 @@ from airtouch.gap import candidates, measure
 from airtouch.gap.blind_draw import KINDS, Kind
 from airtouch.gap.calibrate import whole_of
 from airtouch.gap.candidates import CLOCK, Term
-from airtouch.gap.fit import Data, Study, judge
+from airtouch.gap.data import Data, Study
+from airtouch.gap.fit import judge
 from airtouch.gap.select import clock_gain
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown

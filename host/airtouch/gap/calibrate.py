@@ -15,7 +15,9 @@ import numpy as np
 from airtouch.gap import twin
 from airtouch.gap.candidates import Term, terms
 from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
-from airtouch.gap.fit import Data, Part, Study, fit
+from airtouch.gap.data import Data, Study
+from airtouch.gap.fit import fit
+from airtouch.gap.problem import Part
 from airtouch.gap.flight import Flight
 from airtouch.gap.generic import usual_of
 from airtouch.gap.result import Quantity

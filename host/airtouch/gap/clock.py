@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.candidates import Term
-from airtouch.gap.fit import Data
+from airtouch.gap.data import Data
 from airtouch.gap.flight import PERIOD_S
 
 LEAST_CLOCK_S = 2e-4  #: rms of a clock that nothing disturbs

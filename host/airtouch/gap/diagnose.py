@@ -9,7 +9,8 @@ from airtouch.errors import AirTouchError
 from airtouch.gap import advice as advices
 from airtouch.gap import balance_result, calibrate, candidates, measure
 from airtouch.gap.candidates import CLOCK, Term
-from airtouch.gap.fit import Data, Study, fit, strength_variance
+from airtouch.gap.data import Data, Study
+from airtouch.gap.fit import fit, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked

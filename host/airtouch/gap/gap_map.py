@@ -17,7 +17,7 @@ from airtouch.gap.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_
 from airtouch.gap.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
-from airtouch.gap.fit import Data, Study
+from airtouch.gap.data import Data, Study
 from airtouch.gap.flight import GROUND, Flight
 from airtouch.gap.result import Cell
 from airtouch.gap.spectra import frequencies

@@ -16,7 +16,8 @@ import numpy as np
 from airtouch.gap.basis import BASIS, basis
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COUNT
-from airtouch.gap.fit import Data, Part, Problem, problem_of
+from airtouch.gap.data import Data
+from airtouch.gap.problem import Part, Problem, problem_of
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies
 
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
@@ -129,7 +130,8 @@ class _Half:
     def powers(self, left: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Power of what is left over what it should be, freedom, tail and group of the values that are known."""
         known = self.problem.known
-        return np.abs(left[known]) ** 2 / self.power[known], self.problem.freedom[known], self.problem.tail[known], self.groups[known]
+        over = np.abs(left[known]) ** 2 / self.power[known]
+        return over, self.problem.freedom[known], self.problem.tail[known], self.groups[known]
 
 
 def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:

@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap import calibrate, twin
 from airtouch.gap.channels import residual
-from airtouch.gap.fit import Study
+from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, Flight, ready
 from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of,
                                    where)

@@ -85,7 +85,7 @@ class Response:
         return out
 
     def added(self, quiet: np.ndarray, sensed: bool) -> np.ndarray:
-        """Power (blocks, bins, 3) that a random torque of unit power adds (on the gyro alone: sensed); 1 in the means."""
+        """Power (blocks, bins, 3) that a random torque of unit power adds; 1 in the means. sensed: on the gyro alone."""
         made = [np.ones(self.usual.shape) if law is None else
                 law.weight ** 2 * (1.0 if sensed else np.abs(law.outside) ** 2) for law in (self.steady, self.stepped)]
         out = np.nan_to_num(np.where(quiet[:, None], *made), nan=1.0)  # no law: such blocks do not count
@@ -125,7 +125,8 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: np.ndarray, flo
     share = (y * w.conj() * mask).sum(axis=0) / count / np.maximum(power, 1e-30)
     told = _smooth(share.real) + 1j * _smooth(share.imag)
     rest = np.exp(_smooth(np.log(np.maximum((np.abs(y - told * w) ** 2 * mask).sum(axis=0) / count, 1e-30))))
-    weight = np.ones(rest.shape) if floor is None else np.where(chosen.sum(axis=0) >= FEWEST, np.sqrt(floor / rest), np.nan)
+    known = chosen.sum(axis=0) >= FEWEST
+    weight = np.ones(rest.shape) if floor is None else np.where(known, np.sqrt(floor / rest), np.nan)
     changed = told / np.maximum(np.abs(told), 1.0)
     return Law(told, changed, loop + changed * (1.0 - loop), weight), rest
 

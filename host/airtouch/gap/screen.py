@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch.gap.candidates import MEAN, Term
-from airtouch.gap.fit import Data, Part, Problem, _bounded_step, _limits, _weights, problem_of, spectra
-from airtouch.gap.fit import _without_offsets as without_offsets
+from airtouch.gap.data import Data, spectra
+from airtouch.gap.least_squares import bounded_step, limits, weights_of, without_offsets
+from airtouch.gap.problem import Part, Problem, problem_of
 from airtouch.gap.twin import COMMAND_ONLY
 
 STEP = 0.25  #: of a parameter's natural step, at which the change is taken
@@ -58,7 +59,7 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         problem = problem_of(screen.data, part)
         tables.append([screen.column(problem, t, i) for t in (*mean, *other) for i in range(len(t.free))])
     n = sum(len(t.free) for t in mean)
-    low, high = _limits(mean) if mean else (np.zeros(0), np.zeros(0))
+    low, high = limits(mean) if mean else (np.zeros(0), np.zeros(0))
     wide = np.full(len(tables[0]) - n, 1e6)
     low, high = np.concatenate([low, -wide]), np.concatenate([high, wide])
     for train, test in ((0, 1), (1, 0)):
@@ -70,7 +71,7 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
         values = left[train]
         for _ in range(ROUNDS):
-            change, _ = _bounded_step(columns, prior, values, _weights(problem, values, added[train]),
+            change, _ = bounded_step(columns, prior, values, weights_of(problem, values, added[train]),
                                       x, offsets, low, high, nothing)
             x = np.clip(x + change[:len(x)], low, high)
             offsets = offsets + change[len(x):]

@@ -13,7 +13,9 @@ import numpy as np
 
 from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, twins_of
 from airtouch.gap.clock import clock_gain, clock_left
-from airtouch.gap.fit import Data, Fit, Part, fit, judge, left_over
+from airtouch.gap.data import Data
+from airtouch.gap.fit import Fit, fit, judge, left_over
+from airtouch.gap.problem import Part
 from airtouch.gap.generic import generic_gain
 from airtouch.gap.screen import Screen, first_order
 from airtouch.gap.spectra import AIR, REST
@@ -116,8 +118,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         best = None
         if len(steps) < MOST_EFFECTS:
             more = _round(data, parts, base, screen, candidates, steps[-1], progress)
-            best = max((j for j in more.values() if j.full and j.gain - steps[-1].gain >= _needed_beside(data, steps[-1], j)),
-                       key=lambda j: j.gain, default=None)
+            enough = {n: j for n, j in more.items() if j.gain - steps[-1].gain >= _needed_beside(data, steps[-1], j)}
+            best = _best_of(enough, steps[-1].gain)
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
@@ -148,7 +150,7 @@ def needed(data: Data) -> float:
 
 
 def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
-    """Held-out log likelihood that a further effect must gain: more where others have gained much, as no model is exact."""
+    """Held-out log likelihood that a further effect must gain: more beside one that gains much, as no model is exact."""
     names = {t.name for t in held.terms}
     new = [t for t in more.terms if t.name not in names]
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.fit import Data, Part, left_over
+from airtouch.gap.data import Data
+from airtouch.gap.fit import left_over
+from airtouch.gap.problem import Part
 from airtouch.gap.generic import bands_of
 from airtouch.gap.result import Quantity
 from airtouch.gap.select import Judged

@@ -17,7 +17,15 @@ from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.edge_response import EdgeFloor, floor_of
 from airtouch.gap.flight import PERIOD_S, Flight
-from airtouch.gap.loop_model import AXES, Controller, excess_phase, firmware, spectra, torque_per_command, turning_per_command
+from airtouch.gap.loop_model import (
+    AXES,
+    Controller,
+    excess_phase,
+    firmware,
+    spectra,
+    torque_per_command,
+    turning_per_command,
+)
 from airtouch.logs.segments import KINDS
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -42,8 +50,8 @@ SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers 
 FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "height_gain",
           "motor_rise", "motor_fall", "inertia", "mass", "gain", "gyro_noise")
 #: those of the roll and pitch loops that change it, not its noise
-LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise", "motor_fall",
-               "inertia")
+LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
+               "motor_fall", "inertia")
 SMOOTH = 2.0  #: bins: a block's window and `response.SMOOTH`
 MOST_CHANGE = 5.0  #: of the share of torque
 #: effects that change the commands alone: replayed motor commands hold nothing of them

@@ -15,11 +15,11 @@ from airtouch.gap import calibrate, measure, random_effects, words
 from airtouch.gap.band_sums import BANDS_HZ
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term, term_of
 from airtouch.gap.channels import CHANNELS, residual
-from airtouch.gap.fit import Data, Study
+from airtouch.gap.data import Data, Study
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import CHANNEL_WORDS, GapMap, gap_map, in_words, short
 from airtouch.gap.gap_map import where as where_of
-from airtouch.gap.result import Cell, Diagnosis, Found
+from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.spectra import AIR, blocks, frequencies, sensor_power, starts
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog

@@ -1,0 +1,93 @@
+"""Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.channels import TORQUE, angular_acceleration, residual
+from airtouch.gap.flight import Flight
+from airtouch.gap.motion import held
+from airtouch.gap.response import Response
+from airtouch.gap.spectra import AIR, REST, Floor, blocks, frequencies, starts
+from airtouch.gap.twin import COMMAND_ONLY, Twin
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+KEPT, KEPT_SAMPLES = 64, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a diagnosis holds flights against: vehicle, calibration, controller and floor."""
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    controller: Twin | None
+    floor: Floor
+    response: Response | None = None
+    usual: Any = None  #: generic.Usual of the nominal flights
+
+
+@dataclass
+class Data:
+    """Flights with their blocks and the spectra of the gap before any effect is added.
+
+    slow: torque counts below the bins in which commands hold aliases only.
+    """
+
+    study: Study
+    flights: Sequence[Flight]
+    slow: bool = False
+    first: list[dict[str, np.ndarray]] = field(default_factory=list)
+    base: list[dict[str, np.ndarray]] = field(default_factory=list)
+    turning: list[np.ndarray] = field(default_factory=list)  #: spectra in the air of the measured angular acceleration
+    quiet: list[np.ndarray] = field(default_factory=list)  #: blocks in the air and axes where no set-point stepped
+
+    def __post_init__(self) -> None:
+        self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
+        self.turning = [blocks(angular_acceleration(f), b[AIR], AIR)
+                        for f, b in zip(self.flights, self.first, strict=True)]
+        if self.study.response is not None:
+            self.quiet = [self.study.response.quiet(t - b[AIR][:, :, TORQUE])
+                          for t, b in zip(self.turning, _replayed(self, ()), strict=True)]
+        self.base = spectra(self, ())
+
+
+def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+    """Spectra of the gap with effects in the model, by flight and regime; commands are the twin view's.
+
+    Where nominal flights tell how the gyro follows the commands, torque is compared with what that leaves to expect.
+    """
+    response = data.study.response
+    replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
+    every = _replayed(data, replayed)
+    if response is None:
+        return every
+    law = data.study.controller
+    beside = [a for a in replayed if not law.changes_loop((a,))]
+    through = [a for a in beside if a.effect.wrench is None]
+    change = law.torque_change(active, frequencies(AIR))
+    replays = (_replayed(data, s) for s in ((), through, beside))
+    sets = zip(data.flights, data.quiet, data.turning, *replays, every, strict=True)
+    return [e if f.rates is None else {**e, AIR: response.applied(q, m, n[AIR], d[AIR], o[AIR], e[AIR], change)}
+            for f, q, m, n, d, o, e in sets]
+
+
+def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+    """Spectra of what was measured minus what the model makes of the logged commands."""
+    study, out = data.study, []
+    kept = data.__dict__.setdefault("_spectra", {})
+    key = tuple((a.effect.name, *a.values.values()) for a in active)
+    if key in kept:
+        return kept[key]
+    for flight, first in zip(data.flights, data.first, strict=True):
+        left = residual(flight, study.vehicle, (*study.calibration, *active))
+        left = held(np.where(flight.lost[:, None], np.nan, left))
+        out.append({r: blocks(left, first[r], r) for r in first})
+    if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
+        if len(kept) >= KEPT:
+            kept.pop(next(k for k in kept if k))
+        kept[key] = out
+    return out

@@ -1,0 +1,162 @@
+"""Blocks flattened to one array, and their likelihood: Whittle's, of the gap's spectra against the floor.
+
+A bin's power e over what the floor and the random effects give is exponential when the
+hypothesis holds; since the floor itself is estimated from few flights, a Student-like
+tail stands in for it.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import exp1
+
+from airtouch.gap import random_effects
+from airtouch.gap.candidates import Term
+from airtouch.gap.channels import COMMAND, COUNT, TORQUE
+from airtouch.gap.data import Data, spectra
+from airtouch.gap.response import FIRST_BIN
+from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, judged
+from airtouch.gap.twin import COMMAND_ONLY
+from airtouch.gap.twin_view import TwinView
+from airtouch.simulation.effects import Active
+
+OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
+LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
+DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
+FREEDOM = 12.0  #: of the Student-like tail at most
+
+
+@dataclass(frozen=True)
+class Part:
+    """Which blocks of which flights: (flight, regime, chosen bool array), for fitting or judging."""
+
+    pieces: tuple[tuple[int, str, np.ndarray], ...]
+
+
+class Problem:
+    """Blocks flattened to one array: rows are (block, bin, channel) values that count."""
+
+    def __init__(self, data: Data, part: Part) -> None:
+        self.data, self.part = data, part
+        self._constant: list[tuple[np.ndarray, float]] | None = None
+        self.keep = {r: judged(r) for r in (AIR, REST)}
+        for keep in self.keep.values():
+            keep[:, COMMAND] = False  # the twin view judges them
+        if data.slow:
+            self.keep[AIR][FIRST_BIN:, TORQUE] = False
+        self.twin = TwinView(data.study.controller, data.flights, data.first, part.pieces)
+        self.power = self._gather([{r: np.broadcast_to(data.study.floor.power[r], s[r].shape) for r in s}
+                                   for s in data.base]).real
+        self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
+                                     for s in data.base]).real.astype(int)
+        self.flight = np.concatenate([np.full(self._size(p), p[0]) for p in part.pieces]) \
+            if part.pieces else np.zeros(0, int)
+        self.base = self._gather(data.base)
+        self.known = np.isfinite(self.base)
+        self.power = np.where(self.known, self.power, 1.0)
+        self.base = np.where(self.known, self.base, 0.0)
+        counts = data.study.floor.blocks
+        nu = [np.full(self._size(p), np.clip(3.0 * counts[p[1]], 2.0, FREEDOM)) for p in part.pieces]
+        self.freedom = np.concatenate(nu) if nu else np.zeros(0)
+        self.own = len(self.base)  #: elements of the replay view; those of the twin view follow
+        self.torque = (self.channel >= TORQUE.start) & (self.channel < TORQUE.stop)
+        twin = self.twin
+        self.power = np.concatenate([self.power, twin.floor])
+        self.base = np.concatenate([self.base, twin.values])
+        self.known = np.concatenate([self.known, np.ones(len(twin), bool)])
+        self.channel = np.concatenate([self.channel, twin.channel]).astype(int)
+        self.flight = np.concatenate([self.flight, twin.flight]).astype(int)
+        self.tail = np.concatenate([tail(self.freedom), twin.freedom])  #: the twin's floor has its tails in it
+        self.freedom = np.concatenate([self.freedom, twin.freedom])
+
+    def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
+        return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
+
+    def _gather(self, by_flight: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
+        parts = [by_flight[i][r][chosen][:, self.keep[r]].ravel() for i, r, chosen in self.part.pieces]
+        return np.concatenate(parts).astype(complex) if parts else np.zeros(0, complex)
+
+    def values(self, active: Sequence[Active]) -> np.ndarray:
+        """Spectra with effects in the model, flattened."""
+        seen = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
+        own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
+        return np.where(self.known, self._with_twin(own, self.twin.moved(active)), 0.0)
+
+    def _with_twin(self, own: np.ndarray, twin: np.ndarray | float = 0.0) -> np.ndarray:
+        return np.concatenate([own, np.broadcast_to(twin, len(self.twin))])
+
+    def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+        """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
+        power, cost = self.twin.power(active, wide)
+        return np.concatenate([self._doubt(active), power - self.twin.floor]), cost
+
+    def _doubt(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (own,) of what the loop model may be wrong by in the torque that it changes."""
+        law = self.data.study.controller
+        loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
+        if not self.own or not loop or not law.changes_loop(loop):
+            return np.zeros(self.own)
+        change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
+        return DOUBT ** 2 * np.abs(change) ** 2 * self.torque
+
+    def constant(self) -> list[tuple[np.ndarray, float]]:
+        """Spectra of a unit offset in each of the OFFSETS channels of each flight, with its prior's deviation."""
+        if self._constant is None:
+            self._constant = self._constants()
+        return self._constant
+
+    def _constants(self) -> list[tuple[np.ndarray, float]]:
+        columns = []
+        tell = self.data.study.floor.offset
+        for i, flight in enumerate(self.data.flights):
+            for c in range(OFFSETS):
+                if tell[c] <= 0.0:
+                    continue
+                ones = np.zeros((len(flight), COUNT))
+                ones[~flight.on_ground, c] = 1.0
+                made = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
+                         for r in f} for j, f in enumerate(self.data.first)]
+                columns.append((self._with_twin(self._gather(made)), float(tell[c])))
+        return columns
+
+    def random_power(self, terms: Sequence[Term]) -> np.ndarray:
+        """PSD that random effects add, flattened."""
+        total = np.zeros(len(self.base))
+        for term in terms:
+            total += self._with_twin(self._gather(random_effects.power(self.data, term)).real)
+        return total
+
+    def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+        """Log likelihood of what is left, over nothing in particular; only differences mean something."""
+        return float(self.each(values, added).sum())
+
+    def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+        power = self.power + added
+        e = np.abs(values) ** 2 / power
+        tails = (self.freedom + 1.0) * np.log1p(e / self.tail)
+        return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + tails), 0.0)
+
+
+def tail(freedom: np.ndarray) -> np.ndarray:
+    """Scale (n,) of tails whose likelihood is highest at the mean of exponential power:
+
+    E[(nu + 1) e / (tail + e)] = 1.
+    """
+    return np.array([_tail(nu) for nu in np.unique(freedom)])[np.unique(freedom, return_inverse=True)[1]] \
+        if len(freedom) else freedom
+
+
+@functools.cache
+def _tail(nu: float) -> float:
+    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
+
+
+def problem_of(data: Data, part: Part) -> Problem:
+    """The flattened blocks of a part, made once."""
+    kept = data.__dict__.setdefault("_problems", {})
+    if id(part) not in kept:
+        kept[id(part)] = (part, Problem(data, part))
+    return kept[id(part)][1]
