@@ -28,6 +28,7 @@ class Study:
     floor: Floor
     response: Response | None = None
     usual: Any = None  #: generic.Usual of the nominal flights
+    nominal: int = 0  #: how many there were
 
 
 @dataclass

@@ -25,6 +25,7 @@ QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point sho
 STEPPED = 3.0  #: times the usual power of the commanded torque
 FEWEST = 8  #: blocks of nominal flights
 SMOOTH = 1.5  #: bins
+NOISE = 0.2  #: coherence up to which it is the noise of the gyro that both have, not believed
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,8 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: np.ndarray, flo
     mask, count = chosen[:, None], np.maximum(chosen.sum(axis=0), 1)
     power = (np.abs(w) ** 2 * mask).sum(axis=0) / count
     share = (y * w.conj() * mask).sum(axis=0) / count / np.maximum(power, 1e-30)
-    told = _smooth(share.real) + 1j * _smooth(share.imag)
+    follows = _smooth(np.abs(share) ** 2 * power / np.maximum((np.abs(y) ** 2 * mask).sum(axis=0) / count, 1e-30))
+    told = (_smooth(share.real) + 1j * _smooth(share.imag)) * np.clip((follows - NOISE) / NOISE, 0.0, 1.0)
     rest = np.exp(_smooth(np.log(np.maximum((np.abs(y - told * w) ** 2 * mask).sum(axis=0) / count, 1e-30))))
     known = chosen.sum(axis=0) >= FEWEST
     weight = np.ones(rest.shape) if floor is None else np.where(known, np.sqrt(floor / rest), np.nan)

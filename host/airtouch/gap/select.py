@@ -27,14 +27,15 @@ FIRST_GAIN = 8.0  #: the same for the first effect, against a floor from nominal
 PRICE = 0.9  #: of each further parameter of an effect
 LEAST_SHARE = 0.01  #: and as a share of what the effects before it have added
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
-#: gain of a nameless model over the effects named, for `unknown`, where nominal flights gave the floor, and else
-UNKNOWN_GAIN, UNKNOWN_ALONE = 14.0, 25.0
+#: gain of a nameless model over the effects named, for `unknown`, where many nominal flights gave the floor, and else
+UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectrum is assumed, not measured
 MOST_EFFECTS = 3
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
+BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
 Hypothesis = tuple[Term, ...]
 
 
@@ -55,7 +56,7 @@ class Selection:
     """singles: the best variant of every candidate; steps: effects added one after another;
 
     free_before, free_after: gain of the nameless model over no effect and over the last step;
-    parts: the two halves that they were fitted and judged on; floor: whether nominal flights gave it;
+    parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
     assumed: whether a chosen effect is random or changes the loop.
     """
 
@@ -65,7 +66,7 @@ class Selection:
     free_after: float
     parts: tuple[Part, Part]
     least: float  #: gain that a first effect needs
-    floor: bool
+    nominal: int
     assumed: bool
 
     @property
@@ -75,11 +76,14 @@ class Selection:
 
     @property
     def allowed(self) -> float:
-        """Log likelihood that a nameless model may gain on top of the effects named where they are right."""
-        if not self.floor:
+        """Log likelihood that a nameless model may gain on top of the effects named where they are right.
+
+        The fewer nominal flights there are, the farther off may another one lie.
+        """
+        if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before)
         share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
-        return max(UNKNOWN_GAIN, share * (self.chosen.gain if self.chosen else 0.0))
+        return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * (self.chosen.gain if self.chosen else 0.0))
 
     @property
     def explained(self) -> bool:
@@ -123,8 +127,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
-    return Selection(singles, tuple(steps), before, after, parts, needed(data), data.study.controller is not None,
-                     _assumes(data, last))
+    return Selection(singles, tuple(steps), before, after, parts, needed(data), data.study.nominal, _assumes(data, last))
 
 
 def _assumes(data: Data, terms: Sequence[Term]) -> bool:
@@ -288,5 +291,8 @@ def probabilities(selection: Selection) -> dict[str, float]:
     weight = np.exp((score - score.max()) / TEMPERATURE)
     odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
     unknown = odds / (1.0 + odds)
+    if selection.chosen is not None and selection.explained:  # not above the effect that is the answer
+        share = weight[names.index(selection.steps[0].name)] / weight.sum()
+        unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
     known = (1.0 - unknown) * weight / weight.sum()
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))
