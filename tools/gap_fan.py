@@ -15,7 +15,7 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, measure
-from airtouch.gap.fit import Data
+from airtouch.gap.data import Data
 from airtouch.gap.flight import GROUND, PERIOD_S
 from airtouch.gap.spectra import AIR, frequencies
 from airtouch.logs import read
