@@ -15,6 +15,7 @@ from airtouch.gap.twin import COMMAND_ONLY, Twin
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
+SCALES_TORQUE = frozenset({"inertia"})
 KEPT, KEPT_SAMPLES = 64, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
 
 
@@ -65,7 +66,7 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
     every = _replayed(data, replayed)
     if response is None:
-        return every
+        return _without_means(data, replayed, every) if data.slow else every
     law = data.study.controller
     beside = [a for a in replayed if not law.changes_loop((a,))]
     through = [a for a in beside if a.effect.wrench is None]
@@ -74,6 +75,19 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     sets = zip(data.flights, data.quiet, data.turning, *replays, every, strict=True)
     return [e if f.rates is None else {**e, AIR: response.applied(q, m, n[AIR], d[AIR], o[AIR], e[AIR], change)}
             for f, q, m, n, d, o, e in sets]
+
+
+def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, np.ndarray]],
+                   ) -> list[dict[str, np.ndarray]]:
+    """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
+    some = [a for a in active if a.effect.name not in SCALES_TORQUE]
+    if len(some) == len(active):
+        return every
+    out = [{r: v.copy() for r, v in e.items()} for e in every]
+    for mine, other in zip(out, _replayed(data, some), strict=True):
+        for r, v in mine.items():
+            v[:, :, TORQUE] = other[r][:, :, TORQUE]
+    return out
 
 
 def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:

@@ -24,6 +24,8 @@ from airtouch.vehicle import Vehicle
 MOST_SECONDS = 260.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
+NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as nobody "
+               "knows how much of the commanded torque is aliases of a faster loop")
 WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 
@@ -57,7 +59,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     cells = where(gap_map(study, seen, nominal, named))
     alike = _alike(found)
     notes = [n for f in seen for n in f.notes] + left_out
-    notes += list(fitted.notes) if fitted else ["no baseline flights: the vehicle is taken as declared"]
+    notes += list(fitted.notes) if fitted else [NO_BASELINE]
     notes += measure.differences(study, nominal)
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
@@ -90,7 +92,8 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
 
 
 def _data(study: Study, flights: Sequence[Flight]) -> Data:
-    data = Data(study, flights)
+    """The flights with their spectra; torque in the mean alone where nobody knows which share of it is aliases."""
+    data = Data(study, flights, slow=study.response is None)
     if any(not sum(chosen.sum() for _, regime, chosen in p.pieces if regime == AIR) for p in halves(data)):
         raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
                             "5 s in the air without a hole are needed")
