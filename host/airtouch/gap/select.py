@@ -24,6 +24,7 @@ from airtouch.gap.twin import COMMAND_ONLY
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
 FIRST_GAIN = 8.0  #: the same for the first effect, against a floor from nominal flights
+LOOP_GAIN = 20.0  #: and of one that changes a loop faster than the log, as nominal flights seem to by a tenth, now and then
 PRICE = 0.9  #: of each further parameter of an effect
 LEAST_SHARE = 0.01  #: and as a share of what the effects before it have added
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
@@ -65,7 +66,7 @@ class Selection:
     free_before: float
     free_after: float
     parts: tuple[Part, Part]
-    least: float  #: gain that a first effect needs
+    least: Mapping[str, float]  #: gain that each candidate needs as the first
     nominal: int
     assumed: bool
 
@@ -116,18 +117,19 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     screen = Screen(data)
     singles = _round(data, parts, base, screen, candidates, None, progress)
     steps: list[Judged] = []
-    best = _best_of(singles, needed(data))
+    least = {name: needed(data, j.terms) for name, j in singles.items()}
+    best = _best_of({name: j for name, j in singles.items() if j.gain >= least[name]})
     while best is not None and len(steps) < MOST_EFFECTS:
         steps.append(best)
         best = None
         if len(steps) < MOST_EFFECTS:
             more = _round(data, parts, base, screen, candidates, steps[-1], progress)
             enough = {n: j for n, j in more.items() if j.gain - steps[-1].gain >= _needed_beside(data, steps[-1], j)}
-            best = _best_of(enough, steps[-1].gain)
+            best = _best_of(enough)
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
-    return Selection(singles, tuple(steps), before, after, parts, needed(data), data.study.nominal, _assumes(data, last))
+    return Selection(singles, tuple(steps), before, after, parts, least, data.study.nominal, _assumes(data, last))
 
 
 def _assumes(data: Data, terms: Sequence[Term]) -> bool:
@@ -147,9 +149,11 @@ def _nameless(data: Data, parts: tuple[Part, Part], chosen: Judged | None) -> fl
     return max(sum(generic_gain(data, parts, fits)), 0.0) + clock_left(data, named)
 
 
-def needed(data: Data) -> float:
+def needed(data: Data, terms: Sequence[Term]) -> float:
     """Held-out log likelihood that a first effect must gain: less where nominal flights gave the floor."""
-    return LEAST_GAIN if data.study.controller is None else FIRST_GAIN
+    if data.study.controller is None:
+        return LEAST_GAIN
+    return LOOP_GAIN if data.study.controller.by_firmware and _changes_loop(data, terms) else FIRST_GAIN
 
 
 def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
@@ -158,12 +162,12 @@ def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
     new = [t for t in more.terms if t.name not in names]
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
     share = LOOP_SHARE if _assumes(data, held.terms) and _changes_loop(data, new) else LEAST_SHARE
-    return max(LEAST_GAIN, share * (held.gain - of_clock))
+    return max(LEAST_GAIN, needed(data, new), share * (held.gain - of_clock))
 
 
-def _best_of(judged: Mapping[str, Judged], least: float) -> Judged | None:
-    """The best of those that were fitted, and not only looked at; None where it does not gain enough."""
-    return max((j for j in judged.values() if j.full and j.gain >= least), key=lambda j: j.gain, default=None)
+def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
+    """The best of those that were fitted, and not only looked at; None where there is none."""
+    return max((j for j in judged.values() if j.full), key=lambda j: j.gain, default=None)
 
 
 def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], screen: Screen,
@@ -287,7 +291,7 @@ def probabilities(selection: Selection) -> dict[str, float]:
     """
     names = list(selection.singles)
     singles = selection.singles
-    score = np.array([_against_none(singles[n].gain, selection.least, len(names)) for n in names] + [0.0])
+    score = np.array([_against_none(singles[n].gain, selection.least[n], len(names)) for n in names] + [0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
     odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
     unknown = odds / (1.0 + odds)
