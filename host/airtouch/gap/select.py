@@ -24,7 +24,7 @@ from airtouch.gap.twin import COMMAND_ONLY
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
 FIRST_GAIN = 8.0  #: the same for the first effect, against a floor from nominal flights
-LOOP_GAIN = 20.0  #: and of one that changes a loop faster than the log, as nominal flights seem to by a tenth, now and then
+LOOP_GAIN = 20.0  #: of one that changes a loop faster than the log, as nominal flights seem to by a tenth now and then
 PRICE = 0.9  #: of each further parameter of an effect
 LEAST_SHARE = 0.01  #: and as a share of what the effects before it have added
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
@@ -84,7 +84,8 @@ class Selection:
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before)
         share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
-        return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * (self.chosen.gain if self.chosen else 0.0))
+        gained = self.chosen.gain if self.chosen else 0.0
+        return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * gained)
 
     @property
     def explained(self) -> bool:
@@ -157,7 +158,7 @@ def needed(data: Data, terms: Sequence[Term]) -> float:
 
 
 def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
-    """Held-out log likelihood that a further effect must gain: more beside one that gains much, as no model is exact."""
+    """Held-out log likelihood that a further effect must gain: more beside one that gains much, no model being exact."""
     names = {t.name for t in held.terms}
     new = [t for t in more.terms if t.name not in names]
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
