@@ -84,7 +84,7 @@ def test_command_writes_flights_and_continues(quick, tmp_path):
     assert len(files) == 5
     log = logs.read(files[0])
     assert log.has("acc_world_x_mps2", "rpm_4", "vbat_V")
-    assert ["wind", {"x": 0.1, "y": 0.0, "z": 0.0, "drag": 0.0147}] in log.meta["effects"]
+    assert ["wind", {"x": 0.1, "y": 0.0, "z": 0.0, "drag": 0.0147, "lever": 0.0}] in log.meta["effects"]
     stamps = {f: f.stat().st_mtime_ns for f in files[1:]}
     before = files[0].read_bytes()
     files[0].unlink()
