@@ -21,7 +21,7 @@ from airtouch.gap.twin import Twin
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
-MOST_SECONDS = 260.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
+MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as nobody "
