@@ -3,7 +3,7 @@
     python tools/gap_peers.py [FLIGHTS/peers]
 
 Each case is held against the two `cal` flights of its vehicle; the diagnosis never sees the label.
-Twins (mass and thrust_coefficient) count as one.
+Twins (`candidates.TWINS`) count as one.
 """
 
 import csv
@@ -14,25 +14,18 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
-from airtouch.gap.candidates import twins_of
+from airtouch.gap.blind import alike
+from airtouch.gap.blind_score import wilson
 from airtouch.gap.diagnose import diagnose
 from airtouch.logs import read
 
 NAMES = {"latency": "sensor_latency", "act_delay": "actuator_delay", "thrust_coeff": "thrust_coefficient"}
 
 
-def same(one: str, two: str) -> bool:
-    """Whether two names are one effect in these logs."""
-    twins = twins_of(one)
-    return one == two or (twins is not None and two in twins[0])
-
-
 def interval(hits: int, n: int) -> str:
-    """95 % interval of a share (Wilson)."""
-    z, p = 1.96, hits / n
-    middle, half = p + z * z / (2 * n), z * ((p * (1 - p) / n + z * z / (4 * n * n)) ** 0.5)
-    low, high = ((middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n))
-    return f"{hits} of {n} ({p:.0%}, 95 % interval {low:.0%} to {high:.0%})"
+    """95 % interval of a share."""
+    share = wilson(hits, n)
+    return f"{hits} of {n} ({share['value']:.0%}, 95 % interval {share['low']:.0%} to {share['high']:.0%})"
 
 
 def main(folder: Path) -> None:
@@ -47,12 +40,12 @@ def main(folder: Path) -> None:
                          [read(folder / f"cal_{v}_{i}.csv.gz") for i in (0, 1)])
         true = NAMES.get(row["effect"], row["effect"])
         ranked = [r.name for r in found.ranking[:3]]
-        first += same(ranked[0], true)
-        third += any(same(r, true) for r in ranked)
+        first += alike(ranked[0], true)
+        third += any(alike(r, true) for r in ranked)
         named = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
                                                    if q.low is not None) for e in found.effects)
         control = found.control.get("shrink", {}).get("value")
-        if found.shrink is not None and same(ranked[0], true):
+        if found.shrink is not None and alike(ranked[0], true):
             shrinks.append(found.shrink.value)
             wrong += [control] if control is not None else []
         print(f"| {true} | {float(row['strength']):.3g} {row['unit'].split(',')[0][:24]} | {found.verdict} | {named} | "

@@ -6,6 +6,7 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, candidates, fit, flight
 from airtouch.gap.data import Data
+from airtouch.gap.problem import whole_of
 from airtouch.gap.blind import SCENARIO
 from airtouch.simulation import replay, scenario
 from airtouch.simulation import signals as at
@@ -46,7 +47,7 @@ def test_one_force_while_thrust_is_steady():
 def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, apart):
     """Log likelihood: 70 and 160 for a push against the speed, 1 and 3 for the moment of 15 mm of lever."""
     data = Data(study, flown(1, {"blade_flapping": {"tilt": tilt}}, 32))
-    whole = calibrate.whole_of(data)
+    whole = whole_of(data)
     none = fit.fit(data, whole, ()).gained
     flapping, drag = (fit.fit(data, whole, candidates.terms(name)).gained - none
                       for name in ("blade_flapping", "rotor_drag"))

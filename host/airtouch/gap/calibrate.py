@@ -17,11 +17,11 @@ from airtouch.gap.candidates import Term, terms
 from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.data import Data, Study
 from airtouch.gap.fit import fit
-from airtouch.gap.problem import Part
 from airtouch.gap.flight import Flight
 from airtouch.gap.generic import usual_of
-from airtouch.gap.result import Quantity
 from airtouch.gap.loop_model import sensitivity
+from airtouch.gap.problem import whole_of
+from airtouch.gap.result import Quantity
 from airtouch.gap.response import Response, response_of
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.simulation.effects import Active
@@ -72,12 +72,6 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Cali
     study = replace(study, usual=usual_of(Data(study, flights)))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))
-
-
-def whole_of(data: Data) -> Part:
-    """Every block of every flight."""
-    return Part(tuple((i, r, np.ones(len(f[r]), bool)) for i, f in enumerate(data.first) for r in (AIR, REST)
-                      if len(f[r])))
 
 
 def sensor_noise(vehicle: Vehicle) -> np.ndarray:

@@ -15,7 +15,7 @@ from airtouch.gap.twin import COMMAND_ONLY, Twin
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SCALES_TORQUE = frozenset({"inertia"})
+SCALES_TORQUE = frozenset({"inertia"})  #: what only multiplies torque, and would make less of any trim
 KEPT, KEPT_SAMPLES = 64, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
 
 

@@ -13,6 +13,7 @@ from airtouch.gap.data import Data, Study
 from airtouch.gap.fit import fit, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
+from airtouch.gap.problem import whole_of
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
 from airtouch.gap.select import FIRST_GAIN, Judged, Selection, halves, probabilities, select
 from airtouch.gap.shrink import Shrink, shrink_of
@@ -118,7 +119,7 @@ def _effects(data: Data, found: Selection) -> list[Found]:
     if found.chosen is None:
         return []
     others = [t for t in found.chosen.terms if t.kind != CLOCK]
-    whole = calibrate.whole_of(data)
+    whole = whole_of(data)
     fitted = fit(data, whole, others, _middle(found.chosen)) if others else None
     out, place = [], 0
     for t in fitted.terms if fitted else ():

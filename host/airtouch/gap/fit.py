@@ -88,12 +88,9 @@ def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
     """What effects leave of a part, the power that they add, and what offsets and the commands' floor cost."""
     problem = problem_of(data, part)
-    random = [t for t in terms if t.kind == SPECTRUM]
-    active = [t.active() for t in terms if t.kind == MEAN]
-    told, cost = problem.commanded([*active, *(t.active() for t in random)], wide or bool(random))
-    added = problem.random_power(random) + told
-    values, penalty = without_offsets(problem, problem.values(active), added)
-    return problem, values, added, penalty + cost
+    values, added, cost = problem.modelled(terms, wide)
+    left, penalty = without_offsets(problem, values, added)
+    return problem, left, added, penalty + cost
 
 
 def _start(problem: Problem, mean: Sequence[Term]) -> np.ndarray:

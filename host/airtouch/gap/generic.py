@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.gap.basis import BASIS, basis
-from airtouch.gap.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.candidates import Term
 from airtouch.gap.channels import COUNT
 from airtouch.gap.data import Data
-from airtouch.gap.problem import Part, Problem, problem_of
-from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies
+from airtouch.gap.problem import Part, Problem, problem_of, whole_of
+from airtouch.gap.spectra import OVERLAP_WEIGHT, REST, blocks, frequencies
 
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 CHANNELS = 9  #: that are regressed: force, torque, rate
@@ -97,11 +97,8 @@ class _Half:
 
     def __init__(self, data: Data, part: Part, terms: Sequence[Term]) -> None:
         self.problem = problem = problem_of(data, part)
-        random = [t for t in terms if t.kind == SPECTRUM]
-        mean = [t.active() for t in terms if t.kind == MEAN]
-        told, _ = problem.commanded([*mean, *(t.active() for t in random)], bool(random))
-        self.values = problem.values(mean)
-        self.power = problem.power + problem.random_power(random) + told
+        self.values, added, _ = problem.modelled(terms)
+        self.power = problem.power + added
         self.groups = bands_of(problem)
         kept = problem.__dict__.setdefault("_cells", [])
         if not kept:
@@ -237,9 +234,7 @@ def _perhaps(gain: np.ndarray | float) -> np.ndarray:
 
 def usual_of(data: Data) -> Usual:
     """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
-    parts = [Part(tuple((i, r, np.ones(len(first[r]), bool)) for r in (AIR, REST) if len(first[r])))
-             for i, first in enumerate(data.first)]
-    halves = [_Half(data, p, ()) for p in parts]
+    halves = [_Half(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
     n = len(halves)
     if n < 2:
         return nothing_usual()

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.special import exp1
 
 from airtouch.gap import random_effects
-from airtouch.gap.candidates import Term
+from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.data import Data, spectra
 from airtouch.gap.response import FIRST_BIN
@@ -94,6 +94,13 @@ class Problem:
         power, cost = self.twin.power(active, wide)
         return np.concatenate([self._doubt(active), power - self.twin.floor]), cost
 
+    def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
+        """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
+        random = [t for t in terms if t.kind == SPECTRUM]
+        mean = [t.active() for t in terms if t.kind == MEAN]
+        told, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
+        return self.values(mean), self.random_power(random) + told, cost
+
     def _doubt(self, active: Sequence[Active]) -> np.ndarray:
         """Power (own,) of what the loop model may be wrong by in the torque that it changes."""
         law = self.data.study.controller
@@ -153,6 +160,13 @@ def tail(freedom: np.ndarray) -> np.ndarray:
 @functools.cache
 def _tail(nu: float) -> float:
     return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
+
+
+def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
+    """Every block of every flight, or of the flights of these numbers."""
+    chosen = range(len(data.flights)) if flights is None else flights
+    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in chosen for r in (AIR, REST)
+                      if len(data.first[i][r])))
 
 
 def problem_of(data: Data, part: Part) -> Problem:

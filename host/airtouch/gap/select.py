@@ -15,8 +15,8 @@ from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, twi
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over
-from airtouch.gap.problem import Part
 from airtouch.gap.generic import generic_gain
+from airtouch.gap.problem import Part
 from airtouch.gap.screen import Screen, first_order
 from airtouch.gap.spectra import AIR, REST
 from airtouch.gap.twin import COMMAND_ONLY
@@ -193,15 +193,15 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
                 continue
             choice = np.log(sum(len(v) == len(terms) for v in variants))  # among so many; else many would beat one
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
-                gain, start = first_order(screen, parts, left, added, terms, held)
-                looked.append(Judged(name, (*held, *terms), before + gain - _price(terms) - choice, full=False))
+                gain, _ = first_order(screen, parts, left, added, terms, held)
+                gain += before - _price(terms) - choice
+                looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
                 hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
     looked = _best_variants(looked)
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
-    fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen,
-                       np.log(sum(len(v) == len(j.terms) - len(held) for v in candidates[j.name]))) for j in worth]
+    fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen, j.choice) for j in worth]
     best: dict[str, Judged] = {}
     for j in (*sure, *fitted, *(j for j in looked if j not in worth)):
         old = best.get(j.name)

@@ -8,6 +8,7 @@ then multiplies them by the ratio of the modelled spectra with and without it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,7 +88,7 @@ class Twin:
 
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
-        row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
+        row = self._row(active)
         key = tuple(np.round(np.concatenate([np.ravel(row[k]) for k in FIELDS]), 12))
         kept = self.__dict__.setdefault("_kept", {})
         if key not in kept:
@@ -101,9 +102,9 @@ class Twin:
 
         A controller no faster than the log folds nothing: there the motors alone count.
         """
-        if not self.changes_loop(active):
+        row, first = self._row(active), self._plain
+        if _same_loop(row, first):
             return None
-        row, first = (prepare(self.vehicle, c)[0][0] for c in ((*self.calibration, *active), self.calibration))
         after, before = self._shares(row, f), self._shares(first, f)
         share = after / before if self.by_firmware else np.ones_like(before)
         motors = torque_per_command(row, AXES[1], f) / torque_per_command(first, AXES[1], f)
@@ -111,8 +112,15 @@ class Twin:
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
-        row, first = (prepare(self.vehicle, c)[0][0] for c in ((*self.calibration, *active), self.calibration))
-        return not all(np.array_equal(row[k], first[k]) for k in LOOP_FIELDS)
+        return not _same_loop(self._row(active), self._plain)
+
+    @cached_property
+    def _plain(self) -> Any:
+        """Plant row of the vehicle as calibrated."""
+        return self._row(())
+
+    def _row(self, active: Sequence[Active]) -> Any:
+        return prepare(self.vehicle, (*self.calibration, *active))[0][0]
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
         """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""
@@ -143,11 +151,11 @@ class Twin:
         return np.fft.irfft(spectrum, len(told), axis=0)
 
     def _gyro_noise(self) -> np.ndarray:
-        return np.maximum(prepare(self.vehicle, self.calibration)[0][0]["gyro_noise"], 1e-9)
+        return np.maximum(self._plain["gyro_noise"], 1e-9)
 
     def _nominal(self) -> np.ndarray:
         if "_base" not in self.__dict__:
-            self.__dict__["_base"] = self._power(prepare(self.vehicle, self.calibration)[0][0])
+            self.__dict__["_base"] = self._power(self._plain)
         return self.__dict__["_base"]
 
     def _power(self, row: Any) -> np.ndarray:
@@ -162,6 +170,11 @@ class Twin:
             beyond = excess_phase(controller, row, axis)
             made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
         return np.stack([through_window(m) for m in made], axis=1)
+
+
+def _same_loop(one: Any, two: Any) -> bool:
+    """Whether two plant rows have the same roll and pitch loops."""
+    return all(np.array_equal(one[k], two[k]) for k in LOOP_FIELDS)
 
 
 def frequencies() -> np.ndarray:

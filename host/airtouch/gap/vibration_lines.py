@@ -29,7 +29,7 @@ RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
 LOWEST_HZ = 3.0  #: below it forces of other origin are strong
 STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power over the floor's
 MOST_BLOCKS = 40  #: on which the place is looked for
-FREEDOM = 12.0  #: of the tails of a block's power, as in `fit`
+FREEDOM = 12.0  #: of the tails of a block's power, as in `problem`
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Lines:
 
 
 def lines(data: Any) -> Lines:
-    """The lines of the flights of `data` (`fit.Data`), worked out once."""
+    """The lines of the flights of `data` (`data.Data`), worked out once."""
     kept = data.__dict__.get("_lines")
     if kept is None:
         kept = data.__dict__["_lines"] = _found(data)
