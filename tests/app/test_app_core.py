@@ -11,7 +11,8 @@ from airtouch.detector import best, paper
 from airtouch.detector.channels import level_acceleration
 from airtouch.detector.features import pipeline
 from airtouch.errors import AirTouchError
-from airtouch.kernels.app_core import DETECTORS, HEALTH, LINK, PARAMS, AppCore, Gap8Core
+from airtouch.kernels.app_core import DETECTORS, HEALTH, LINK, PARAM_TYPES, PARAMS, AppCore, Gap8Core
+from airtouch.kernels.library import call, ffi
 from airtouch.logs import read
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch import vehicle as vehicles
@@ -181,7 +182,8 @@ def test_values_that_are_not_finite_do_not_stay(flight, value):
 
 OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 3), "filter": (3, 2), "bandMid": (1e9, 48.0),
                 "bandWidth": (50.0, 2.0), "pFa": (0.0, 1e-12), "probabilityIn": (7.0, 0.99),
-                "probabilityOut": (0.95, 0.89), "scoreIn": (99.0, 12.0), "scoreOut": (-99.0, -8.0)}
+                "probabilityOut": (0.95, 0.89), "scoreIn": (99.0, 12.0), "scoreOut": (-99.0, -8.0),
+                "probabilityDwell": (0, 10), "alertHold": (60_000, 1000)}
 
 
 @pytest.mark.parametrize("name", PARAMS)
@@ -263,9 +265,29 @@ def test_decoding_of_paper_is_that_of_the_shipped_model():
     core = AppCore().params()
     assert core["probabilityIn"] == pytest.approx(settings.probability_entry)
     assert core["probabilityOut"] == pytest.approx(settings.probability_exit)
-    header = (Path(__file__).parents[2] / "firmware/app/src/app_core.h").read_text()
-    assert f"APP_PAPER_DWELL_SAMPLES {settings.dwell_samples}\n" in header
-    assert f"APP_PAPER_ALERT_HOLD {settings.alert_hold}\n" in header
+    assert (core["probabilityDwell"], core["alertHold"]) == (settings.dwell_samples, settings.alert_hold)
+
+
+def test_settings_are_compared_field_by_field_and_nothing_between_them_counts():
+    size = ffi.sizeof("appParams_t")
+    one, other = ffi.new("appParams_t *"), ffi.new("appParams_t *")
+    ffi.memmove(one, b"\x00" * size, size)
+    ffi.memmove(other, b"\xff" * size, size)  # what lies between the fields differs
+    for name in PARAMS:
+        setattr(one, name, 1)
+        setattr(other, name, 1)
+    assert call("appHostSame")(one, other)
+    for name, kind in PARAM_TYPES.items():
+        setattr(other, name, 2)
+        assert not call("appHostSame")(one, other), name
+        setattr(other, name, 1)
+        if kind == "float":  # else what was put right is never written back, and counts again each step
+            setattr(one, name, np.nan)
+            setattr(other, name, np.nan)
+            assert call("appHostSame")(one, other), name
+            setattr(one, name, 1)
+            assert not call("appHostSame")(one, other), name
+            setattr(other, name, 1)
 
 
 def test_recorded_flights_give_the_same_edges_on_both_processors(flights):

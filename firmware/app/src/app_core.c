@@ -26,6 +26,8 @@ static bool filters(const appCore_t *core) {
 static void setThresholds(appCore_t *core) {
   core->pipeline.config.probabilityEntry = core->params.probabilityIn;
   core->pipeline.config.probabilityExit = core->params.probabilityOut;
+  core->pipeline.config.dwellSamples = core->params.probabilityDwell;
+  core->pipeline.config.alertHold = core->params.alertHold;
   core->pipeline.config.physicalFilter = filters(core);
   core->best.decoder.config.entryScore = core->params.scoreIn;
   core->best.decoder.config.exitScore = core->params.scoreOut;
@@ -37,8 +39,6 @@ static void beginPipeline(appCore_t *core) {
   config.lowHz = core->params.bandMid - 0.5f * core->params.bandWidth;
   config.highHz = core->params.bandMid + 0.5f * core->params.bandWidth;
   config.pFa = core->params.pFa;
-  config.dwellSamples = APP_PAPER_DWELL_SAMPLES;
-  config.alertHold = APP_PAPER_ALERT_HOLD;
   edgePipelineInit(&core->pipeline, &config);
   core->nonFinite = 0;
 }

@@ -23,12 +23,6 @@
 #define APP_ANSWER_STEPS 50      ///< an answer of the GAP8 that is older says nothing of now
 #define APP_EVENTS 4             ///< kinds of them
 
-/** How the shipped `paper` model was tuned (host/airtouch/models/paper.npz). */
-#define APP_PAPER_PROBABILITY_IN 0.9f
-#define APP_PAPER_PROBABILITY_OUT 0.2f
-#define APP_PAPER_DWELL_SAMPLES 150
-#define APP_PAPER_ALERT_HOLD 100
-
 /** appParams_t.detector. */
 typedef enum {
   APP_CFAR = 0,        ///< FR-CFAR alone, on the STM32: edges of unknown kind
@@ -89,6 +83,9 @@ void appParamsDefaults(appParams_t *params);
  * @return how many were changed
  */
 uint16_t appParamsClamp(appParams_t *params);
+
+/** Whether every setting is the same, to the bit: a NaN is the same as itself, and bytes between fields do not count. */
+bool appParamsSame(const appParams_t *one, const appParams_t *other);
 
 /**
  * Sets the app up.

@@ -27,6 +27,7 @@ HEALTH = {  #: bits of the log variable `health`
 }
 PACKETS = 2  #: packets that the app sends in a step, at most
 UNKNOWN = (np.nan,) * 4
+MOST = {"uint8_t": 255, "uint16_t": 65_535}  #: of the integer parameters
 
 
 class AppCore:
@@ -88,8 +89,8 @@ class AppCore:
         for name, value in changes.items():
             if name not in PARAMS:
                 raise AirTouchError(f"airtouch.{name}: no such parameter; known: {', '.join(PARAMS)}")
-            byte = dict(ffi.typeof("appParams_t").fields)[name].type.cname == "uint8_t"
-            setattr(self._params, name, int(np.clip(value, 0, 255)) if byte else float(value))
+            most = MOST.get(PARAM_TYPES[name])
+            setattr(self._params, name, float(value) if most is None else int(np.clip(value, 0, most)))
 
 
 class Gap8Core:
@@ -115,5 +116,7 @@ class Gap8Core:
         return bytes(ffi.buffer(self._packet, length))
 
 
-PARAMS = tuple(name for name, _ in ffi.typeof("appParams_t").fields)  #: the PARAM group
+#: C type of each field of appParams_t, which is the PARAM group
+PARAM_TYPES = {name: field.type.cname for name, field in ffi.typeof("appParams_t").fields}
+PARAMS = tuple(PARAM_TYPES)
 LOGS = tuple(name for name, _ in ffi.typeof("appLog_t").fields)  #: the LOG group; feature, force, logit are arrays

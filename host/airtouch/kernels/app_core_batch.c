@@ -13,6 +13,8 @@ void appHostDefaults(appParams_t *params) { appParamsDefaults(params); }
 
 uint16_t appHostClamp(appParams_t *params) { return appParamsClamp(params); }
 
+int appHostSame(const appParams_t *one, const appParams_t *other) { return appParamsSame(one, other); }
+
 void appHostInit(void *core, const appParams_t *params, int haveGap8, uint32_t nonce) {
   appCoreInit(core, params, haveGap8 != 0, nonce);
 }

@@ -11,6 +11,8 @@ int64_t appHostPacketBytes(void);
 /** The shipped settings; and settings put right, @return how many were changed. */
 void appHostDefaults(appParams_t *params);
 uint16_t appHostClamp(appParams_t *params);
+/** Whether two settings are the same. */
+int appHostSame(const appParams_t *one, const appParams_t *other);
 /** See app_core.h. */
 void appHostInit(void *core, const appParams_t *params, int haveGap8, uint32_t nonce);
 uint16_t appHostSetParams(void *core, appParams_t *params);

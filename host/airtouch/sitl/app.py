@@ -5,7 +5,7 @@ The names and types of the LOG and PARAM group are those of firmware/app/src/air
 
 from collections.abc import Sequence
 
-from airtouch.kernels.app_core import AppCore, Gap8Core
+from airtouch.kernels.app_core import PARAM_TYPES, AppCore, Gap8Core
 from airtouch.sitl.param_service import Parameter
 
 GROUP = "airtouch"
@@ -33,9 +33,8 @@ LOGS: dict[str, tuple[str, str, int]] = {
 PARAMS = {
     "enable": "enable", "detector": "detector", "filter": "filter", "bandMid": "bandMid",
     "bandWidth": "bandWidth", "pFa": "pFa", "probIn": "probabilityIn", "probOut": "probabilityOut",
-    "scoreIn": "scoreIn", "scoreOut": "scoreOut",
+    "scoreIn": "scoreIn", "scoreOut": "scoreOut", "probDwell": "probabilityDwell", "alertHold": "alertHold",
 }
-BYTES = ("enable", "detector", "filter")  #: parameters of type uint8_t, the others are float
 
 
 class App:
@@ -50,7 +49,7 @@ class App:
     def parameters(self) -> list[Parameter]:
         """The PARAM group with the values in force."""
         values = self._core.params()
-        return [Parameter(f"{GROUP}.{name}", "uint8_t" if name in BYTES else "float", values[field])
+        return [Parameter(f"{GROUP}.{name}", PARAM_TYPES[field], values[field])
                 for name, field in PARAMS.items()]
 
     def set(self, name: str, value: float) -> float:
