@@ -78,6 +78,21 @@ def test_best_on_the_gap8_gives_the_same_edges_a_sample_later(flight, best_edges
     assert LINK[drone.app.log.link] == "up" and drone.app.log.lost == 0
 
 
+def test_nothing_goes_to_the_gap8_unless_a_detector_asks_for_it(flight, best_edges):
+    _, acc, gyro, pwm = flight
+    app, gap8, found = AppCore(have_gap8=True), Gap8Core(), []
+    for i in range(len(acc)):
+        kind = app.step(acc[i], gyro[i], pwm[i])
+        found += [(i, kind)] if kind != "none" else []
+        assert list(app.packets()) == []
+        if i % 50 == 0:
+            app.receive(gap8.heartbeat(10 * i))
+    assert DETECTORS[int(app.params()["detector"])] == "best" and found == best_edges and app.log.health == 0
+    app.set_params(detector=DETECTORS.index("best-gap8"))
+    app.step(acc[0], gyro[0], pwm[0])
+    assert len(list(app.packets())) == 1
+
+
 def test_a_third_of_the_packets_lost_delays_edges_and_changes_none(flight, best_edges):
     drone = Drone("best-gap8", loss=0.3, seed=1)
     found = drone.fly(flight)
@@ -297,6 +312,15 @@ def test_recorded_flights_give_the_same_edges_on_both_processors(flights):
         edges = [(d.sample, d.kind) for d in best.run(log).edges]
         assert Drone("best").fly(flight) == edges
         assert Drone("best-gap8").fly(flight) == [(i + 1, kind) for i, kind in edges]
+
+
+@pytest.mark.parametrize("now, last, stalled", [
+    (1000, 1000, 0), (1050, 1000, 0), (1051, 1000, 1), (90_000, 1000, 1),
+    (1000, 1001, 0), (1000, 1060, 0),  # the step ended after the clock was read
+    (20, 2**32 - 30, 0), (21, 2**32 - 30, 1), (2**32 - 1, 3, 0),  # ticks wrap
+    (40, 0, 0), (60, 0, 1)])  # no step yet
+def test_an_old_tick_is_no_stalled_app(now, last, stalled):
+    assert call("appHostStalled")(now, last, 50) == stalled
 
 
 def test_load_and_late_steps_are_logged():

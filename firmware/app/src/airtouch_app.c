@@ -147,8 +147,8 @@ void appMain(void) {
 static uint16_t healthNow(uint32_t timestamp, void *data) {
   (void)timestamp;
   (void)data;
-  const bool stalled = xTaskGetTickCount() - lastStep > STALLED;
-  return (uint16_t)(core.log.health | (stalled ? APP_STALLED : 0));
+  const TickType_t now = xTaskGetTickCount();  // first: a step may end between the two
+  return (uint16_t)(core.log.health | (appStalled(now, lastStep, STALLED) ? APP_STALLED : 0));
 }
 
 static logByFunction_t healthLogger = {.acquireUInt16 = healthNow};

@@ -282,3 +282,8 @@ void appCoreTime(appCore_t *core, uint32_t microseconds, bool late) {
 }
 
 void appCoreNoSensor(appCore_t *core) { core->noSensor = true; }
+
+bool appStalled(uint32_t now, uint32_t lastStep, uint32_t limit) {
+  const int32_t age = (int32_t)(now - lastStep);
+  return age > 0 && (uint32_t)age > limit;
+}

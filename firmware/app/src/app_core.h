@@ -128,3 +128,9 @@ void appCoreTime(appCore_t *core, uint32_t microseconds, bool late);
 
 /** The firmware lacks a log variable that the app needs. */
 void appCoreNoSensor(appCore_t *core);
+
+/**
+ * Whether the last step ended more than @p limit ticks before @p now. Ticks wrap. A step that ended after
+ * @p now was read is new: read the clock first, then the step's time.
+ */
+bool appStalled(uint32_t now, uint32_t lastStep, uint32_t limit);

@@ -8,7 +8,7 @@
 void appParamsDefaults(appParams_t *params) {
   *params = (appParams_t){
       .enable = 1,
-      .detector = APP_BEST_GAP8,
+      .detector = APP_BEST,
       .filter = APP_FILTER_AS_TRAINED,
       .bandMid = 0.5f * (AIRTOUCH_BAND_LOW_HZ + AIRTOUCH_BAND_HIGH_HZ),
       .bandWidth = AIRTOUCH_BAND_HIGH_HZ - AIRTOUCH_BAND_LOW_HZ,

@@ -35,6 +35,8 @@ void appHostSent(void *core, int taken) { appCoreSent(core, taken != 0); }
 
 void appHostTime(void *core, uint32_t microseconds, int late) { appCoreTime(core, microseconds, late != 0); }
 
+int appHostStalled(uint32_t now, uint32_t lastStep, uint32_t limit) { return appStalled(now, lastStep, limit); }
+
 void gap8HostInit(void *core) { gap8CoreInit(core, &airtouchStream, &airtouchNetwork, NULL); }
 
 uint16_t gap8HostTake(void *core, const uint8_t *bytes, uint16_t length, uint8_t *reply) {

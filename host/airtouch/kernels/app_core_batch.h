@@ -21,6 +21,7 @@ void appHostReceive(void *core, const uint8_t *bytes, uint16_t length);
 uint16_t appHostOutgoing(void *core, uint8_t *bytes);
 void appHostSent(void *core, int taken);
 void appHostTime(void *core, uint32_t microseconds, int late);
+int appHostStalled(uint32_t now, uint32_t lastStep, uint32_t limit);
 /** See gap8_core.h; the networks are those of gap8/model. */
 void gap8HostInit(void *core);
 uint16_t gap8HostTake(void *core, const uint8_t *bytes, uint16_t length, uint8_t *reply);

@@ -45,6 +45,7 @@ class App:
         self._gap8 = Gap8Core() if have_gap8 else None
         self._booted_s = self._beat_s = 0.0
         self.gap8_silent = False
+        self.sent = 0  #: packets to the GAP8 so far; none unless the parameter `detector` asks for it
 
     def parameters(self) -> list[Parameter]:
         """The PARAM group with the values in force."""
@@ -83,6 +84,7 @@ class App:
         edge = self._core.step(acc_world, gyro, pwm, vbat_v=vbat_v, attitude=attitude)
         answering = self._gap8 is not None and not self.gap8_silent and now_s >= self._booted_s
         for sent in self._core.packets():
+            self.sent += 1
             reply = self._gap8.take(sent) if answering else b""
             if reply:
                 self._core.receive(reply)
