@@ -33,6 +33,19 @@ void edgePipelineDefaults(edgePipelineConfig_t *config, const airtouchVehicle_t 
   config->vehicle = *vehicle;
 }
 
+/** The band power of the settings, without a past. */
+static bool beginBand(edgePipeline_t *pipeline) {
+  const edgePipelineConfig_t *config = &pipeline->config;
+  for (int c = 0; c < EDGE_PIPELINE_CHANNELS; c++) {
+    pipeline->bandPower[c] = NAN;
+  }
+  for (int s = 0; s < EDGE_PIPELINE_SENSORS; s++) {
+    pipeline->features[s] = NAN;
+  }
+  return bandPowerInit(&pipeline->band, config->sampleRateHz, config->window, config->lowHz, config->highHz,
+                       config->hop, EDGE_PIPELINE_CHANNELS, pipeline->bandStorage, EDGE_PIPELINE_BAND_FLOATS);
+}
+
 bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *config) {
   memset(pipeline, 0, sizeof(*pipeline));
   pipeline->config = *config;
@@ -40,20 +53,32 @@ bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *conf
   pipeline->voltageFactor = 1.0f;
   pipeline->sinceAlert = EDGE_NEVER;
   pipeline->sinceEdge = EDGE_NEVER;
-  for (int c = 0; c < EDGE_PIPELINE_CHANNELS; c++) {
-    pipeline->bandPower[c] = NAN;
-  }
-  for (int s = 0; s < EDGE_PIPELINE_SENSORS; s++) {
-    pipeline->features[s] = NAN;
-  }
   if (!(config->forceMeanSamples > 0.0f) || !isfinite(config->forceMeanSamples)) {
     return false;
   }
   exponentialMeanInit(&pipeline->forceMean, config->forceMeanSamples);
-  return bandPowerInit(&pipeline->band, config->sampleRateHz, config->window, config->lowHz, config->highHz,
-                       config->hop, EDGE_PIPELINE_CHANNELS, pipeline->bandStorage, EDGE_PIPELINE_BAND_FLOATS) &&
-         frCfarInit(&pipeline->cfar, config->leadingWindow, config->guardCells, config->pFa,
-                    pipeline->cfarStorage, EDGE_PIPELINE_MAX_CELLS);
+  return beginBand(pipeline) && frCfarInit(&pipeline->cfar, config->leadingWindow, config->guardCells, config->pFa,
+                                           pipeline->cfarStorage, EDGE_PIPELINE_MAX_CELLS);
+}
+
+bool edgePipelineSetBand(edgePipeline_t *pipeline, float lowHz, float highHz) {
+  edgePipelineConfig_t *config = &pipeline->config;
+  const size_t bins = bandPowerBins(config->sampleRateHz, config->window, lowHz, highHz, NULL);
+  const size_t floats = BAND_POWER_FLOATS((size_t)config->window, (size_t)EDGE_PIPELINE_CHANNELS, bins);
+  if (bins == 0 || floats > EDGE_PIPELINE_BAND_FLOATS) {
+    return false;
+  }
+  config->lowHz = lowHz;
+  config->highHz = highHz;
+  return beginBand(pipeline);
+}
+
+bool edgePipelineSetFalseAlarm(edgePipeline_t *pipeline, float pFa) {
+  if (!frCfarSetFalseAlarm(&pipeline->cfar, pFa)) {
+    return false;
+  }
+  pipeline->config.pFa = pFa;
+  return true;
 }
 
 /** Keeps the finite ones of @p count values; returns how many were not. */

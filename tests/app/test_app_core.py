@@ -229,6 +229,70 @@ def test_another_band_is_another_power(flight):
     assert drone.app.log.feature[0] != other.app.log.feature[0]
 
 
+CHANGES = {300: {"pFa": 1e-3}, 420: {"bandMid": 3.0}, 640: {"bandWidth": 1.0}, 700: {"pFa": 1e-9}, 701: {"bandMid": 20.0},
+           1500: {"pFa": 1e-6, "bandMid": 7.0, "bandWidth": 2.0}}
+
+
+def said(drone, flight, changes):
+    """Edges, logits, thresholds and alerts of a flight with changes of parameters, step by step."""
+    _, acc, gyro, pwm = flight
+    rows, edges = [], []
+    for i in range(len(acc)):
+        if i in changes:
+            assert drone.app.set_params(**changes[i]) == 0
+        kind = drone.step(acc[i], gyro[i], pwm[i])
+        edges += [(i, kind)] if kind != "none" else []
+        log = drone.app.log
+        rows.append([*log.logit, log.probability, log.answers, log.threshold, log.alert])
+    return edges, np.array(rows)
+
+
+@pytest.mark.parametrize("detector, gap8", [("best", {}), ("best", {"have_gap8": False}), ("best-gap8", {}),
+                                            ("best-gap8", {"answers": False}), ("best-gap8", {"have_gap8": False})],
+                         ids=["stm32", "stm32-no-deck", "gap8", "silent-gap8", "no-gap8"])
+def test_band_and_false_alarms_change_nothing_of_best(flight, best_edges, detector, gap8):
+    edges, rows = said(Drone(detector, **gap8), flight, CHANGES)
+    usual, usual_rows = said(Drone(detector, **gap8), flight, {})
+    assert edges == usual and [kind for _, kind in edges] == [kind for _, kind in best_edges]
+    np.testing.assert_array_equal(rows[:, :5], usual_rows[:, :5])
+
+
+def test_another_false_alarm_probability_is_in_force_at_once(flight):
+    changed = said(Drone("cfar"), flight, {900: {"pFa": 1e-3}})[1]
+    before, after = said(Drone("cfar"), flight, {})[1], said(Drone("cfar"), flight, {0: {"pFa": 1e-3}})[1]
+    np.testing.assert_array_equal(changed[:900, 5:], before[:900, 5:])
+    np.testing.assert_array_equal(changed[900:, 5:], after[900:, 5:])
+    assert np.all(after[100:, 5] < before[100:, 5])
+
+
+def test_another_band_leaves_the_threshold_alone(flight):
+    changes = {at: change for at, change in CHANGES.items() if "pFa" not in change}
+    np.testing.assert_array_equal(said(Drone("cfar"), flight, changes)[1][:, 5:], said(Drone("cfar"), flight, {})[1][:, 5:])
+
+
+def test_another_band_begins_the_paper_pipeline_anew_and_false_alarms_do_not(flight):
+    usual = said(Drone("paper-gap8"), flight, {})[1][:, 3]
+    np.testing.assert_array_equal(said(Drone("paper-gap8"), flight, {900: {"pFa": 1e-3}})[1][:, 3], usual)
+    changed = said(Drone("paper-gap8"), flight, {900: {"bandMid": 5.0}})[1][:, 3]
+    later = tuple(x[900:] for x in flight[1:])
+    fresh = said(Drone("paper-gap8"), (None, *later), {0: {"bandMid": 5.0}})[1][:, 3]
+    np.testing.assert_array_equal(changed[:900], usual[:900])
+    assert np.isnan(changed[900:900 + 299]).all() and np.isfinite(changed[900 + 310:]).all()
+    known = np.isfinite(changed[900:]) & np.isfinite(fresh)
+    assert known.sum() > 100
+    np.testing.assert_allclose(changed[900:][known], fresh[known], atol=0.02)
+
+
+def test_a_change_in_a_recorded_flight_with_a_silent_gap8_loses_no_edge(flights):
+    path = sorted((flights / "airtouch").glob("imu_data_02*h79*"))[0]
+    log = read(path)
+    flight = log, level_acceleration(log), log.stack(GYRO), log.stack(PWM)
+    edges = [(d.sample, d.kind) for d in best.run(log).edges]
+    first = edges[0][0]
+    changes = {first - 200: {"pFa": 1e-5}, first - 100: {"bandMid": 6.0}}
+    assert len(edges) >= 2 and said(Drone("best-gap8", answers=False), flight, changes)[0] == edges
+
+
 def test_switched_off_it_sends_and_finds_nothing_and_comes_back(flight):
     drone = Drone("best-gap8")
     drone.fly(flight, stop=500)

@@ -33,16 +33,21 @@ static void setThresholds(appCore_t *core) {
   core->best.decoder.config.exitScore = core->params.scoreOut;
 }
 
+static float bandLow(const appParams_t *params) { return params->bandMid - 0.5f * params->bandWidth; }
+
+static float bandHigh(const appParams_t *params) { return params->bandMid + 0.5f * params->bandWidth; }
+
 static void beginPipeline(appCore_t *core) {
   edgePipelineConfig_t config;
   edgePipelineDefaults(&config, &airtouchStreamMotion.vehicle);
-  config.lowHz = core->params.bandMid - 0.5f * core->params.bandWidth;
-  config.highHz = core->params.bandMid + 0.5f * core->params.bandWidth;
+  config.lowHz = bandLow(&core->params);
+  config.highHz = bandHigh(&core->params);
   config.pFa = core->params.pFa;
   edgePipelineInit(&core->pipeline, &config);
   core->nonFinite = 0;
 }
 
+/** A new stream: its samples count from 0 anew, so a run of the network over the old one's ends with it. */
 static void beginLink(appCore_t *core) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
   const bool paper = core->detector == APP_PAPER_GAP8;
@@ -53,6 +58,7 @@ static void beginLink(appCore_t *core) {
   const linkCounters_t counters = core->link.counters;
   linkSenderInit(&core->link, paper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, refill, core->nonce, session);
   core->link.counters = counters;
+  core->local = (appLocal_t){0};
 }
 
 /** Kernels, detector and stream begin anew; counters stay. */
@@ -68,7 +74,6 @@ static void begin(appCore_t *core) {
   streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
                      &airtouchStreamDecoder, core->arena);
   beginLink(core);
-  core->local = (appLocal_t){0};
   setThresholds(core);
 }
 
@@ -86,6 +91,16 @@ void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint
   begin(core);
 }
 
+/** The network of `paper` sees the band's features: with another band its stream begins anew. `best` uses no band. */
+static void changeBand(appCore_t *core) {
+  edgePipelineSetBand(&core->pipeline, bandLow(&core->params), bandHigh(&core->params));
+  if (core->detector == APP_PAPER_GAP8) {
+    core->probability = NAN;
+    core->log.probability = NAN;
+    beginLink(core);
+  }
+}
+
 uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   const appParams_t old = core->params;
   const uint16_t errors = appParamsClamp(params);
@@ -96,9 +111,13 @@ uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   core->params = *params;
   if (params->detector != old.detector || params->enable != old.enable) {
     begin(core);
-  } else if (params->bandMid != old.bandMid || params->bandWidth != old.bandWidth || params->pFa != old.pFa) {
-    beginPipeline(core);
-    beginLink(core);
+    return errors;
+  }
+  if (params->bandMid != old.bandMid || params->bandWidth != old.bandWidth) {
+    changeBand(core);
+  }
+  if (params->pFa != old.pFa) {
+    edgePipelineSetFalseAlarm(&core->pipeline, params->pFa);
   }
   setThresholds(core);
   return errors;

@@ -97,8 +97,9 @@ bool appParamsSame(const appParams_t *one, const appParams_t *other);
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce);
 
 /**
- * Changes settings between two steps. Another band or false-alarm probability makes the kernels
- * begin anew, about 0.5 ms; another detector begins a new stream; the counters stay.
+ * Changes settings between two steps. What uses a setting begins anew, nothing else: another band the band power
+ * (features are unknown for 2 s, about 0.5 ms) and the stream of `paper`; another detector all of it; another
+ * false-alarm probability is in force at once. The counters stay.
  * @param params  receives what is in force
  * @return how many were out of range and put right
  */

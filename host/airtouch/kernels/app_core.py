@@ -70,7 +70,7 @@ class AppCore:
 
     def receive(self, packet: bytes) -> None:
         """What came from the GAP8: any bytes."""
-        call("appHostReceive")(self._memory, packet, len(packet))
+        call("appHostReceive")(self._memory, packet, min(len(packet), 0xFFFF))
 
     def params(self) -> dict[str, float]:
         """The settings in force."""
@@ -107,7 +107,7 @@ class Gap8Core:
 
     def take(self, packet: bytes) -> bytes:
         """The reply to what came from the STM32: any bytes; empty for none."""
-        length = call("gap8HostTake")(self._memory, packet, len(packet), self._packet)
+        length = call("gap8HostTake")(self._memory, packet, min(len(packet), 0xFFFF), self._packet)
         return bytes(ffi.buffer(self._packet, length))
 
     def heartbeat(self, uptime_ms: int) -> bytes:
