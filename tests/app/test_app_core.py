@@ -83,6 +83,40 @@ def test_without_an_ai_deck_the_same_detector_runs_on_the_stm32(flight, best_edg
     assert DETECTORS[drone.app.log.detector] == "cfar"
 
 
+@pytest.mark.parametrize("horizontal", [0.0, 0.25], ids=["none", "frozen"])
+def test_an_estimator_without_horizontal_acceleration_is_said_after_a_second_of_flight(flight, horizontal):
+    _, acc, gyro, pwm = flight
+    acc = acc.copy()
+    acc[:, :2] = horizontal  # the complementary estimator never sets it
+    flies = pwm.mean(axis=1) > 15_000
+    took_off = int(np.argmax(flies))
+    assert flies[took_off:took_off + 400].all()
+    for in_body in (False, True):
+        app = AppCore({"detector": 1})
+        flagged = []
+        for i in range(took_off + 400):
+            app.step(acc[i], gyro[i], pwm[i], acc_in_body=in_body)
+            flagged.append(bool(app.log.health & HEALTH["no horizontal"]))
+        assert flagged == [not in_body and i >= took_off + 99 for i in range(took_off + 400)]
+    app = AppCore({"detector": 1})
+    for i in range(took_off, took_off + 200):
+        app.step(acc[i], gyro[i], pwm[i])
+    assert app.log.health == HEALTH["no horizontal"]
+    app.step(flight[1][i], gyro[i], pwm[i])
+    assert app.log.health == 0
+    for _ in range(200):
+        app.step(acc[0], gyro[0], (0.0,) * 4)  # on the ground nothing moves
+    assert app.log.health == 0
+
+
+def test_a_flight_is_healthy_at_every_step(flight):
+    _, acc, gyro, pwm = flight
+    app = AppCore()
+    for i in range(len(acc)):
+        app.step(acc[i], gyro[i], pwm[i])
+        assert app.log.health == 0
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e38])
 def test_values_that_are_not_finite_do_not_stay(flight, value):
     _, acc, gyro, pwm = flight

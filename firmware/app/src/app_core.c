@@ -70,6 +70,7 @@ static void begin(appCore_t *core) {
   core->probability = NAN;
   core->wasAlert = false;
   core->sinceEdge = UINT16_MAX;
+  core->still = 0;
   beginPipeline(core);
   streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
                      &airtouchStreamDecoder, core->arena);
@@ -262,6 +263,17 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
   }
 }
 
+/** The complementary estimator gives no horizontal acceleration: it stays 0, or what another one gave last. */
+static void watchHorizontal(appCore_t *core, const appSample_t *sample) {
+  const bool same = sample->acc[0] == core->horizontal[0] && sample->acc[1] == core->horizontal[1];
+  if (!same || sample->accInBody || core->pipeline.airborne == 0) {
+    core->still = 0;
+  } else if (core->still < APP_STILL_STEPS) {
+    core->still++;
+  }
+  memcpy(core->horizontal, sample->acc, sizeof core->horizontal);
+}
+
 bool appCoreStep(appCore_t *core, const appSample_t *sample) {
   core->log.samples++;
   if (core->params.enable) {
@@ -271,6 +283,7 @@ bool appCoreStep(appCore_t *core, const appSample_t *sample) {
     level.probability = core->probability;
     edgePipelineStep(&core->pipeline, &level, &event);
     appLogEvent(core, &event);
+    watchHorizontal(core, sample);
     runDetector(core, &event);
     appLogLink(core);
   }

@@ -22,6 +22,7 @@
 #define APP_RECENT_STEPS 100     ///< health flags of single events stay up for so long
 #define APP_ANSWER_STEPS 50      ///< an answer of the GAP8 that is older says nothing of now
 #define APP_EVENTS 4             ///< kinds of them
+#define APP_STILL_STEPS 100      ///< of flight without a change of the horizontal acceleration, until that is a fault
 
 /** appParams_t.detector. */
 typedef enum {
@@ -50,6 +51,7 @@ typedef enum {
   APP_LATE = 128,         ///< a step began late within the last second
   APP_STALLED = 256,      ///< no step for 50 ms (set by whoever reads the log)
   APP_NO_SENSOR = 512,    ///< the firmware lacks a log variable that the app needs
+  APP_NO_HORIZONTAL = 1024, ///< horizontal acceleration stood still for a second of flight: another estimator is needed
 } appHealth_t;
 
 /** The app. It points into itself: initialise it where it stays, never copy it. */
@@ -61,6 +63,8 @@ typedef struct {
   uint32_t nonce;
   uint16_t since[APP_EVENTS];  ///< steps since the last event of each kind
   uint16_t sinceEdge;  ///< FR-CFAR alone: steps since its last edge
+  uint16_t still;      ///< steps of flight in which the horizontal acceleration has not changed
+  float horizontal[2]; ///< the last one, world axes, m/s^2
   bool wasAlert;
   bool noSensor;
   bool reported;       ///< an edge, since the last step

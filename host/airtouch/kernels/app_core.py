@@ -24,6 +24,7 @@ LINK = ("starting", "filling", "up", "down", "refused")  #: values of the log va
 HEALTH = {  #: bits of the log variable `health`
     "non-finite": 1, "link down": 2, "link filling": 4, "model refused": 8, "parameter clamped": 16,
     "no GAP8": 32, "packet dropped": 64, "late": 128, "stalled": 256, "no sensor": 512,
+    "no horizontal": 1024,
 }
 PACKETS = 2  #: packets that the app sends in a step, at most
 UNKNOWN = (np.nan,) * 4
