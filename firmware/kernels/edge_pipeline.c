@@ -8,7 +8,6 @@
 #include "sample_guard.h"
 
 #define EDGE_NEVER (UINT32_C(1) << 30)
-#define PWM_MAX 65535.0f
 
 static const uint16_t sensorAxes[EDGE_PIPELINE_SENSORS] = {3, 3, 3};
 
@@ -81,12 +80,12 @@ bool edgePipelineSetFalseAlarm(edgePipeline_t *pipeline, float pFa) {
   return true;
 }
 
-/** Keeps the finite ones of @p count values; returns how many were not. */
-static uint32_t holdFinite(const float *value, int count, float *held) {
+/** Keeps the finite ones of @p count values within +-@p limit; returns how many were not finite. */
+static uint32_t holdFinite(const float *value, int count, float limit, float *held) {
   uint32_t others = 0;
   for (int i = 0; i < count; i++) {
     others += isfinite(value[i]) ? 0u : 1u;
-    guardSample(value[i], &held[i]);
+    guardWithin(value[i], limit, &held[i]);
   }
   return others;
 }
@@ -94,12 +93,13 @@ static uint32_t holdFinite(const float *value, int count, float *held) {
 /** Keeps the finite values of @p sample in the pipeline, counts the others. */
 static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
   float *held = pipeline->held;
-  pipeline->nonFinite += holdFinite(sample->acc, 3, held) + holdFinite(sample->gyro, 3, held + 3) +
-                         holdFinite(sample->pwm, 4, held + 6);
+  pipeline->nonFinite += holdFinite(sample->acc, 3, ACC_LIMIT, held) +
+                         holdFinite(sample->gyro, 3, RATE_LIMIT, held + 3) +
+                         holdFinite(sample->pwm, 4, PWM_LIMIT, held + 6);
   for (int i = 6; i < 10; i++) {
-    held[i] = clampFloat(held[i], 0.0f, PWM_MAX);
+    held[i] = held[i] > 0.0f ? held[i] : 0.0f;
   }
-  holdFinite(sample->thrustAxis, 3, pipeline->thrustAxis);
+  holdFinite(sample->thrustAxis, 3, AXIS_LIMIT, pipeline->thrustAxis);
   if (voltageKnown(sample->vbat)) {
     pipeline->voltageFactor = voltageFactor(&pipeline->config.vehicle, sample->vbat);
   }
