@@ -4,7 +4,8 @@
 
 #include "sample_guard.h"
 
-#define PWM_MAX 65535.0f
+#define LEAST_FACTOR 0.25f
+#define MOST_FACTOR 4.0f
 
 bool voltageKnown(float vbat) { return vbat >= 0.1f && vbat <= 1000.0f; }
 
@@ -13,13 +14,13 @@ float voltageFactor(const airtouchVehicle_t *vehicle, float vbat) {
     return 1.0f;
   }
   const float ratio = vbat / vehicle->nominalVoltage;
-  return ratio * ratio;
+  return clampFloat(ratio * ratio, LEAST_FACTOR, MOST_FACTOR);
 }
 
 float totalThrust(const airtouchVehicle_t *vehicle, const float pwm[4]) {
   float thrust = 0.0f;
   for (int i = 0; i < 4; i++) {
-    const float p = clampFloat(pwm[i], 0.0f, PWM_MAX);
+    const float p = clampFloat(pwm[i], 0.0f, PWM_LIMIT);
     if (p > 0.0f) {
       thrust += vehicle->thrust[0] + p * (vehicle->thrust[1] + p * vehicle->thrust[2]);
     }

@@ -14,7 +14,7 @@
 bool voltageKnown(float vbat);
 
 /**
- * (vbat / nominal)^2.
+ * (vbat / nominal)^2, clamped to 0.25..4.
  * @return 1 when the vehicle's nominal voltage or @p vbat is unknown
  */
 float voltageFactor(const airtouchVehicle_t *vehicle, float vbat);

@@ -8,7 +8,6 @@
 #include "sample_guard.h"
 
 #define EDGE_NEVER (UINT32_C(1) << 30)
-#define PWM_MAX 65535.0f
 
 static const uint16_t sensorAxes[EDGE_PIPELINE_SENSORS] = {3, 3, 3};
 
@@ -33,6 +32,19 @@ void edgePipelineDefaults(edgePipelineConfig_t *config, const airtouchVehicle_t 
   config->vehicle = *vehicle;
 }
 
+/** The band power of the settings, without a past. */
+static bool beginBand(edgePipeline_t *pipeline) {
+  const edgePipelineConfig_t *config = &pipeline->config;
+  for (int c = 0; c < EDGE_PIPELINE_CHANNELS; c++) {
+    pipeline->bandPower[c] = NAN;
+  }
+  for (int s = 0; s < EDGE_PIPELINE_SENSORS; s++) {
+    pipeline->features[s] = NAN;
+  }
+  return bandPowerInit(&pipeline->band, config->sampleRateHz, config->window, config->lowHz, config->highHz,
+                       config->hop, EDGE_PIPELINE_CHANNELS, pipeline->bandStorage, EDGE_PIPELINE_BAND_FLOATS);
+}
+
 bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *config) {
   memset(pipeline, 0, sizeof(*pipeline));
   pipeline->config = *config;
@@ -40,28 +52,40 @@ bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *conf
   pipeline->voltageFactor = 1.0f;
   pipeline->sinceAlert = EDGE_NEVER;
   pipeline->sinceEdge = EDGE_NEVER;
-  for (int c = 0; c < EDGE_PIPELINE_CHANNELS; c++) {
-    pipeline->bandPower[c] = NAN;
-  }
-  for (int s = 0; s < EDGE_PIPELINE_SENSORS; s++) {
-    pipeline->features[s] = NAN;
-  }
   if (!(config->forceMeanSamples > 0.0f) || !isfinite(config->forceMeanSamples)) {
     return false;
   }
   exponentialMeanInit(&pipeline->forceMean, config->forceMeanSamples);
-  return bandPowerInit(&pipeline->band, config->sampleRateHz, config->window, config->lowHz, config->highHz,
-                       config->hop, EDGE_PIPELINE_CHANNELS, pipeline->bandStorage, EDGE_PIPELINE_BAND_FLOATS) &&
-         frCfarInit(&pipeline->cfar, config->leadingWindow, config->guardCells, config->pFa,
-                    pipeline->cfarStorage, EDGE_PIPELINE_MAX_CELLS);
+  return beginBand(pipeline) && frCfarInit(&pipeline->cfar, config->leadingWindow, config->guardCells, config->pFa,
+                                           pipeline->cfarStorage, EDGE_PIPELINE_MAX_CELLS);
 }
 
-/** Keeps the finite ones of @p count values; returns how many were not. */
-static uint32_t holdFinite(const float *value, int count, float *held) {
+bool edgePipelineSetBand(edgePipeline_t *pipeline, float lowHz, float highHz) {
+  edgePipelineConfig_t *config = &pipeline->config;
+  const size_t bins = bandPowerBins(config->sampleRateHz, config->window, lowHz, highHz, NULL);
+  const size_t floats = BAND_POWER_FLOATS((size_t)config->window, (size_t)EDGE_PIPELINE_CHANNELS, bins);
+  if (bins == 0 || floats > EDGE_PIPELINE_BAND_FLOATS) {
+    return false;
+  }
+  config->lowHz = lowHz;
+  config->highHz = highHz;
+  return beginBand(pipeline);
+}
+
+bool edgePipelineSetFalseAlarm(edgePipeline_t *pipeline, float pFa) {
+  if (!frCfarSetFalseAlarm(&pipeline->cfar, pFa)) {
+    return false;
+  }
+  pipeline->config.pFa = pFa;
+  return true;
+}
+
+/** Keeps the finite ones of @p count values within +-@p limit; returns how many were not finite. */
+static uint32_t holdFinite(const float *value, int count, float limit, float *held) {
   uint32_t others = 0;
   for (int i = 0; i < count; i++) {
     others += isfinite(value[i]) ? 0u : 1u;
-    guardSample(value[i], &held[i]);
+    guardWithin(value[i], limit, &held[i]);
   }
   return others;
 }
@@ -69,12 +93,13 @@ static uint32_t holdFinite(const float *value, int count, float *held) {
 /** Keeps the finite values of @p sample in the pipeline, counts the others. */
 static void takeSample(edgePipeline_t *pipeline, const edgeSample_t *sample) {
   float *held = pipeline->held;
-  pipeline->nonFinite += holdFinite(sample->acc, 3, held) + holdFinite(sample->gyro, 3, held + 3) +
-                         holdFinite(sample->pwm, 4, held + 6);
+  pipeline->nonFinite += holdFinite(sample->acc, 3, ACC_LIMIT, held) +
+                         holdFinite(sample->gyro, 3, RATE_LIMIT, held + 3) +
+                         holdFinite(sample->pwm, 4, PWM_LIMIT, held + 6);
   for (int i = 6; i < 10; i++) {
-    held[i] = clampFloat(held[i], 0.0f, PWM_MAX);
+    held[i] = held[i] > 0.0f ? held[i] : 0.0f;
   }
-  holdFinite(sample->thrustAxis, 3, pipeline->thrustAxis);
+  holdFinite(sample->thrustAxis, 3, AXIS_LIMIT, pipeline->thrustAxis);
   if (voltageKnown(sample->vbat)) {
     pipeline->voltageFactor = voltageFactor(&pipeline->config.vehicle, sample->vbat);
   }

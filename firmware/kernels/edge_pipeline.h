@@ -66,6 +66,16 @@ void edgePipelineDefaults(edgePipelineConfig_t *config, const airtouchVehicle_t 
 bool edgePipelineInit(edgePipeline_t *pipeline, const edgePipelineConfig_t *config);
 
 /**
+ * Another band: the band power begins anew, so features are NaN until a window has passed; nothing else changes.
+ * @return false, with nothing changed, for a band out of range or larger than this build's room
+ * Costs 2 N sines, as the start does.
+ */
+bool edgePipelineSetBand(edgePipeline_t *pipeline, float lowHz, float highHz);
+
+/** Another probability of false alarm, in force at once. @return false, with nothing changed, outside 0..1 */
+bool edgePipelineSetFalseAlarm(edgePipeline_t *pipeline, float pFa);
+
+/**
  * Takes one sample and says what it means.
  * @param event  every field is written
  * @return whether an edge is reported at this sample

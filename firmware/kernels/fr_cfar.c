@@ -14,14 +14,24 @@ bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, flo
                 size_t floats) {
   memset(self, 0, sizeof(*self));
   const uint32_t lag = (uint32_t)leadingWindow + guardCells;
-  if (leadingWindow == 0 || lag > MAX_CELLS || floats < lag || !(pFa >= FLT_MIN && pFa < 1.0f)) {
+  if (leadingWindow == 0 || lag > MAX_CELLS || floats < lag) {
     return false;
   }
   self->leadingWindow = leadingWindow;
   self->lag = (uint16_t)lag;
-  self->factor = exponentialLessOne(-naturalLogarithm(pFa) / (float)leadingWindow);
+  if (!frCfarSetFalseAlarm(self, pFa)) {
+    return false;
+  }
   self->ring = storage;
   frCfarReset(self);
+  return true;
+}
+
+bool frCfarSetFalseAlarm(frCfar_t *self, float pFa) {
+  if (!(pFa >= FLT_MIN && pFa < 1.0f)) {
+    return false;
+  }
+  self->factor = exponentialLessOne(-naturalLogarithm(pFa) / (float)self->leadingWindow);
   return true;
 }
 

@@ -34,6 +34,12 @@ typedef struct {
 bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, float pFa, float *storage,
                 size_t floats);
 
+/**
+ * Another probability of false alarm; the cells stay, so the next threshold is known at once.
+ * @return false, with nothing changed, outside 0..1
+ */
+bool frCfarSetFalseAlarm(frCfar_t *self, float pFa);
+
 /** Forgets every cell; keeps the settings. */
 void frCfarReset(frCfar_t *self);
 

@@ -12,12 +12,12 @@ void motionChannelsInit(motionChannels_t *motion, const motionConfig_t *config) 
 
 static void hold(motionChannels_t *motion, const float acc[3], const float gyro[3], const float pwm[4]) {
   for (int i = 0; i < 3; i++) {
-    guardSample(acc[i], &motion->held[i]);
-    guardSample(gyro[i], &motion->held[3 + i]);
+    guardWithin(acc[i], ACC_LIMIT, &motion->held[i]);
+    guardWithin(gyro[i], RATE_LIMIT, &motion->held[3 + i]);
   }
   for (int i = 0; i < 4; i++) {
-    guardSample(pwm[i], &motion->held[6 + i]);
-    motion->held[6 + i] = clampFloat(motion->held[6 + i], 0.0f, 65535.0f);
+    guardWithin(pwm[i], PWM_LIMIT, &motion->held[6 + i]);
+    motion->held[6 + i] = motion->held[6 + i] > 0.0f ? motion->held[6 + i] : 0.0f;
   }
 }
 

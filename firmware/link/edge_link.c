@@ -5,13 +5,16 @@
 #define HEADER_BYTES 8
 #define CRC_BYTES 2
 
-/** Where the next number is written or read. */
+/** Where the next number is written. */
 typedef struct {
   uint8_t *at;
 } writer_t;
 
+/** What is left to read. A read of more than that reads nothing, gives 0, and is remembered. */
 typedef struct {
   const uint8_t *at;
+  uint16_t left;
+  bool tooShort;  ///< there was less than was asked for
 } reader_t;
 
 uint16_t edgeLinkCrc(const uint8_t *bytes, uint16_t length) {
@@ -37,38 +40,50 @@ static void putBytes(writer_t *to, const void *from, uint16_t bytes) {
   to->at += bytes;
 }
 
-static uint32_t get(reader_t *from, int bytes) {
+static bool has(reader_t *from, uint16_t bytes) {
+  from->tooShort = from->tooShort || bytes > from->left;
+  return !from->tooShort;
+}
+
+static uint32_t get(reader_t *from, uint16_t bytes) {
   uint32_t value = 0;
-  for (int i = 0; i < bytes; i++) {
-    value |= (uint32_t)*from->at++ << (8 * i);
+  if (!has(from, bytes)) {
+    return 0;
   }
+  for (uint16_t i = 0; i < bytes; i++) {
+    value |= (uint32_t)from->at[i] << (8 * i);
+  }
+  from->at += bytes;
+  from->left = (uint16_t)(from->left - bytes);
   return value;
 }
 
 static void getBytes(reader_t *from, void *to, uint16_t bytes) {
-  memcpy(to, from->at, bytes);
-  from->at += bytes;
-}
-
-/** Bytes of a body whose count is known; 0 for what no body can be. */
-static uint16_t bodyBytes(uint8_t type, uint8_t count) {
-  switch (type) {
-    case EDGE_LINK_RESET:
-      return 4 + 1 + EDGE_LINK_DIGEST_BYTES;
-    case EDGE_LINK_FEATURES:
-      return count >= 1 && count <= EDGE_LINK_SAMPLES ? (uint16_t)(3 + count * EDGE_LINK_SAMPLE_BYTES) : 0;
-    case EDGE_LINK_RESULT:
-      return count <= EDGE_LINK_ANSWERS ? (uint16_t)(6 + count * (1 + EDGE_LINK_OUTPUTS)) : 0;
-    case EDGE_LINK_HEARTBEAT:
-      return 5 * 4 + 2 + EDGE_LINK_DIGEST_BYTES;
-    default:
-      return 0;
+  if (has(from, bytes)) {
+    memcpy(to, from->at, bytes);
+    from->at += bytes;
+    from->left = (uint16_t)(from->left - bytes);
   }
 }
 
-static uint8_t countOf(const edgeLinkPacket_t *packet) {
-  return packet->type == EDGE_LINK_FEATURES ? packet->features.count
-                                            : (packet->type == EDGE_LINK_RESULT ? packet->result.count : 0);
+/** The length of a body to be written; false where there is none of this type with this count. */
+static bool bodyLength(const edgeLinkPacket_t *packet, uint16_t *bytes) {
+  switch (packet->type) {
+    case EDGE_LINK_RESET:
+      *bytes = 4 + 1 + EDGE_LINK_DIGEST_BYTES;
+      return true;
+    case EDGE_LINK_FEATURES:
+      *bytes = (uint16_t)(3 + packet->features.count * EDGE_LINK_SAMPLE_BYTES);
+      return packet->features.count >= 1 && packet->features.count <= EDGE_LINK_SAMPLES;
+    case EDGE_LINK_RESULT:
+      *bytes = (uint16_t)(6 + packet->result.count * (1 + EDGE_LINK_OUTPUTS));
+      return packet->result.count <= EDGE_LINK_ANSWERS;
+    case EDGE_LINK_HEARTBEAT:
+      *bytes = 5 * 4 + 2 + EDGE_LINK_DIGEST_BYTES;
+      return true;
+    default:
+      return false;
+  }
 }
 
 static void putBody(writer_t *to, const edgeLinkPacket_t *packet) {
@@ -107,8 +122,8 @@ static void putBody(writer_t *to, const edgeLinkPacket_t *packet) {
 }
 
 uint16_t edgeLinkPack(const edgeLinkPacket_t *packet, uint8_t *bytes) {
-  const uint16_t body = bodyBytes(packet->type, countOf(packet));
-  if (body == 0) {
+  uint16_t body;
+  if (!bodyLength(packet, &body)) {
     return 0;
   }
   const uint16_t length = (uint16_t)(HEADER_BYTES + body + CRC_BYTES);
@@ -123,60 +138,84 @@ uint16_t edgeLinkPack(const edgeLinkPacket_t *packet, uint8_t *bytes) {
   return length;
 }
 
-static void getBody(reader_t *from, edgeLinkPacket_t *packet) {
-  edgeLinkHeartbeat_t *beat = &packet->heartbeat;
+/** The samples of FEATURES; false for a count that it cannot have. */
+static bool getFeatures(reader_t *from, edgeLinkFeatures_t *features) {
+  features->back = (uint16_t)get(from, 2);
+  features->count = (uint8_t)get(from, 1);
+  if (features->count < 1 || features->count > EDGE_LINK_SAMPLES) {
+    return false;
+  }
+  getBytes(from, features->sample, (uint16_t)(features->count * EDGE_LINK_SAMPLE_BYTES));
+  return true;
+}
+
+/** The answers of RESULT; false for a count that it cannot have. */
+static bool getResult(reader_t *from, edgeLinkResult_t *result) {
+  result->expected = get(from, 4);
+  result->flags = (uint8_t)get(from, 1);
+  result->count = (uint8_t)get(from, 1);
+  if (result->count > EDGE_LINK_ANSWERS) {
+    return false;
+  }
+  for (int i = 0; i < result->count; i++) {
+    result->answer[i].back = (uint8_t)get(from, 1);
+    getBytes(from, result->answer[i].output, EDGE_LINK_OUTPUTS);
+  }
+  return true;
+}
+
+static void getHeartbeat(reader_t *from, edgeLinkHeartbeat_t *beat) {
+  beat->uptimeMs = get(from, 4);
+  beat->expected = get(from, 4);
+  beat->taken = get(from, 4);
+  beat->lost = get(from, 4);
+  beat->refused = get(from, 4);
+  beat->algorithm = (uint8_t)get(from, 1);
+  beat->flags = (uint8_t)get(from, 1);
+  getBytes(from, beat->digest, EDGE_LINK_DIGEST_BYTES);
+}
+
+static void getReset(reader_t *from, edgeLinkReset_t *reset) {
+  reset->nonce = get(from, 4);
+  reset->algorithm = (uint8_t)get(from, 1);
+  getBytes(from, reset->digest, EDGE_LINK_DIGEST_BYTES);
+}
+
+/** Reads a body; false for an unknown type or a count that it cannot have. */
+static bool getBody(reader_t *from, edgeLinkPacket_t *packet) {
   switch (packet->type) {
     case EDGE_LINK_RESET:
-      packet->reset.nonce = get(from, 4);
-      packet->reset.algorithm = (uint8_t)get(from, 1);
-      getBytes(from, packet->reset.digest, EDGE_LINK_DIGEST_BYTES);
-      break;
+      getReset(from, &packet->reset);
+      return true;
     case EDGE_LINK_FEATURES:
-      packet->features.back = (uint16_t)get(from, 2);
-      packet->features.count = (uint8_t)get(from, 1);
-      getBytes(from, packet->features.sample, (uint16_t)(packet->features.count * EDGE_LINK_SAMPLE_BYTES));
-      break;
+      return getFeatures(from, &packet->features);
     case EDGE_LINK_RESULT:
-      packet->result.expected = get(from, 4);
-      packet->result.flags = (uint8_t)get(from, 1);
-      packet->result.count = (uint8_t)get(from, 1);
-      for (int i = 0; i < packet->result.count; i++) {
-        packet->result.answer[i].back = (uint8_t)get(from, 1);
-        getBytes(from, packet->result.answer[i].output, EDGE_LINK_OUTPUTS);
-      }
-      break;
+      return getResult(from, &packet->result);
+    case EDGE_LINK_HEARTBEAT:
+      getHeartbeat(from, &packet->heartbeat);
+      return true;
     default:
-      beat->uptimeMs = get(from, 4);
-      beat->expected = get(from, 4);
-      beat->taken = get(from, 4);
-      beat->lost = get(from, 4);
-      beat->refused = get(from, 4);
-      beat->algorithm = (uint8_t)get(from, 1);
-      beat->flags = (uint8_t)get(from, 1);
-      getBytes(from, beat->digest, EDGE_LINK_DIGEST_BYTES);
-      break;
+      return false;
   }
 }
 
 bool edgeLinkParse(const uint8_t *bytes, uint16_t length, edgeLinkPacket_t *packet) {
-  if (length < HEADER_BYTES + CRC_BYTES || length > EDGE_LINK_MAX_BYTES || bytes[0] != EDGE_LINK_VERSION ||
-      bytes[2] != length) {
+  if (length < HEADER_BYTES + CRC_BYTES || length > EDGE_LINK_MAX_BYTES) {
     return false;
   }
-  const uint8_t type = bytes[1];
-  const uint16_t body = (uint16_t)(length - HEADER_BYTES - CRC_BYTES);
-  const uint16_t countAt = type == EDGE_LINK_FEATURES ? 2 : 5;
-  const uint8_t count = body > countAt ? bytes[HEADER_BYTES + countAt] : 0;
-  reader_t crc = {bytes + length - CRC_BYTES};
-  if (bodyBytes(type, count) != body || get(&crc, 2) != edgeLinkCrc(bytes, (uint16_t)(length - CRC_BYTES))) {
+  const uint16_t end = (uint16_t)(length - CRC_BYTES);
+  reader_t crc = {bytes + end, CRC_BYTES, false};
+  reader_t from = {bytes, end, false};
+  if (get(&crc, 2) != edgeLinkCrc(bytes, end) || get(&from, 1) != EDGE_LINK_VERSION) {
     return false;
   }
-  reader_t from = {bytes + 3};
-  packet->type = type;
+  packet->type = (uint8_t)get(&from, 1);
+  if (get(&from, 1) != length) {
+    return false;
+  }
   packet->session = (uint8_t)get(&from, 1);
   packet->sequence = get(&from, 4);
-  getBody(&from, packet);
-  return true;
+  return getBody(&from, packet) && !from.tooShort && from.left == 0;
 }
 
 static uint8_t hexValue(char digit) {

@@ -17,11 +17,21 @@ static void restart(linkSender_t *sender, uint8_t session) {
   sender->state = LINK_STARTING;
   sender->outstanding = 0;
   sender->holdOff = 0;
-  sender->waited = LINK_RETRY_STEPS;
 }
 
 static void restartAnew(linkSender_t *sender) {
   restart(sender, (uint8_t)(sender->session == 255 ? 1 : sender->session + 1));
+}
+
+/** The next try is due. */
+static void endWait(linkSender_t *sender) { sender->waited = UINT16_MAX; }
+
+/** A try is made: the next one comes after the same wait, or twice that where the silence has cost samples. */
+static void beginWait(linkSender_t *sender) {
+  sender->waited = 0;
+  if (sender->silent >= LINK_HISTORY) {
+    sender->wait = (uint16_t)(2 * sender->wait < LINK_RETRY_MOST ? 2 * sender->wait : LINK_RETRY_MOST);
+  }
 }
 
 void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t digest[EDGE_LINK_DIGEST_BYTES],
@@ -31,6 +41,8 @@ void linkSenderInit(linkSender_t *sender, uint8_t algorithm, const uint8_t diges
   sender->algorithm = algorithm;
   sender->refill = refill < LINK_HISTORY ? refill : LINK_HISTORY;
   sender->nonce = nonce;
+  sender->wait = LINK_RETRY_STEPS;
+  endWait(sender);
   restart(sender, session == 0 ? 1 : session);
 }
 
@@ -93,11 +105,11 @@ static void packFeatures(linkSender_t *sender, edgeLinkPacket_t *packet) {
 /** Whether the sender may speak; goes back to the base where no answer has come for too long. */
 static bool mayContinue(linkSender_t *sender) {
   const bool silent = sender->silent >= LINK_RETRY_STEPS;
-  if (silent && sender->waited >= LINK_RETRY_STEPS) {
+  if (silent && sender->waited >= sender->wait) {
     sender->counters.timeouts++;
     sender->next = sender->base;
     sender->outstanding = 0;
-    sender->waited = 0;
+    beginWait(sender);
     return true;
   }
   return !silent && sender->outstanding < LINK_WINDOW;
@@ -108,10 +120,10 @@ uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes) {
   sender->sending = false;
   const bool refused = sender->state == LINK_REFUSED;
   if (refused || sender->state == LINK_STARTING) {
-    if (sender->waited < (refused ? LINK_REFUSED_STEPS : LINK_RETRY_STEPS)) {
+    if (sender->waited < sender->wait || (refused && sender->waited < LINK_REFUSED_STEPS)) {
       return 0;
     }
-    sender->waited = 0;
+    beginWait(sender);
     packReset(sender, &packet);
   } else {
     if (sender->next == sender->samples && sender->silent < LINK_RETRY_STEPS) {
@@ -200,6 +212,18 @@ static int takeResult(linkSender_t *sender, const edgeLinkResult_t *result, link
   return newAnswers(sender, result, answers);
 }
 
+/** The GAP8 is there: it is asked at once. Another session than ours says that it was reset. */
+static void takeHeartbeat(linkSender_t *sender, uint8_t session) {
+  const bool ours = session == sender->session;
+  if (!ours && sender->state != LINK_STARTING && sender->state != LINK_REFUSED) {
+    sender->counters.resets++;
+    restartAnew(sender);
+  }
+  if (!ours || sender->state != LINK_REFUSED) {
+    endWait(sender);
+  }
+}
+
 int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, linkAnswer_t *answers) {
   edgeLinkPacket_t packet;
   if (!edgeLinkParse(bytes, length, &packet)) {
@@ -214,16 +238,14 @@ int linkSenderTake(linkSender_t *sender, const uint8_t *bytes, uint16_t length, 
   sender->counters.received++;
   if (!result) {
     sender->counters.uptimeMs = packet.heartbeat.uptimeMs;
-    if (packet.session != sender->session && sender->state != LINK_STARTING && sender->state != LINK_REFUSED) {
-      sender->counters.resets++;
-      restartAnew(sender);
-    }
+    takeHeartbeat(sender, packet.session);
     return 0;
   }
   if (packet.session != sender->session) {
     return 0;  // an answer to an earlier session
   }
   sender->silent = 0;
+  sender->wait = LINK_RETRY_STEPS;
   return takeResult(sender, &packet.result, answers);
 }
 

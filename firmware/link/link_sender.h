@@ -2,7 +2,8 @@
  * @file link_sender.h
  * The STM32's end of the link. It keeps the last samples and sends, with each new one, every
  * sample that the GAP8 has not confirmed, seven at most: a few lost packets cost nothing. After
- * a longer fault it goes back to the first unconfirmed sample and sends all from there.
+ * a longer fault it goes back to the first unconfirmed sample and sends all from there. A GAP8 that
+ * is silent for longer than samples are kept is asked ever less often.
  *
  * One step of 10 ms: linkSenderPush() once, linkSenderPoll() once or twice, and linkSenderTake()
  * for each packet that came. Never waits, never fails.
@@ -14,6 +15,7 @@
 #define LINK_HISTORY 288      ///< samples kept: the longest fault that leaves no gap, in steps
 #define LINK_WINDOW 8         ///< packets on their way, at most
 #define LINK_RETRY_STEPS 10   ///< without an answer until everything unconfirmed is sent again
+#define LINK_RETRY_MOST 320   ///< between two tries; after LINK_HISTORY steps of silence each wait is twice the last
 #define LINK_DOWN_STEPS 50    ///< without an answer until the link counts as down
 #define LINK_REFUSED_STEPS 100 ///< between two resets to a GAP8 that has another model
 
@@ -56,7 +58,8 @@ typedef struct {
   uint32_t lastAnswer;  ///< sequence of the last answer given
   uint16_t refill;      ///< samples that the network needs before it answers
   uint16_t silent;      ///< steps since the GAP8's last packet
-  uint16_t waited;      ///< steps since the last reset, or since everything was sent again
+  uint16_t waited;      ///< steps since the last try: a reset, or everything that is unconfirmed again
+  uint16_t wait;        ///< steps from one try to the next
   uint8_t outstanding;  ///< packets on their way
   uint8_t holdOff;      ///< steps in which requests to go back are old news
   uint8_t session;

@@ -10,6 +10,8 @@
 
 #define AIRTOUCH_STREAM_SHA256 "32d7cab7b02d7fec47efc972b05d63286b69f623f7725b6c61198d43eff6bf3b"
 #define AIRTOUCH_STREAM_ARENA_BYTES 3432  // what streamInt8ArenaBytes says
+#define AIRTOUCH_STREAM_ENTRY_SCORE 2.299999952e+00f  // airtouchStreamDecoder.entryScore
+#define AIRTOUCH_STREAM_EXIT_SCORE 1.100000024e+00f
 
 extern const streamInt8_t airtouchStream;
 extern const streamQuantisation_t airtouchStreamQuantisation;

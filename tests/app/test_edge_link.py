@@ -53,6 +53,9 @@ def test_any_bytes_change_nothing():
             junk = bytes([0xA1, int(rng.integers(0, 6)), len(junk) & 255]) + junk[3:]
         assert gap8.take(junk) == b""
         app.receive(junk)
+    for junk in (b"", bytes(65_535), bytes(70_000)):
+        assert gap8.take(junk) == b""
+        app.receive(junk)
     app.step(**STEP)
     assert app.log.answers == 0
 

@@ -1,39 +1,22 @@
 """The two ends of the link over a pipe of bytes: any fault, no wrong answer, back within ten packets."""
 
-import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from app.sanitized import build
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-ROOT = Path(__file__).parents[2]
-INCLUDES = [f"-I{ROOT / folder}" for folder in ("firmware/kernels", "firmware/link", "gap8/kernels", "gap8/model",
-                                                "gap8/app/src")]
-SOURCES = [*sorted((ROOT / "firmware" / "link").glob("*.c")), ROOT / "firmware/kernels/feature_window.c",
-           *sorted((ROOT / "gap8" / "kernels").glob("*.c")), *sorted((ROOT / "gap8" / "app" / "src").glob("gap8_*.c")),
-           ROOT / "gap8/model/airtouch_model.c", ROOT / "gap8/model/airtouch_stream.c"]
-SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 PASS, DROP, FLIP, RESET = 0, 6, 10, 62
 
 
 @pytest.fixture(scope="module")
 def driver(tmp_path_factory):
     """The C driver, built with sanitizers: a function from scripts to the slowest recovery, in packets."""
-    compiler = shutil.which(os.environ.get("CC", "cc"))
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
     folder = tmp_path_factory.mktemp("link")
-    program = folder / "driver"
-    build = subprocess.run([compiler, "-std=gnu11", "-O2", "-g", "-Wall", "-Wextra", *SANITIZERS, *INCLUDES, *SOURCES,
-                            Path(__file__).with_name("link_driver.c"), "-lm", "-o", program],
-                           capture_output=True, text=True)
-    if "cannot find -lasan" in build.stderr or "libclang_rt" in build.stderr:
-        pytest.skip(f"{compiler} has no sanitizers")
-    assert build.returncode == 0, build.stderr
+    program = build(Path(__file__).with_name("link_driver.c"), folder / "driver")
 
     def run(scripts, *words):
         files = list(words)

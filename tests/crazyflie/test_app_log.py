@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from airtouch.crazyflie import app_log, blocks
+from airtouch.kernels.app_core import HEALTH
 
 APP = Path(__file__).parents[2] / "firmware" / "app" / "src"
 
@@ -21,7 +22,7 @@ def test_names_and_types_are_those_of_the_log_group():
 def test_health_flags_are_those_of_the_header():
     flags = re.findall(r"APP_\w+ = (\d+),\s*///<", re.search(r"0 is good\. \*/\ntypedef enum \{(.*?)\}",
                                                             (APP / "app_core.h").read_text(), re.DOTALL)[1])
-    assert sorted(app_log.HEALTH) == sorted(int(flag) for flag in flags)
+    assert sorted(app_log.HEALTH) == sorted(HEALTH.values()) == sorted(int(flag) for flag in flags)
 
 
 def test_a_packet_in_words():

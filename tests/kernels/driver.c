@@ -120,6 +120,19 @@ static void feedFeatures(bytes_t bytes) {
   free(values);
 }
 
+static void change(bytes_t *bytes, edgePipeline_t *pipeline) {
+  float to[3];
+  take(bytes, to, sizeof(to));
+  const edgePipelineConfig_t before = pipeline->config;
+  if (!edgePipelineSetBand(pipeline, to[0], to[1])) {
+    check(memcmp(&before.lowHz, &pipeline->config.lowHz, sizeof(float)) == 0 &&
+              memcmp(&before.highHz, &pipeline->config.highHz, sizeof(float)) == 0, "a band that is refused changes nothing");
+  }
+  if (!edgePipelineSetFalseAlarm(pipeline, to[2])) {
+    check(memcmp(&before.pFa, &pipeline->config.pFa, sizeof(float)) == 0, "nor does a false-alarm probability");
+  }
+}
+
 static void feedPipeline(bytes_t bytes, bool wild) {
   const airtouchVehicle_t vehicle = {0.0362f, 9.81f, {5.485e-4f, 1.0326e-6f, 2.1303e-11f}, 4.0f};
   edgePipelineConfig_t config;
@@ -148,6 +161,9 @@ static void feedPipeline(bytes_t bytes, bool wild) {
     edgeSample_t sample;
     edgeEvent_t event;
     take(&bytes, &sample, sizeof(sample));
+    if (wild && seen++ % 8 == 7) {
+      change(&bytes, pipeline);
+    }
     const bool edge = edgePipelineStep(pipeline, &sample, &event);
     check(edge == (event.edge != EDGE_NONE) && event.edge <= EDGE_EXIT, "an edge is none, entry or exit");
     if (!wild) {

@@ -26,7 +26,7 @@ def test_connect_tables_parameters_and_ten_seconds_at_100_hz(cflib, tmp_path):
             assert cf.log.toc.get_element_by_complete_name(name).ctype == kind, name
         assert len(cf.log.toc.toc) == len({v.group for v in virtual.firmware.log.toc.items})
         for name, value in {"deck.bcFlow2": 1, "deck.bcMultiranger": 1, "deck.bcAI": 1,
-                            "commander.enHighLevel": 0, "airtouch.detector": 2,
+                            "commander.enHighLevel": 0, "airtouch.detector": 1,
                             "stabilizer.estimator": 2}.items():
             assert int(cf.param.get_value(name)) == value, name
         # a parameter is set, and one out of range is put right by the app

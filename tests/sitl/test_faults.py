@@ -50,9 +50,10 @@ def test_a_late_line_keeps_the_order():
     assert max(delays) <= 0.06 and np.mean(delays) > 0.02
 
 
-def flying(bench, *faults, **settings):
+def flying(bench, *faults, detector=2, **settings):
     """A drone in the air with faults, and `pass_(seconds)` that lets the server's time pass."""
     craft = bench("hover", faults=faults, **settings)
+    craft.drone.app.set("detector", detector)
 
     def pass_(seconds):
         for _ in range(round(100 * seconds)):
@@ -73,6 +74,18 @@ def test_the_gap8_restarts_and_comes_back(bench):
     pass_(6.0)
     assert app.read("resets") == 1 and not app.read("health") & 2
     assert craft.height == pytest.approx(0.5, abs=0.15)
+
+
+def test_the_gap8_is_left_alone_unless_a_detector_asks_for_it(bench):
+    craft = bench("hover", faults=["gap8-reset=3"])
+    assert craft.firmware.param.values["airtouch.detector"] == 1
+    craft.take_off()
+    craft.fly(4.0)
+    app = craft.drone.app
+    assert app.sent == 0 and app.read("health") == 0 and math.isfinite(app.read("prob"))
+    app.set("detector", 2)
+    craft.fly(0.1)
+    assert app.sent > 0
 
 
 def test_a_gap8_that_never_answers(bench):
@@ -96,7 +109,7 @@ def test_faults_can_be_ordered_in_flight(bench):
 
 def test_without_an_ai_deck_the_stm32_does_it(bench):
     craft, _ = flying(bench, ai_deck=False)
-    assert craft.drone.app.read("detector") == 1 and math.isfinite(craft.drone.app.read("prob"))
+    assert craft.drone.app.sent == 0 and craft.drone.app.read("detector") == 1 and math.isfinite(craft.drone.app.read("prob"))
     assert craft.firmware.param.values["deck.bcAI"] == 0
 
 

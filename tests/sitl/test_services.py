@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from airtouch.logs.quaternion import decompress
+from airtouch.kernels.app_core import PARAM_TYPES
 from airtouch.sitl import app
 from airtouch.sitl.log_service import LENGTHS, encode
 from airtouch.sitl.packet import LOG, MEMORY, PARAM
@@ -34,7 +35,8 @@ def test_the_app_has_the_names_and_types_of_the_firmware():
         name: (field, element) for name, (_, field, element) in app.LOGS.items() if name != "health"}
     params = re.findall(r"PARAM_ADD\(PARAM_(\w+), (\w+), &wanted\.(\w+)\)", text)
     assert {name: field for _, name, field in params} == app.PARAMS
-    assert {name for kind, name, _ in params if kind == "UINT8"} == set(app.BYTES)
+    assert {field: kind for kind, _, field in params} == {
+        field: kind.removesuffix("_t").upper() for field, kind in PARAM_TYPES.items()}
 
 
 def test_checksum_chains_the_entries():

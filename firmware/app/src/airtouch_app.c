@@ -82,7 +82,7 @@ static void sendPackets(void) {
 /** Takes changed parameters over; those out of range are written back as they were put right. */
 static void takeParams(void) {
   const appParams_t asked = wanted;
-  if (memcmp(&asked, &core.params, sizeof asked) == 0) {
+  if (appParamsSame(&asked, &core.params)) {
     return;
   }
   appParams_t inForce = asked;
@@ -91,7 +91,7 @@ static void takeParams(void) {
   }
   DEBUG_PRINT("Parameter out of range, put right\n");
   taskENTER_CRITICAL();
-  if (memcmp(&wanted, &asked, sizeof asked) == 0) {
+  if (appParamsSame(&wanted, &asked)) {
     wanted = inForce;
   }
   taskEXIT_CRITICAL();
@@ -147,8 +147,8 @@ void appMain(void) {
 static uint16_t healthNow(uint32_t timestamp, void *data) {
   (void)timestamp;
   (void)data;
-  const bool stalled = xTaskGetTickCount() - lastStep > STALLED;
-  return (uint16_t)(core.log.health | (stalled ? APP_STALLED : 0));
+  const TickType_t now = xTaskGetTickCount();  // first: a step may end between the two
+  return (uint16_t)(core.log.health | (appStalled(now, lastStep, STALLED) ? APP_STALLED : 0));
 }
 
 static logByFunction_t healthLogger = {.acquireUInt16 = healthNow};
@@ -244,4 +244,8 @@ PARAM_ADD(PARAM_FLOAT, probOut, &wanted.probabilityOut)
 PARAM_ADD(PARAM_FLOAT, scoreIn, &wanted.scoreIn)
 /** @brief best: an exit fires above this logit */
 PARAM_ADD(PARAM_FLOAT, scoreOut, &wanted.scoreOut)
+/** @brief paper: at least so long between two edges, 10 to 1000 [10 ms] */
+PARAM_ADD(PARAM_UINT16, probDwell, &wanted.probabilityDwell)
+/** @brief filter: an FR-CFAR alert vouches for edges so long, 1 to 1000 [10 ms] */
+PARAM_ADD(PARAM_UINT16, alertHold, &wanted.alertHold)
 PARAM_GROUP_STOP(airtouch)

@@ -26,23 +26,28 @@ static bool filters(const appCore_t *core) {
 static void setThresholds(appCore_t *core) {
   core->pipeline.config.probabilityEntry = core->params.probabilityIn;
   core->pipeline.config.probabilityExit = core->params.probabilityOut;
+  core->pipeline.config.dwellSamples = core->params.probabilityDwell;
+  core->pipeline.config.alertHold = core->params.alertHold;
   core->pipeline.config.physicalFilter = filters(core);
   core->best.decoder.config.entryScore = core->params.scoreIn;
   core->best.decoder.config.exitScore = core->params.scoreOut;
 }
 
+static float bandLow(const appParams_t *params) { return params->bandMid - 0.5f * params->bandWidth; }
+
+static float bandHigh(const appParams_t *params) { return params->bandMid + 0.5f * params->bandWidth; }
+
 static void beginPipeline(appCore_t *core) {
   edgePipelineConfig_t config;
   edgePipelineDefaults(&config, &airtouchStreamMotion.vehicle);
-  config.lowHz = core->params.bandMid - 0.5f * core->params.bandWidth;
-  config.highHz = core->params.bandMid + 0.5f * core->params.bandWidth;
+  config.lowHz = bandLow(&core->params);
+  config.highHz = bandHigh(&core->params);
   config.pFa = core->params.pFa;
-  config.dwellSamples = APP_PAPER_DWELL_SAMPLES;
-  config.alertHold = APP_PAPER_ALERT_HOLD;
   edgePipelineInit(&core->pipeline, &config);
   core->nonFinite = 0;
 }
 
+/** A new stream: its samples count from 0 anew, so a run of the network over the old one's ends with it. */
 static void beginLink(appCore_t *core) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
   const bool paper = core->detector == APP_PAPER_GAP8;
@@ -53,6 +58,7 @@ static void beginLink(appCore_t *core) {
   const linkCounters_t counters = core->link.counters;
   linkSenderInit(&core->link, paper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, refill, core->nonce, session);
   core->link.counters = counters;
+  core->local = (appLocal_t){0};
 }
 
 /** Kernels, detector and stream begin anew; counters stay. */
@@ -64,11 +70,11 @@ static void begin(appCore_t *core) {
   core->probability = NAN;
   core->wasAlert = false;
   core->sinceEdge = UINT16_MAX;
+  core->still = 0;
   beginPipeline(core);
   streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
                      &airtouchStreamDecoder, core->arena);
   beginLink(core);
-  core->local = (appLocal_t){0};
   setThresholds(core);
 }
 
@@ -86,6 +92,16 @@ void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint
   begin(core);
 }
 
+/** The network of `paper` sees the band's features: with another band its stream begins anew. `best` uses no band. */
+static void changeBand(appCore_t *core) {
+  edgePipelineSetBand(&core->pipeline, bandLow(&core->params), bandHigh(&core->params));
+  if (core->detector == APP_PAPER_GAP8) {
+    core->probability = NAN;
+    core->log.probability = NAN;
+    beginLink(core);
+  }
+}
+
 uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   const appParams_t old = core->params;
   const uint16_t errors = appParamsClamp(params);
@@ -96,9 +112,13 @@ uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
   core->params = *params;
   if (params->detector != old.detector || params->enable != old.enable) {
     begin(core);
-  } else if (params->bandMid != old.bandMid || params->bandWidth != old.bandWidth || params->pFa != old.pFa) {
-    beginPipeline(core);
-    beginLink(core);
+    return errors;
+  }
+  if (params->bandMid != old.bandMid || params->bandWidth != old.bandWidth) {
+    changeBand(core);
+  }
+  if (params->pFa != old.pFa) {
+    edgePipelineSetFalseAlarm(&core->pipeline, params->pFa);
   }
   setThresholds(core);
   return errors;
@@ -243,6 +263,17 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
   }
 }
 
+/** The complementary estimator gives no horizontal acceleration: it stays 0, or what another one gave last. */
+static void watchHorizontal(appCore_t *core, const appSample_t *sample) {
+  const bool same = sample->acc[0] == core->horizontal[0] && sample->acc[1] == core->horizontal[1];
+  if (!same || sample->accInBody || core->pipeline.airborne == 0) {
+    core->still = 0;
+  } else if (core->still < APP_STILL_STEPS) {
+    core->still++;
+  }
+  memcpy(core->horizontal, sample->acc, sizeof core->horizontal);
+}
+
 bool appCoreStep(appCore_t *core, const appSample_t *sample) {
   core->log.samples++;
   if (core->params.enable) {
@@ -252,6 +283,7 @@ bool appCoreStep(appCore_t *core, const appSample_t *sample) {
     level.probability = core->probability;
     edgePipelineStep(&core->pipeline, &level, &event);
     appLogEvent(core, &event);
+    watchHorizontal(core, sample);
     runDetector(core, &event);
     appLogLink(core);
   }
@@ -282,3 +314,8 @@ void appCoreTime(appCore_t *core, uint32_t microseconds, bool late) {
 }
 
 void appCoreNoSensor(appCore_t *core) { core->noSensor = true; }
+
+bool appStalled(uint32_t now, uint32_t lastStep, uint32_t limit) {
+  const int32_t age = (int32_t)(now - lastStep);
+  return age > 0 && (uint32_t)age > limit;
+}

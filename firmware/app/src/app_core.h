@@ -22,12 +22,7 @@
 #define APP_RECENT_STEPS 100     ///< health flags of single events stay up for so long
 #define APP_ANSWER_STEPS 50      ///< an answer of the GAP8 that is older says nothing of now
 #define APP_EVENTS 4             ///< kinds of them
-
-/** How the shipped `paper` model was tuned (host/airtouch/models/paper.npz). */
-#define APP_PAPER_PROBABILITY_IN 0.9f
-#define APP_PAPER_PROBABILITY_OUT 0.2f
-#define APP_PAPER_DWELL_SAMPLES 150
-#define APP_PAPER_ALERT_HOLD 100
+#define APP_STILL_STEPS 100      ///< of flight without a change of the horizontal acceleration, until that is a fault
 
 /** appParams_t.detector. */
 typedef enum {
@@ -56,6 +51,7 @@ typedef enum {
   APP_LATE = 128,         ///< a step began late within the last second
   APP_STALLED = 256,      ///< no step for 50 ms (set by whoever reads the log)
   APP_NO_SENSOR = 512,    ///< the firmware lacks a log variable that the app needs
+  APP_NO_HORIZONTAL = 1024, ///< horizontal acceleration stood still for a second of flight: another estimator is needed
 } appHealth_t;
 
 /** The app. It points into itself: initialise it where it stays, never copy it. */
@@ -67,6 +63,8 @@ typedef struct {
   uint32_t nonce;
   uint16_t since[APP_EVENTS];  ///< steps since the last event of each kind
   uint16_t sinceEdge;  ///< FR-CFAR alone: steps since its last edge
+  uint16_t still;      ///< steps of flight in which the horizontal acceleration has not changed
+  float horizontal[2]; ///< the last one, world axes, m/s^2
   bool wasAlert;
   bool noSensor;
   bool reported;       ///< an edge, since the last step
@@ -90,6 +88,9 @@ void appParamsDefaults(appParams_t *params);
  */
 uint16_t appParamsClamp(appParams_t *params);
 
+/** Whether every setting is the same, to the bit: a NaN is the same as itself, and bytes between fields do not count. */
+bool appParamsSame(const appParams_t *one, const appParams_t *other);
+
 /**
  * Sets the app up.
  * @param params    NULL for those shipped; put right where they are out of range
@@ -100,8 +101,9 @@ uint16_t appParamsClamp(appParams_t *params);
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce);
 
 /**
- * Changes settings between two steps. Another band or false-alarm probability makes the kernels
- * begin anew, about 0.5 ms; another detector begins a new stream; the counters stay.
+ * Changes settings between two steps. What uses a setting begins anew, nothing else: another band the band power
+ * (features are unknown for 2 s, about 0.5 ms) and the stream of `paper`; another detector all of it; another
+ * false-alarm probability is in force at once. The counters stay.
  * @param params  receives what is in force
  * @return how many were out of range and put right
  */
@@ -131,3 +133,9 @@ void appCoreTime(appCore_t *core, uint32_t microseconds, bool late);
 
 /** The firmware lacks a log variable that the app needs. */
 void appCoreNoSensor(appCore_t *core);
+
+/**
+ * Whether the last step ended more than @p limit ticks before @p now. Ticks wrap. A step that ended after
+ * @p now was read is new: read the clock first, then the step's time.
+ */
+bool appStalled(uint32_t now, uint32_t lastStep, uint32_t limit);

@@ -1,20 +1,24 @@
 #include <math.h>
+#include <string.h>
 
+#include "airtouch_model.h"
 #include "app_core.h"
 #include "sample_guard.h"
 
 void appParamsDefaults(appParams_t *params) {
   *params = (appParams_t){
       .enable = 1,
-      .detector = APP_BEST_GAP8,
+      .detector = APP_BEST,
       .filter = APP_FILTER_AS_TRAINED,
       .bandMid = 0.5f * (AIRTOUCH_BAND_LOW_HZ + AIRTOUCH_BAND_HIGH_HZ),
       .bandWidth = AIRTOUCH_BAND_HIGH_HZ - AIRTOUCH_BAND_LOW_HZ,
       .pFa = AIRTOUCH_P_FA,
-      .probabilityIn = APP_PAPER_PROBABILITY_IN,
-      .probabilityOut = APP_PAPER_PROBABILITY_OUT,
-      .scoreIn = airtouchStreamDecoder.entryScore,
-      .scoreOut = airtouchStreamDecoder.exitScore,
+      .probabilityIn = AIRTOUCH_MODEL_PROBABILITY_ENTRY,
+      .probabilityOut = AIRTOUCH_MODEL_PROBABILITY_EXIT,
+      .scoreIn = AIRTOUCH_STREAM_ENTRY_SCORE,
+      .scoreOut = AIRTOUCH_STREAM_EXIT_SCORE,
+      .probabilityDwell = AIRTOUCH_MODEL_DWELL_SAMPLES,
+      .alertHold = AIRTOUCH_MODEL_ALERT_HOLD,
   };
 }
 
@@ -24,6 +28,13 @@ static uint16_t clampByte(uint8_t *value, uint8_t high) {
   }
   *value = high;
   return 1;
+}
+
+static uint16_t clampSteps(uint16_t *value, uint16_t low, uint16_t high) {
+  const uint16_t right = *value < low ? low : (*value > high ? high : *value);
+  const uint16_t changed = right != *value;
+  *value = right;
+  return changed;
 }
 
 static uint16_t clampSetting(float *value, float low, float high, float usual) {
@@ -47,5 +58,18 @@ uint16_t appParamsClamp(appParams_t *params) {
   const float below = params->probabilityIn - 0.01f;
   changed = (uint16_t)(changed + clampSetting(&params->probabilityOut, 0.01f, below, usual.probabilityOut));
   changed = (uint16_t)(changed + clampSetting(&params->scoreIn, -8.0f, 12.0f, usual.scoreIn));
-  return (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, usual.scoreOut));
+  changed = (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, usual.scoreOut));
+  changed = (uint16_t)(changed + clampSteps(&params->probabilityDwell, 10, 1000));
+  return (uint16_t)(changed + clampSteps(&params->alertHold, 1, 1000));
+}
+
+static bool sameFloat(float one, float other) { return memcmp(&one, &other, sizeof one) == 0; }
+
+bool appParamsSame(const appParams_t *one, const appParams_t *other) {
+  return one->enable == other->enable && one->detector == other->detector && one->filter == other->filter &&
+         sameFloat(one->bandMid, other->bandMid) && sameFloat(one->bandWidth, other->bandWidth) &&
+         sameFloat(one->pFa, other->pFa) && sameFloat(one->probabilityIn, other->probabilityIn) &&
+         sameFloat(one->probabilityOut, other->probabilityOut) && sameFloat(one->scoreIn, other->scoreIn) &&
+         sameFloat(one->scoreOut, other->scoreOut) && one->probabilityDwell == other->probabilityDwell &&
+         one->alertHold == other->alertHold;
 }

@@ -51,8 +51,6 @@ def notes(seen: Condition) -> list[str]:
     found = []
     if not seen.has("bcMultiranger"):
         found.append("no Multi-ranger: landmarks are not logged; the down range alone tells the true edges")
-    if not seen.has("bcAI"):
-        found.append("no AI-deck: the network does not run on a GAP8 in this flight")
     return found
 
 

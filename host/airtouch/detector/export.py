@@ -8,13 +8,14 @@ import numpy as np
 from airtouch.detector.c_source import fields, float_literal, golden_header, golden_source, layer_arrays
 from airtouch.detector.model_file import Model
 from airtouch.detector.network import WEIGHTED
-from airtouch.detector.paper import stride
+from airtouch.detector.paper import decoding, stride
 from airtouch.detector.stream import export as stream_export
 from airtouch.detector.stream.model import StreamModel
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
 from airtouch.logs.files import write_bytes
+from airtouch.parameters import DEFAULT
 from airtouch.reference import z_score_window
 from airtouch.reference.int8_network import Int8Network, quantise, run
 
@@ -155,6 +156,7 @@ extern const fixedScale_t airtouchRollingScale;
 
 def _model_header(model: Model) -> str:
     network = model.int8
+    settings = decoding(model)[0] if "parameters" in model.metadata else DEFAULT
     rows, columns, channels = network.input_shape
     return f"""// The trained network: {parameter_bytes(network)} bytes of constants.
 // Input: {rows} x {columns * channels} fused features, normalised ({model.normalisation}), then quantised:
@@ -168,6 +170,12 @@ def _model_header(model: Model) -> str:
 #define AIRTOUCH_MODEL_COLUMNS {columns * channels}
 #define AIRTOUCH_MODEL_OUTPUTS {network.outputs}
 #define AIRTOUCH_MODEL_ARENA_BYTES {arena_bytes(network)}  // what networkInt8ArenaBytes says
+
+// How its probability becomes edges, as chosen with it; samples of 10 ms.
+#define AIRTOUCH_MODEL_PROBABILITY_ENTRY {settings.probability_entry!r}f
+#define AIRTOUCH_MODEL_PROBABILITY_EXIT {settings.probability_exit!r}f
+#define AIRTOUCH_MODEL_DWELL_SAMPLES {settings.dwell_samples}
+#define AIRTOUCH_MODEL_ALERT_HOLD {settings.alert_hold}
 
 extern const networkInt8_t airtouchNetwork;
 """

@@ -24,9 +24,11 @@ LINK = ("starting", "filling", "up", "down", "refused")  #: values of the log va
 HEALTH = {  #: bits of the log variable `health`
     "non-finite": 1, "link down": 2, "link filling": 4, "model refused": 8, "parameter clamped": 16,
     "no GAP8": 32, "packet dropped": 64, "late": 128, "stalled": 256, "no sensor": 512,
+    "no horizontal": 1024,
 }
 PACKETS = 2  #: packets that the app sends in a step, at most
 UNKNOWN = (np.nan,) * 4
+MOST = {"uint8_t": 255, "uint16_t": 65_535}  #: of the integer parameters
 
 
 class AppCore:
@@ -69,7 +71,7 @@ class AppCore:
 
     def receive(self, packet: bytes) -> None:
         """What came from the GAP8: any bytes."""
-        call("appHostReceive")(self._memory, packet, len(packet))
+        call("appHostReceive")(self._memory, packet, min(len(packet), 0xFFFF))
 
     def params(self) -> dict[str, float]:
         """The settings in force."""
@@ -88,8 +90,8 @@ class AppCore:
         for name, value in changes.items():
             if name not in PARAMS:
                 raise AirTouchError(f"airtouch.{name}: no such parameter; known: {', '.join(PARAMS)}")
-            byte = dict(ffi.typeof("appParams_t").fields)[name].type.cname == "uint8_t"
-            setattr(self._params, name, int(np.clip(value, 0, 255)) if byte else float(value))
+            most = MOST.get(PARAM_TYPES[name])
+            setattr(self._params, name, float(value) if most is None else int(np.clip(value, 0, most)))
 
 
 class Gap8Core:
@@ -106,7 +108,7 @@ class Gap8Core:
 
     def take(self, packet: bytes) -> bytes:
         """The reply to what came from the STM32: any bytes; empty for none."""
-        length = call("gap8HostTake")(self._memory, packet, len(packet), self._packet)
+        length = call("gap8HostTake")(self._memory, packet, min(len(packet), 0xFFFF), self._packet)
         return bytes(ffi.buffer(self._packet, length))
 
     def heartbeat(self, uptime_ms: int) -> bytes:
@@ -115,5 +117,7 @@ class Gap8Core:
         return bytes(ffi.buffer(self._packet, length))
 
 
-PARAMS = tuple(name for name, _ in ffi.typeof("appParams_t").fields)  #: the PARAM group
+#: C type of each field of appParams_t, which is the PARAM group
+PARAM_TYPES = {name: field.type.cname for name, field in ffi.typeof("appParams_t").fields}
+PARAMS = tuple(PARAM_TYPES)
 LOGS = tuple(name for name, _ in ffi.typeof("appLog_t").fields)  #: the LOG group; feature, force, logit are arrays

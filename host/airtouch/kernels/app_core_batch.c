@@ -13,6 +13,8 @@ void appHostDefaults(appParams_t *params) { appParamsDefaults(params); }
 
 uint16_t appHostClamp(appParams_t *params) { return appParamsClamp(params); }
 
+int appHostSame(const appParams_t *one, const appParams_t *other) { return appParamsSame(one, other); }
+
 void appHostInit(void *core, const appParams_t *params, int haveGap8, uint32_t nonce) {
   appCoreInit(core, params, haveGap8 != 0, nonce);
 }
@@ -32,6 +34,8 @@ uint16_t appHostOutgoing(void *core, uint8_t *bytes) { return appCoreOutgoing(co
 void appHostSent(void *core, int taken) { appCoreSent(core, taken != 0); }
 
 void appHostTime(void *core, uint32_t microseconds, int late) { appCoreTime(core, microseconds, late != 0); }
+
+int appHostStalled(uint32_t now, uint32_t lastStep, uint32_t limit) { return appStalled(now, lastStep, limit); }
 
 void gap8HostInit(void *core) { gap8CoreInit(core, &airtouchStream, &airtouchNetwork, NULL); }
 

@@ -11,6 +11,8 @@ int64_t appHostPacketBytes(void);
 /** The shipped settings; and settings put right, @return how many were changed. */
 void appHostDefaults(appParams_t *params);
 uint16_t appHostClamp(appParams_t *params);
+/** Whether two settings are the same. */
+int appHostSame(const appParams_t *one, const appParams_t *other);
 /** See app_core.h. */
 void appHostInit(void *core, const appParams_t *params, int haveGap8, uint32_t nonce);
 uint16_t appHostSetParams(void *core, appParams_t *params);
@@ -19,6 +21,7 @@ void appHostReceive(void *core, const uint8_t *bytes, uint16_t length);
 uint16_t appHostOutgoing(void *core, uint8_t *bytes);
 void appHostSent(void *core, int taken);
 void appHostTime(void *core, uint32_t microseconds, int late);
+int appHostStalled(uint32_t now, uint32_t lastStep, uint32_t limit);
 /** See gap8_core.h; the networks are those of gap8/model. */
 void gap8HostInit(void *core);
 uint16_t gap8HostTake(void *core, const uint8_t *bytes, uint16_t length, uint8_t *reply);

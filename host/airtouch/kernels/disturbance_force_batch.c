@@ -26,8 +26,8 @@ void disturbanceForceBatch(const float *acc, const float *pwm, const float *vbat
   motors_t motors = {{0.0f, 0.0f, 0.0f, 0.0f}, 1.0f};
   for (int64_t i = 0; i < samples; i++) {
     for (int k = 0; k < 3; k++) {
-      guardSample(acc[3 * i + k], &held[k]);
-      guardSample(thrustAxis[3 * i + k], &axis[k]);
+      guardWithin(acc[3 * i + k], ACC_LIMIT, &held[k]);
+      guardWithin(thrustAxis[3 * i + k], AXIS_LIMIT, &axis[k]);
     }
     disturbanceForce(vehicle, held, heldThrust(&motors, pwm + 4 * i, vbat[i], vehicle), axis, force + 3 * i);
   }

@@ -3,11 +3,11 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.reference.finite import hold_finite
+from airtouch.reference.finite import ACC_LIMIT, AXIS_LIMIT, PWM_MAX, hold_finite
 from airtouch.vehicle import Vehicle
 
-PWM_MAX = 65535.0
 VOLTAGE_RANGE = np.float32(0.1), np.float32(1000.0)  #: what can be a battery's voltage, V
+FACTOR_RANGE = 0.25, 4.0  #: of thrust, for half to twice the nominal voltage
 
 
 def disturbance_force(
@@ -32,11 +32,11 @@ def disturbance_force(
     if acc_world.shape != (n, 3) or pwm.shape != (n, 4):
         raise AirTouchError(f"disturbance force: needs (n, 3) accelerations and (n, 4) PWM, "
                             f"not {acc_world.shape} and {pwm.shape}")
-    acc = hold_finite(acc_world)[0]
+    acc = hold_finite(acc_world, limit=ACC_LIMIT)[0]
     thrust = total_thrust(pwm, vehicle, vbat_v)
     axis = np.array([0.0, 0.0, 1.0])
     if thrust_axis is not None:
-        axis = hold_finite(np.broadcast_to(thrust_axis, (n, 3)), initial=axis)[0]
+        axis = hold_finite(np.broadcast_to(thrust_axis, (n, 3)), initial=axis, limit=AXIS_LIMIT)[0]
     return vehicle.mass_kg * acc - thrust[:, None] * axis
 
 
@@ -50,13 +50,13 @@ def total_thrust(pwm: np.ndarray, vehicle: Vehicle, vbat_v: np.ndarray | float |
 
 
 def voltage_factor(n: int, vehicle: Vehicle, vbat_v: np.ndarray | float | None) -> np.ndarray:
-    """(vbat / nominal)^2, (n,); 1 where either is unknown, the last known (0.1 to 1000 V) voltage held."""
+    """(vbat / nominal)^2, (n,), 0.25 to 4; 1 where either is unknown, the last known (0.1 to 1000 V) voltage held."""
     if vbat_v is None or vehicle.nominal_voltage_v is None:
         return np.ones(n)
     volts = np.broadcast_to(np.asarray(vbat_v, dtype=np.float64), (n,))
     known = np.where((volts >= VOLTAGE_RANGE[0]) & (volts <= VOLTAGE_RANGE[1]), volts, np.nan)
     held = hold_finite(known, initial=vehicle.nominal_voltage_v)[0]
-    return np.square(held / vehicle.nominal_voltage_v)
+    return np.clip(np.square(held / vehicle.nominal_voltage_v), *FACTOR_RANGE)
 
 
 def force_norm(force: np.ndarray) -> np.ndarray:

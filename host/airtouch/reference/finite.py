@@ -4,22 +4,28 @@ import numpy as np
 
 #: Samples are clamped to this magnitude, so that no square or product of powers overflows float32.
 SAMPLE_LIMIT = float(np.float32(1e15))
+#: Where the unit is known, to what a sensor can say: a longer number would be remembered for half a minute.
+ACC_LIMIT = 240.0  #: m/s^2, full scale of the IMU: 24 g
+RATE_LIMIT = 40.0  #: rad/s, full scale of the IMU: 2000 degrees/s
+PWM_MAX = 65535.0
+AXIS_LIMIT = 1.0  #: of a unit vector's components
 FLOAT32_MAX = float(np.finfo(np.float32).max)  #: samples beyond it are infinite to the kernels
 
 
-def hold_finite(x: np.ndarray, initial: float | np.ndarray = 0.0) -> tuple[np.ndarray, int]:
+def hold_finite(x: np.ndarray, initial: float | np.ndarray = 0.0,
+                limit: float = SAMPLE_LIMIT) -> tuple[np.ndarray, int]:
     """Samples with the gaps filled causally, and how many were filled.
 
     x: (n,) or (n, c), any unit, as float32 would hold it. A NaN or infinite sample becomes the last finite
-    one of its column (`initial` before any); magnitudes are clamped to SAMPLE_LIMIT.
+    one of its column (`initial` before any); magnitudes are clamped to `limit`.
     Returns float64 of the same shape. C: sample_guard.h.
     """
     x = np.asarray(x, dtype=np.float64)
     finite = np.abs(x) <= FLOAT32_MAX
     if finite.all():
-        return np.clip(x, -SAMPLE_LIMIT, SAMPLE_LIMIT), 0
+        return np.clip(x, -limit, limit), 0
     rows = np.arange(len(x)).reshape(-1, *([1] * (x.ndim - 1)))
     last = np.maximum.accumulate(np.where(finite, rows, -1), axis=0)
     filled = np.take_along_axis(x, np.maximum(last, 0), axis=0)
     filled = np.where(last >= 0, filled, initial)
-    return np.clip(filled, -SAMPLE_LIMIT, SAMPLE_LIMIT), int(x.size - finite.sum())
+    return np.clip(filled, -limit, limit), int(x.size - finite.sum())

@@ -5,7 +5,7 @@ The names and types of the LOG and PARAM group are those of firmware/app/src/air
 
 from collections.abc import Sequence
 
-from airtouch.kernels.app_core import AppCore, Gap8Core
+from airtouch.kernels.app_core import PARAM_TYPES, AppCore, Gap8Core
 from airtouch.sitl.param_service import Parameter
 
 GROUP = "airtouch"
@@ -33,9 +33,8 @@ LOGS: dict[str, tuple[str, str, int]] = {
 PARAMS = {
     "enable": "enable", "detector": "detector", "filter": "filter", "bandMid": "bandMid",
     "bandWidth": "bandWidth", "pFa": "pFa", "probIn": "probabilityIn", "probOut": "probabilityOut",
-    "scoreIn": "scoreIn", "scoreOut": "scoreOut",
+    "scoreIn": "scoreIn", "scoreOut": "scoreOut", "probDwell": "probabilityDwell", "alertHold": "alertHold",
 }
-BYTES = ("enable", "detector", "filter")  #: parameters of type uint8_t, the others are float
 
 
 class App:
@@ -46,11 +45,12 @@ class App:
         self._gap8 = Gap8Core() if have_gap8 else None
         self._booted_s = self._beat_s = 0.0
         self.gap8_silent = False
+        self.sent = 0  #: packets to the GAP8 so far; none unless the parameter `detector` asks for it
 
     def parameters(self) -> list[Parameter]:
         """The PARAM group with the values in force."""
         values = self._core.params()
-        return [Parameter(f"{GROUP}.{name}", "uint8_t" if name in BYTES else "float", values[field])
+        return [Parameter(f"{GROUP}.{name}", PARAM_TYPES[field], values[field])
                 for name, field in PARAMS.items()]
 
     def set(self, name: str, value: float) -> float:
@@ -84,6 +84,7 @@ class App:
         edge = self._core.step(acc_world, gyro, pwm, vbat_v=vbat_v, attitude=attitude)
         answering = self._gap8 is not None and not self.gap8_silent and now_s >= self._booted_s
         for sent in self._core.packets():
+            self.sent += 1
             reply = self._gap8.take(sent) if answering else b""
             if reply:
                 self._core.receive(reply)

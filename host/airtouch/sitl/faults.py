@@ -9,7 +9,8 @@
     gap8-silent=T    the GAP8 never answers again
     low-battery=T    the battery is nearly empty
 
-T is in seconds after take-off (`3` or `3s`), or `start` for at once.
+T is in seconds after take-off (`3` or `3s`), or `start` for at once. The GAP8 is used, and missed, where the parameter
+`airtouch.detector` is 2 or 3.
 """
 
 import heapq

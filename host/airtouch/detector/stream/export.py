@@ -47,6 +47,8 @@ def _header(model: StreamModel) -> str:
 
 #define AIRTOUCH_STREAM_SHA256 "{model.digest}"
 #define AIRTOUCH_STREAM_ARENA_BYTES {arena_bytes(network)}  // what streamInt8ArenaBytes says
+#define AIRTOUCH_STREAM_ENTRY_SCORE {float_literal(model.decoder.entry_score)}  // airtouchStreamDecoder.entryScore
+#define AIRTOUCH_STREAM_EXIT_SCORE {float_literal(model.decoder.exit_score)}
 
 extern const streamInt8_t airtouchStream;
 extern const streamQuantisation_t airtouchStreamQuantisation;
