@@ -125,11 +125,11 @@ unsigned int paramGetUint(paramVarId_t id) {
 static int sent, registered;
 
 #ifdef CONFIG_DECK_AI
+#include "app_core_batch.h"
 #include "cpx_internal_router.h"
-#include "gap8_core.h"
 #include "queue.h"
 
-static gap8Core_t gap8;
+static void *gap8;
 static cpxAppMessageHandlerCallback_t handler;
 
 QueueHandle_t xQueueCreateStatic(uint32_t slots, uint32_t size, uint8_t *storage, StaticQueue_t *memory) {
@@ -181,9 +181,10 @@ bool cpxSendPacketBlockingTimeout(const CPXPacket_t *packet, const uint32_t time
   check(packet->dataLength <= 98, "the firmware's UART transport asserts on longer packets");
   check(handler != NULL, "answers are taken before questions are asked");
   if (sent++ == 0) {
-    gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
+    gap8 = aligned_alloc(8, ((size_t)gap8HostBytes() + 7) / 8 * 8);
+    gap8HostInit(gap8);
   }
-  const uint16_t length = gap8CoreTake(&gap8, packet->data, packet->dataLength, reply);
+  const uint16_t length = gap8HostTake(gap8, packet->data, packet->dataLength, reply);
   if (length > 0) {
     answer(CPX_T_GAP8, reply, length);
   }

@@ -1,25 +1,31 @@
 """The STM32 app as the Crazyflie runs it: cross-compiled, emulated, and its names beside those of the virtual drone."""
 
+import importlib.util
 import os
 import re
 import shutil
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
+from airtouch.crazyflie import flash
+from airtouch.detector import vehicle_header
 from airtouch.detector.channels import level_acceleration
-from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
-from airtouch.kernels.library import ffi
+from airtouch.kernels.app_core import DETECTORS, PARAMS, AppCore, Gap8Core
+from airtouch.kernels.library import call, ffi
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
 from tools import stack
 from tools.emulator import build
+from tools.emulator.cores import CORTEX_M4
+from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 
 ROOT = Path(__file__).parents[2]
@@ -223,6 +229,65 @@ def test_make_flash_takes_the_image_last_built(arguments, flashed, tmp_path):
     (tmp_path / "build/firmware/image").write_text("build/firmware/cf21bl.bin\n")
     run = make(*command, *arguments)
     assert run.returncode == 0 and run.stdout.split() == f"flash {flashed}".split(), run.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config, platform", [("app-config", "cf2"), ("app-config-tap", "cf2"),
+                                              ("app-config-gap8", "cf2"), ("app-config", "cf21bl")])
+def test_the_image_links_with_the_firmware(config, platform):
+    base = os.environ.get("CRAZYFLIE_BASE")
+    if not base or shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc")
+    run = make("firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}", f"PLATFORM={platform}",
+               "NETWORKS=" + ("no" if platform == "cf21bl" else ""))
+    assert run.returncode == 0 and "warning:" not in run.stderr, run.stderr[-3000:]
+    image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
+    assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")
+    assert firmwares_default(image, "wanted") == defaults()
+    size, _, _ = stack.deepest(ROOT / "build" / "firmware", "appMain")
+    assert size <= STACK_BUDGET
+
+
+def cross_compiler():
+    """A command that compiles for the Cortex-M4."""
+    if shutil.which("arm-none-eabi-gcc"):
+        return ["arm-none-eabi-gcc", *CORTEX_M4.gcc_flags]
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc", *CORTEX_M4.zig_flags, f"-I{build.LIBC}"]
+    pytest.skip("no cross compiler: pip install ziglang")
+
+
+def test_the_image_holds_the_defaults_of_the_parameters(tmp_path):
+    # paramGetDefault() of the firmware looks a default up in the image of .data; it takes all else for zero.
+    shutil.copy(ROOT / vehicle_header.FOLDER / "crazyflie-2.1-flow.h", tmp_path / "airtouch_vehicle.h")
+    run = subprocess.run([*cross_compiler(), "-std=gnu11", "-Os", "-fdata-sections", "-DCONFIG_PLATFORM_CF2",
+                          f"-I{tmp_path}", f"-I{Path(__file__).parent / 'crazyflie'}", *(f"-I{i}" for i in INCLUDES),
+                          "-c", APP / "airtouch_app.c", "-o", tmp_path / "app.o"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[:3000]
+    section, = (s for s in Elf(tmp_path / "app.o").sections if s.name == ".data.wanted")
+    assert fields(section.data) == defaults()
+
+
+def firmwares_default(image, name):
+    """What paramGetDefault() finds for the parameters in a variable of this image."""
+    at, start, end, stored = (image.symbols[n].address for n in (name, "_sdata", "_edata", "_sidata"))
+    assert start <= at <= end, "outside .data the firmware takes a default to be zero"
+    data = image.path.with_suffix(".bin").read_bytes()
+    begin = stored + at - start - flash.STM32_FLASH.start
+    return fields(data[begin:begin + ffi.sizeof("appParams_t")])
+
+
+def fields(data):
+    """Field -> value of an appParams_t's bytes."""
+    params = ffi.from_buffer("appParams_t *", bytearray(data), require_writable=True)
+    return {name: getattr(params, name) for name in PARAMS}
+
+
+def defaults():
+    """Field -> value as appParamsDefaults() gives them."""
+    params = ffi.new("appParams_t *")
+    call("appHostDefaults")(params)
+    return {name: getattr(params, name) for name in PARAMS}
 
 
 def test_the_deepest_stack_is_summed_along_calls(tmp_path):

@@ -48,7 +48,8 @@ def compiled(tmp_path, name, platform):
 def test_the_headers_are_those_of_the_vehicle_files():
     for name in vehicle_header.SHIPPED:
         vehicle_header.check(vehicles.load(name), HEADERS)
-    assert {path.stem for path in HEADERS.glob("*")} == set(vehicle_header.SHIPPED)
+    flown = {f.stem for f in (ROOT / "host/airtouch/vehicles").glob("*.toml") if vehicles.load(f.stem).platform}
+    assert set(vehicle_header.SHIPPED) == flown
 
 
 @pytest.mark.parametrize("name", vehicle_header.SHIPPED)
