@@ -126,8 +126,8 @@ def hover(vehicle):
 
 
 def flown(app, pwm, steps=300):
-    for _ in range(steps):
-        app.step((0, 0, 9.81), (0, 0, 0), pwm)
+    for step in range(steps):
+        app.step((1e-3 * (step % 2), 0, 9.81), (0, 0, 0), pwm)
     return app.log
 
 
