@@ -29,14 +29,18 @@ bench: setup  ## time the kernels and the simulator against their peers, as rati
 	$(BIN)/python tools/bench.py $(BENCH_ARGS)
 	$(BIN)/python tools/bench_simulation.py
 
-firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [CONFIG=app-config-tap] [PLATFORM=cf21bl]
-	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)" "$(or $(PLATFORM),cf2)"
+firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [PLATFORM=cf21bl] [VEHICLE=...] [CONFIG=app-config-tap]
+	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)" "$(or $(PLATFORM),cf2)" "$(VEHICLE)" \
+	  "$(NETWORKS)"
 
 gap8:  ## build the GAP8 app: GAP_SDK_HOME=... AIDECK=...
 	@sh gap8/app/build.sh "$(GAP_SDK_HOME)" "$(AIDECK)"
 
-flash: setup  ## check and flash an image: IMAGE=... [URI=radio://...]
-	$(BIN)/airtouch flash "$(or $(IMAGE),build/firmware/firmware/app/build/cf2.bin)" $(if $(URI),--uri "$(URI)")
+flash: setup  ## check and flash the image last built, or [PLATFORM=...] or [IMAGE=...]: [URI=radio://...] [CHECK=1]
+	@image="$(or $(IMAGE),$(if $(PLATFORM),build/firmware/$(PLATFORM).bin))"; \
+	image=$${image:-$$(cat build/firmware/image 2> /dev/null)}; \
+	[ -n "$$image" ] || { echo "make flash: no image: make firmware CRAZYFLIE_BASE=..., or give IMAGE=..." >&2; exit 1; }; \
+	$(BIN)/airtouch flash "$$image" $(if $(URI),--uri "$(URI)") $(if $(CHECK),--check)
 
 clean:  ## remove what was built
 	rm -rf .venv build out host/*.egg-info host/airtouch/kernels/*.so

@@ -709,8 +709,8 @@ const streamQuantisation_t airtouchStreamQuantisation = {
 
 const decoderConfig_t airtouchStreamDecoder = {
     .overShare = 3.000000119e-01f,
-    .entryScore = 2.299999952e+00f,
-    .exitScore = 1.100000024e+00f,
+    .entryScore = AIRTOUCH_STREAM_ENTRY_SCORE,
+    .exitScore = AIRTOUCH_STREAM_EXIT_SCORE,
     .lateEntry = 3.000000000e+00f,
     .lateExit = -4.000000000e+00f,
     .smoothGain = 1.199999973e-01f,

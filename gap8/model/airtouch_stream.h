@@ -10,10 +10,12 @@
 
 #define AIRTOUCH_STREAM_SHA256 "32d7cab7b02d7fec47efc972b05d63286b69f623f7725b6c61198d43eff6bf3b"
 #define AIRTOUCH_STREAM_ARENA_BYTES 3432  // what streamInt8ArenaBytes says
+#define AIRTOUCH_STREAM_VEHICLE "crazyflie-2.1-flow"  // it was trained for
+#define AIRTOUCH_STREAM_THRUST "thrust 5.484999856e-04f 1.032600039e-06f 2.130299930e-11f, gravity 9.810000420e+00f, armed 1.500000000e+04f"
 #define AIRTOUCH_STREAM_ENTRY_SCORE 2.299999952e+00f  // airtouchStreamDecoder.entryScore
 #define AIRTOUCH_STREAM_EXIT_SCORE 1.100000024e+00f
 
 extern const streamInt8_t airtouchStream;
 extern const streamQuantisation_t airtouchStreamQuantisation;
 extern const decoderConfig_t airtouchStreamDecoder;
-extern const motionConfig_t airtouchStreamMotion;  // for crazyflie-2.1-flow
+extern const motionConfig_t airtouchStreamMotion;

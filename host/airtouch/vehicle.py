@@ -51,6 +51,8 @@ class Vehicle:
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
     derivative_on_error: float = 0.0  #: 1: rate derivative on the error (firmware before 2024)
     battery_compensation: float = 0.0  #: 1: the firmware compensates the battery voltage
+    arm_pwm: float = 15000.0  #: the app takes it to be airborne while the mean PWM is above this
+    platform: str = ""  #: platform of crazyflie-firmware that flies it (cf2, cf21bl, bolt); "" where unknown
 
     def thrust(self, pwm: np.ndarray) -> np.ndarray:
         """Thrust of each motor in newtons for PWM of any shape; 0 where PWM <= 0."""
@@ -59,6 +61,7 @@ class Vehicle:
         return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
 
 
+TEXTS = ("name", "platform")  #: fields that are no number
 #: fields of three numbers
 TRIPLES = ("inertia_kg_m2", "thrust_of_pwm_n", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps")
 
@@ -99,8 +102,10 @@ def parse(text: str, source: str) -> Vehicle:
             if not (isinstance(value, list) and len(value) == 3 and all(_is_number(v) for v in value)):
                 raise AirTouchError(f"{source}: {name} must be three numbers")
             values[name] = tuple(float(v) for v in value)
-        elif name == "name":
-            values[name] = str(value)
+        elif name in TEXTS:
+            if not isinstance(value, str):
+                raise AirTouchError(f"{source}: {name} must be a text in quotes")
+            values[name] = value
         elif _is_number(value):
             values[name] = float(value)
         else:

@@ -1,25 +1,31 @@
 """The STM32 app as the Crazyflie runs it: cross-compiled, emulated, and its names beside those of the virtual drone."""
 
+import importlib.util
 import os
 import re
 import shutil
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
+from airtouch.crazyflie import flash
+from airtouch.detector import vehicle_header
 from airtouch.detector.channels import level_acceleration
-from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
-from airtouch.kernels.library import ffi
+from airtouch.kernels.app_core import DETECTORS, PARAMS, AppCore, Gap8Core
+from airtouch.kernels.library import call, ffi
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
 from tools import stack
 from tools.emulator import build
+from tools.emulator.cores import CORTEX_M4
+from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 
 ROOT = Path(__file__).parents[2]
@@ -157,25 +163,131 @@ def test_the_build_lists_every_source_that_the_core_needs():
     assert {source.stem for source in SOURCES} <= built
 
 
-@pytest.mark.parametrize("make, words", [([], "say where the firmware's sources are"),
-                                         (["CRAZYFLIE_BASE=/"], "is no checkout of bitcraze/crazyflie-firmware"),
-                                         (["CRAZYFLIE_BASE={bare}"], "lacks its submodules")])
-def test_make_firmware_says_what_is_missing(make, words, tmp_path):
-    (tmp_path / "tools/make").mkdir(parents=True)
-    (tmp_path / "tools/make/oot.mk").touch()
-    environment = {k: v for k, v in os.environ.items() if k != "CRAZYFLIE_BASE"}
-    run = subprocess.run(["make", "-C", ROOT, "firmware", *(m.format(bare=tmp_path) for m in make)],
-                         capture_output=True, text=True, env=environment)
+@pytest.fixture
+def checkout(tmp_path):
+    """What `make firmware` takes for a checkout of the firmware, up to the first source that it compiles."""
+    for file in ("tools/make/oot.mk", "vendor/FreeRTOS/include/FreeRTOS.h", "vendor/CMSIS/CMSIS/x",
+                 *(f"configs/{name}_defconfig" for name in ("cf2", "cf21bl", "bolt"))):
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / file).touch()
+    return tmp_path
+
+
+def make(*arguments):
+    environment = {k: v for k, v in os.environ.items() if k not in ("CRAZYFLIE_BASE", "PLATFORM", "VEHICLE", "CONFIG")}
+    return subprocess.run(["make", "-C", ROOT, *map(str, arguments)], capture_output=True, text=True, env=environment)
+
+
+@pytest.mark.parametrize("missing, words", [(None, "say where the firmware's sources are"),
+                                            ("tools/make/oot.mk", "is no checkout of bitcraze/crazyflie-firmware"),
+                                            ("vendor/FreeRTOS/include/FreeRTOS.h", "lacks its submodules")])
+def test_make_firmware_says_what_is_missing(missing, words, checkout):
+    if missing:
+        (checkout / missing).unlink()
+    run = make("firmware", *([f"CRAZYFLIE_BASE={checkout}"] if missing else []))
     assert run.returncode != 0 and words in run.stderr
 
 
+@pytest.mark.parametrize("arguments, words", [
+    (["CONFIG=app-config-tab"], "no firmware/app/app-config-tab; CONFIG is one of app-config"),
+    (["PLATFORM=cf3"], "the firmware has no configs/cf3_defconfig"),
+    (["PLATFORM=cf21bl"], "trained for the thrust curve of crazyflie-2.1-flow, not of crazyflie-2.1-brushless"),
+    (["PLATFORM=cf21bl", "VEHICLE=crazyflie-2.1-flow"], "crazyflie-2.1-flow is flown by platform cf2, not by cf21bl"),
+    (["VEHICLE=crazyflie-2.1-brushless"], "crazyflie-2.1-brushless is flown by platform cf21bl, not by cf2"),
+    (["PLATFORM=bolt"], "no vehicle of AirTouch flies bolt"),
+    (["VEHICLE=mine"], "no firmware/app/vehicles/mine.h; VEHICLE is one of crazyflie-2.1"),
+])
+def test_make_firmware_refuses_what_does_not_fit(arguments, words, checkout):
+    run = make("firmware", f"CRAZYFLIE_BASE={checkout}", *arguments)
+    assert run.returncode != 0 and words in run.stderr
+
+
+@pytest.mark.parametrize("config, platform, vehicle, networks", [
+    ("app-config", "cf2", "", ""), ("app-config-gap8-tap", "cf2", "crazyflie-2.1", ""),
+    ("app-config", "cf21bl", "", "no"), ("app-config", "cf2", "firmware/app/vehicles/crazyflie-2.1-flow.h", "")])
+def test_what_fits_comes_as_far_as_the_compiler(config, platform, vehicle, networks, checkout):
+    for tool in ("sed", "basename", "paste"):
+        (checkout / tool).symlink_to(shutil.which(tool))
+    run = subprocess.run([shutil.which("sh"), "firmware/app/build.sh", checkout, config, platform, vehicle, networks],
+                         cwd=ROOT, capture_output=True, text=True, env={"PATH": str(checkout)})
+    assert run.returncode != 0 and run.stderr.startswith("make firmware: no arm-none-eabi-gcc")
+
+
+@pytest.mark.parametrize("arguments, flashed", [
+    ([], "build/firmware/cf21bl.bin"), (["PLATFORM=cf2"], "build/firmware/cf2.bin"), (["IMAGE=x y.bin"], "x y.bin"),
+    (["CHECK=1"], "build/firmware/cf21bl.bin --check"),
+    (["URI=radio://0/80/2M/E7E7E7E7E7"], "build/firmware/cf21bl.bin --uri radio://0/80/2M/E7E7E7E7E7")])
+def test_make_flash_takes_the_image_last_built(arguments, flashed, tmp_path):
+    (tmp_path / "build/firmware").mkdir(parents=True)
+    (tmp_path / ".venv/bin").mkdir(parents=True)
+    (tmp_path / ".venv/bin/airtouch").write_text('#!/bin/sh\necho "$@"\n')
+    (tmp_path / ".venv/bin/airtouch").chmod(0o755)
+    command = ["-C", tmp_path, "-f", ROOT / "Makefile", "-o", ".venv/.kernels", "--no-print-directory", "flash"]
+    if not arguments:
+        run = make(*command)
+        assert run.returncode != 0 and "make flash: no image" in run.stderr
+    (tmp_path / "build/firmware/image").write_text("build/firmware/cf21bl.bin\n")
+    run = make(*command, *arguments)
+    assert run.returncode == 0 and run.stdout.split() == f"flash {flashed}".split(), run.stderr
+
+
 @pytest.mark.slow
-def test_the_image_links_with_the_firmware():
+@pytest.mark.parametrize("config, platform", [("app-config", "cf2"), ("app-config-tap", "cf2"),
+                                              ("app-config-gap8", "cf2"), ("app-config", "cf21bl")])
+def test_the_image_links_with_the_firmware(config, platform):
     base = os.environ.get("CRAZYFLIE_BASE")
     if not base or shutil.which("arm-none-eabi-gcc") is None:
         pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc")
-    run = subprocess.run(["make", "-C", ROOT, "firmware", f"CRAZYFLIE_BASE={base}"], capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr[-3000:]
+    run = make("firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}", f"PLATFORM={platform}",
+               "NETWORKS=" + ("no" if platform == "cf21bl" else ""))
+    assert run.returncode == 0 and "warning:" not in run.stderr, run.stderr[-3000:]
+    image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
+    assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")
+    assert firmwares_default(image, "wanted") == defaults()
+    size, _, _ = stack.deepest(ROOT / "build" / "firmware", "appMain")
+    assert size <= STACK_BUDGET
+
+
+def cross_compiler():
+    """A command that compiles for the Cortex-M4."""
+    if shutil.which("arm-none-eabi-gcc"):
+        return ["arm-none-eabi-gcc", *CORTEX_M4.gcc_flags]
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc", *CORTEX_M4.zig_flags, f"-I{build.LIBC}"]
+    pytest.skip("no cross compiler: pip install ziglang")
+
+
+def test_the_image_holds_the_defaults_of_the_parameters(tmp_path):
+    # paramGetDefault() of the firmware looks a default up in the image of .data; it takes all else for zero.
+    shutil.copy(ROOT / vehicle_header.FOLDER / "crazyflie-2.1-flow.h", tmp_path / "airtouch_vehicle.h")
+    run = subprocess.run([*cross_compiler(), "-std=gnu11", "-Os", "-fdata-sections", "-DCONFIG_PLATFORM_CF2",
+                          f"-I{tmp_path}", f"-I{Path(__file__).parent / 'crazyflie'}", *(f"-I{i}" for i in INCLUDES),
+                          "-c", APP / "airtouch_app.c", "-o", tmp_path / "app.o"], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[:3000]
+    section, = (s for s in Elf(tmp_path / "app.o").sections if s.name == ".data.wanted")
+    assert fields(section.data) == defaults()
+
+
+def firmwares_default(image, name):
+    """What paramGetDefault() finds for the parameters in a variable of this image."""
+    at, start, end, stored = (image.symbols[n].address for n in (name, "_sdata", "_edata", "_sidata"))
+    assert start <= at <= end, "outside .data the firmware takes a default to be zero"
+    data = image.path.with_suffix(".bin").read_bytes()
+    begin = stored + at - start - flash.STM32_FLASH.start
+    return fields(data[begin:begin + ffi.sizeof("appParams_t")])
+
+
+def fields(data):
+    """Field -> value of an appParams_t's bytes."""
+    params = ffi.from_buffer("appParams_t *", bytearray(data), require_writable=True)
+    return {name: getattr(params, name) for name in PARAMS}
+
+
+def defaults():
+    """Field -> value as appParamsDefaults() gives them."""
+    params = ffi.new("appParams_t *")
+    call("appHostDefaults")(params)
+    return {name: getattr(params, name) for name in PARAMS}
 
 
 def test_the_deepest_stack_is_summed_along_calls(tmp_path):

@@ -98,6 +98,15 @@ def test_cfloader_is_called_as_it_says_it_wants(image):
         flash.flash(flash.inspect(path), None)
 
 
+@pytest.mark.parametrize("data, hint", [(stm32(), False), (gap8(), True)], ids=["stm32", "gap8"])
+def test_where_cfloader_fails_its_exit_code_is_told(image, data, hint, monkeypatch):
+    monkeypatch.setattr(flash, "find_spec", lambda name: object())
+    monkeypatch.setattr(flash, "command", lambda image, uri: [sys.executable, "-c", "raise SystemExit(3)"])
+    with pytest.raises(AirTouchError, match="exit code 3") as error:
+        flash.flash(flash.inspect(image(data)), URI)
+    assert ("with the AI-deck's driver" in str(error.value)) == hint
+
+
 def test_cfloader_itself_understands_the_targets(image, monkeypatch):
     """The installed cfloader parses our command line down to the targets that it would flash."""
     cfloader = pytest.importorskip("cfloader")

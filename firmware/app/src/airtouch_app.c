@@ -1,15 +1,10 @@
 // The app in the firmware: a 100 Hz task around app_core.h. It reads log variables and writes its own; it never
 // calls into the stabiliser, never waits for a packet, and allocates nothing.
-#include <string.h>
-
 #include "FreeRTOS.h"
-#include "queue.h"
 #include "task.h"
 
 #include "app.h"
 #include "autoconf.h"
-#include "cpx.h"
-#include "cpx_internal_router.h"
 #include "log.h"
 #include "param.h"
 #include "usec_time.h"
@@ -17,67 +12,19 @@
 #define DEBUG_MODULE "AIRTOUCH"
 #include "debug.h"
 
+#include "airtouch_vehicle.h"
 #include "app_core.h"
+#include "app_defaults.h"
 #include "app_sensors.h"
+#include "gap8_port.h"
 
 #define PERIOD M2T(10)
 #define STALLED M2T(50)
 #define GIVE_UP M2T(100)  // so late that the missed steps are left out
-#define INBOX 4
-
-typedef struct {
-  uint8_t length;
-  uint8_t bytes[EDGE_LINK_MAX_BYTES];
-} appPacket_t;
 
 static appCore_t core;
-static appParams_t wanted;  // the PARAM group; compared with what is in force before each step
+static appParams_t wanted = APP_PARAMS_DEFAULTS;  // the PARAM group; compared with what is in force before each step
 static volatile TickType_t lastStep;
-
-static uint8_t inboxStorage[INBOX * sizeof(appPacket_t)];
-static StaticQueue_t inboxMemory;
-static QueueHandle_t inbox;
-
-/** Runs in the CPX task: copies the packet and returns. */
-static void takePacket(const CPXPacket_t *received) {
-  static appPacket_t packet;  // of the one CPX task
-  if (received->route.source != CPX_T_GAP8 || received->dataLength > EDGE_LINK_MAX_BYTES) {
-    return;
-  }
-  packet.length = (uint8_t)received->dataLength;
-  memcpy(packet.bytes, received->data, packet.length);
-  xQueueSend(inbox, &packet, 0);  // full: the GAP8's next answer repeats what this one said
-}
-
-static bool hasGap8(void) {
-#ifdef CONFIG_ENABLE_CPX
-  const paramVarId_t deck = paramGetVarId("deck", "bcAI");
-  return PARAM_VARID_IS_VALID(deck) && paramGetUint(deck) != 0;
-#else
-  return false;
-#endif
-}
-
-static void receivePackets(void) {
-  static appPacket_t packet;
-  while (xQueueReceive(inbox, &packet, 0) == pdTRUE) {
-    appCoreReceive(&core, packet.bytes, packet.length);
-  }
-}
-
-static void sendPackets(void) {
-#ifdef CONFIG_ENABLE_CPX
-  static CPXPacket_t packet;
-  cpxInitRoute(CPX_T_STM32, CPX_T_GAP8, CPX_F_APP, &packet.route);
-  for (int i = 0; i < APP_PACKETS; i++) {
-    packet.dataLength = appCoreOutgoing(&core, packet.data);
-    if (packet.dataLength == 0) {
-      return;
-    }
-    appCoreSent(&core, cpxSendPacketBlockingTimeout(&packet, 0));
-  }
-#endif
-}
 
 /** Takes changed parameters over; those out of range are written back as they were put right. */
 static void takeParams(void) {
@@ -101,31 +48,25 @@ static void step(bool late) {
   static appSample_t sample;
   const uint64_t start = usecTimestamp();
   takeParams();
-  receivePackets();
+  gap8PortReceive(&core);
   appSensorsRead(&sample);
   if (appCoreStep(&core, &sample)) {
     DEBUG_PRINT("Edge %u\n", core.log.edge);
   }
-  sendPackets();
+  gap8PortSend(&core);
   appCoreTime(&core, (uint32_t)(usecTimestamp() - start), late);
 }
 
 static void start(void) {
   static const char *const names[] = {"FR-CFAR", "best", "best on the GAP8", "paper on the GAP8"};
-  const bool gap8 = hasGap8();
-  inbox = xQueueCreateStatic(INBOX, sizeof(appPacket_t), inboxStorage, &inboxMemory);
-#ifdef CONFIG_ENABLE_CPX
-  cpxRegisterAppMessageHandler(takePacket);
-#else
-  (void)takePacket;
-#endif
-  appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());
-  wanted = core.params;
+  const bool gap8 = gap8PortPresent();
+  appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());  // the first step takes what is wanted
+  appCoreSetVehicle(&core, &airtouchVehicle, AIRTOUCH_VEHICLE_ARM_PWM);
   if (!appSensorsInit()) {
     appCoreNoSensor(&core);
     DEBUG_PRINT("A log variable is missing: it reads as NaN\n");
   }
-  DEBUG_PRINT("%s AI-deck; detector: %s\n", gap8 ? "With" : "No", names[core.log.detector]);
+  DEBUG_PRINT(AIRTOUCH_VEHICLE_NAME ", %s GAP8; detector: %s\n", gap8 ? "with a" : "no", names[core.log.detector]);
 }
 
 void appMain(void) {

@@ -11,6 +11,9 @@
 enum { EDGE_UNKNOWN = 3 };
 
 static uint8_t detectorInForce(const appCore_t *core) {
+  if (!core->networksFit) {
+    return APP_CFAR;
+  }
   if (core->haveGap8 || core->params.detector < APP_BEST_GAP8) {
     return core->params.detector;
   }
@@ -39,7 +42,8 @@ static float bandHigh(const appParams_t *params) { return params->bandMid + 0.5f
 
 static void beginPipeline(appCore_t *core) {
   edgePipelineConfig_t config;
-  edgePipelineDefaults(&config, &airtouchStreamMotion.vehicle);
+  edgePipelineDefaults(&config, &core->vehicle);
+  config.armPwm = core->armPwm;
   config.lowHz = bandLow(&core->params);
   config.highHz = bandHigh(&core->params);
   config.pFa = core->params.pFa;
@@ -78,6 +82,16 @@ static void begin(appCore_t *core) {
   setThresholds(core);
 }
 
+static void setVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float armPwm) {
+  const airtouchVehicle_t *trained = &airtouchStreamMotion.vehicle;
+  core->vehicle = *vehicle;
+  core->armPwm = armPwm;
+  core->networksFit = vehicle->gravity == trained->gravity && armPwm == airtouchStreamMotion.armPwm;
+  for (int i = 0; i < 3; i++) {
+    core->networksFit = core->networksFit && vehicle->thrust[i] == trained->thrust[i];
+  }
+}
+
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce) {
   memset(core, 0, sizeof *core);
   memset(core->since, 0xff, sizeof core->since);
@@ -89,6 +103,12 @@ void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint
     core->params = *params;
     core->log.paramErrors = appParamsClamp(&core->params);
   }
+  setVehicle(core, &airtouchStreamMotion.vehicle, airtouchStreamMotion.armPwm);
+  begin(core);
+}
+
+void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float armPwm) {
+  setVehicle(core, vehicle, armPwm);
   begin(core);
 }
 

@@ -52,6 +52,7 @@ typedef enum {
   APP_STALLED = 256,      ///< no step for 50 ms (set by whoever reads the log)
   APP_NO_SENSOR = 512,    ///< the firmware lacks a log variable that the app needs
   APP_NO_HORIZONTAL = 1024, ///< horizontal acceleration stood still for a second of flight: another estimator is needed
+  APP_OTHER_VEHICLE = 2048,  ///< the wanted network was trained for another vehicle: FR-CFAR runs alone
 } appHealth_t;
 
 /** The app. It points into itself: initialise it where it stays, never copy it. */
@@ -60,6 +61,9 @@ typedef struct {
   appLog_t log;
   uint8_t detector;  ///< an appDetector_t: the wanted one, or what it falls back to without an AI-deck
   bool haveGap8;
+  airtouchVehicle_t vehicle;
+  float armPwm;
+  bool networksFit;  ///< the networks were trained for such a vehicle
   uint32_t nonce;
   uint16_t since[APP_EVENTS];  ///< steps since the last event of each kind
   uint16_t sinceEdge;  ///< FR-CFAR alone: steps since its last edge
@@ -99,6 +103,14 @@ bool appParamsSame(const appParams_t *one, const appParams_t *other);
  * @param nonce     other after each start of the processor
  */
 void appCoreInit(appCore_t *core, const appParams_t *params, bool haveGap8, uint32_t nonce);
+
+/**
+ * The vehicle that flies, where it is not the one that the networks were trained for: call it after appCoreInit().
+ * The networks run where thrust curve, gravity and armPwm are those of their training; the mass they do not see.
+ * Elsewhere FR-CFAR runs alone, and health says so.
+ * @param armPwm  airborne while the mean PWM is above this
+ */
+void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float armPwm);
 
 /**
  * Changes settings between two steps. What uses a setting begins anew, nothing else: another band the band power

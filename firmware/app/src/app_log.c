@@ -60,7 +60,9 @@ uint16_t appHealthOf(appCore_t *core) {
     health = (uint16_t)(health | (core->since[i] < APP_RECENT_STEPS ? flags[i] : 0));
     core->since[i] = (uint16_t)(core->since[i] + (core->since[i] < UINT16_MAX ? 1 : 0));
   }
-  health = (uint16_t)(health | (core->log.detector != core->params.detector ? APP_NO_GAP8 : 0));
+  if (core->log.detector != core->params.detector) {
+    health = (uint16_t)(health | (core->networksFit ? APP_NO_GAP8 : APP_OTHER_VEHICLE));
+  }
   health = (uint16_t)(health | (core->still >= APP_STILL_STEPS ? APP_NO_HORIZONTAL : 0));
   return (uint16_t)(health | (core->noSensor ? APP_NO_SENSOR : 0));
 }

@@ -1,26 +1,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "airtouch_model.h"
 #include "app_core.h"
+#include "app_defaults.h"
 #include "sample_guard.h"
 
-void appParamsDefaults(appParams_t *params) {
-  *params = (appParams_t){
-      .enable = 1,
-      .detector = APP_BEST,
-      .filter = APP_FILTER_AS_TRAINED,
-      .bandMid = 0.5f * (AIRTOUCH_BAND_LOW_HZ + AIRTOUCH_BAND_HIGH_HZ),
-      .bandWidth = AIRTOUCH_BAND_HIGH_HZ - AIRTOUCH_BAND_LOW_HZ,
-      .pFa = AIRTOUCH_P_FA,
-      .probabilityIn = AIRTOUCH_MODEL_PROBABILITY_ENTRY,
-      .probabilityOut = AIRTOUCH_MODEL_PROBABILITY_EXIT,
-      .scoreIn = AIRTOUCH_STREAM_ENTRY_SCORE,
-      .scoreOut = AIRTOUCH_STREAM_EXIT_SCORE,
-      .probabilityDwell = AIRTOUCH_MODEL_DWELL_SAMPLES,
-      .alertHold = AIRTOUCH_MODEL_ALERT_HOLD,
-  };
-}
+void appParamsDefaults(appParams_t *params) { *params = (appParams_t)APP_PARAMS_DEFAULTS; }
 
 static uint16_t clampByte(uint8_t *value, uint8_t high) {
   if (*value <= high) {

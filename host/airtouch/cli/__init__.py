@@ -12,7 +12,7 @@ from airtouch.errors import AirTouchError
 COMMANDS = {
     "logs": ("logs", "Look at, convert and check flight logs."),
     "train": ("train", "Train a detector on recorded flights."),
-    "export": ("export", "Write a trained network as C sources for the GAP8."),
+    "export": ("export", "Write a trained network, or a vehicle, as C for the drone."),
     "evaluate": ("evaluate", "Score a detector on flights with known edges."),
     "crossval": ("crossval", "Cross-validate a detector by flight."),
     "ablate": ("ablate", "Find what each part of the detectors is worth."),

@@ -1,28 +1,40 @@
-"""`airtouch export`: a trained network as C sources."""
+"""`airtouch export`: a trained network, or a vehicle, as C sources."""
 
 from pathlib import Path
 
 import click
 
-from airtouch.detector import archive, export, model_file, paper_stream
+from airtouch import vehicle as vehicles
+from airtouch.detector import archive, export, model_file, paper_stream, vehicle_header
 from airtouch.detector.stream import model as stream_model
 from airtouch.kernels.network import parameter_bytes
 
 
 @click.command(name="export")
 @click.argument("model", required=False, type=click.Path(path_type=Path))
+@click.option("--vehicle", metavar="NAME", help="Write a vehicle's header for the STM32 app instead: a name, or a "
+              ".toml file.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False),
-              default=Path("gap8/model"), show_default=True,
-              help="Folder to write to, or to check.")
+              help="Folder to write to, or to check; gap8/model if left out, firmware/app/vehicles for a vehicle.")
 @click.option("--check", "only_check", is_flag=True,
               help="Write nothing; refuse a folder that is stale or foreign.")
 @click.option("--force", is_flag=True, help="Replace files that differ.")
-def command(model: Path | None, out: Path, only_check: bool, force: bool) -> None:
+def command(model: Path | None, vehicle: str | None, out: Path | None, only_check: bool, force: bool) -> None:
     """Write MODEL (.npz; all shipped ones if left out) as C: weights, shapes, scales, golden vectors.
 
     With --check: exit code 2 and the reason where the folder is not what MODEL exports to: stale, from another
     model, edited, incomplete, or, for the shipped ones, with sources that none of them gives.
     """
+    if vehicle:
+        if model:
+            raise click.UsageError("either MODEL or --vehicle, not both")
+        craft, folder = vehicles.load(vehicle), out or vehicle_header.FOLDER
+        if only_check:
+            click.echo(f"{vehicle_header.check(craft, folder)}: up to date with {craft.name}")
+        else:
+            click.echo(f"written: {vehicle_header.export(craft, folder, force)}")
+        return
+    out = out or Path("gap8/model")
     shipped = [] if model else [model_file.load(), paper_stream.load(None), stream_model.load()]
     for trained in [_load(model)] if model else shipped:
         name = model.name if model else ""

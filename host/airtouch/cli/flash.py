@@ -16,7 +16,7 @@ def command(image: Path, uri: str | None, target: str | None, check: bool) -> No
     """Flash IMAGE (cf2.bin, or the GAP8's target.board.devices.flash.img) through cfloader.
 
     \b
-    airtouch flash build/firmware/firmware/app/build/cf2.bin --uri radio://0/80/2M/E7E7E7E7E7
+    airtouch flash build/firmware/cf2.bin --uri radio://0/80/2M/E7E7E7E7E7
     airtouch flash target.board.devices.flash.img --uri radio://0/80/2M/E7E7E7E7E7
     """
     found = flash.inspect(image, target)

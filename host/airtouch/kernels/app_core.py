@@ -16,7 +16,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.kernels.arrays import vehicle_struct
 from airtouch.kernels.library import call, ffi
+from airtouch.vehicle import Vehicle
 
 DETECTORS = ("cfar", "best", "best-gap8", "paper-gap8")  #: values of the parameter `detector`
 EDGES = ("none", "entry", "exit", "edge")  #: values of the log variable `edge`
@@ -24,7 +26,7 @@ LINK = ("starting", "filling", "up", "down", "refused")  #: values of the log va
 HEALTH = {  #: bits of the log variable `health`
     "non-finite": 1, "link down": 2, "link filling": 4, "model refused": 8, "parameter clamped": 16,
     "no GAP8": 32, "packet dropped": 64, "late": 128, "stalled": 256, "no sensor": 512,
-    "no horizontal": 1024,
+    "no horizontal": 1024, "other vehicle": 2048,
 }
 PACKETS = 2  #: packets that the app sends in a step, at most
 UNKNOWN = (np.nan,) * 4
@@ -34,8 +36,10 @@ MOST = {"uint8_t": 255, "uint16_t": 65_535}  #: of the integer parameters
 class AppCore:
     """The STM32 app's core (firmware/app/src/app_core.h)."""
 
-    def __init__(self, params: dict[str, float] | None = None, have_gap8: bool = False, nonce: int = 1) -> None:
-        """params: fields of appParams_t that differ from the shipped ones."""
+    def __init__(self, params: dict[str, float] | None = None, have_gap8: bool = False, nonce: int = 1,
+                 vehicle: Vehicle | None = None) -> None:
+        """params: fields of appParams_t that differ from the shipped ones. vehicle: what the app is built for, the one
+        that the networks were trained for if left out."""
         self._memory = ffi.new("double[]", call("appHostBytes")() // 8 + 1)  # doubles, for their alignment
         self._params = ffi.new("appParams_t *")
         self._sample = ffi.new("appSample_t *")
@@ -44,6 +48,8 @@ class AppCore:
         call("appHostDefaults")(self._params)
         self._assign(params or {})
         call("appHostInit")(self._memory, self._params, have_gap8, nonce)
+        if vehicle is not None:
+            call("appHostSetVehicle")(self._memory, vehicle_struct(vehicle), vehicle.arm_pwm)
         call("appHostClamp")(self._params)
 
     def step(self, acc: Sequence[float], gyro: Sequence[float], pwm: Sequence[float], *,

@@ -19,6 +19,10 @@ void appHostInit(void *core, const appParams_t *params, int haveGap8, uint32_t n
   appCoreInit(core, params, haveGap8 != 0, nonce);
 }
 
+void appHostSetVehicle(void *core, const airtouchVehicle_t *vehicle, float armPwm) {
+  appCoreSetVehicle(core, vehicle, armPwm);
+}
+
 uint16_t appHostSetParams(void *core, appParams_t *params) { return appCoreSetParams(core, params); }
 
 int appHostStep(void *core, const appSample_t *sample, appLog_t *log) {

@@ -3,6 +3,7 @@
 #include <stdint.h>
 
 #include "app_types.h"
+#include "kernel_types.h"
 
 /** Bytes of an STM32 app's core, of a GAP8 app's, and of the largest packet. */
 int64_t appHostBytes(void);
@@ -15,6 +16,7 @@ uint16_t appHostClamp(appParams_t *params);
 int appHostSame(const appParams_t *one, const appParams_t *other);
 /** See app_core.h. */
 void appHostInit(void *core, const appParams_t *params, int haveGap8, uint32_t nonce);
+void appHostSetVehicle(void *core, const airtouchVehicle_t *vehicle, float armPwm);
 uint16_t appHostSetParams(void *core, appParams_t *params);
 int appHostStep(void *core, const appSample_t *sample, appLog_t *log);
 void appHostReceive(void *core, const uint8_t *bytes, uint16_t length);

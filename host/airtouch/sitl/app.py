@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from airtouch.kernels.app_core import PARAM_TYPES, AppCore, Gap8Core
 from airtouch.sitl.param_service import Parameter
+from airtouch.vehicle import Vehicle
 
 GROUP = "airtouch"
 HEARTBEAT_S = 0.5
@@ -40,8 +41,9 @@ PARAMS = {
 class App:
     """`step` takes one sample of 100 Hz; `read` gives a log variable after it."""
 
-    def __init__(self, have_gap8: bool) -> None:
-        self._core = AppCore(have_gap8=have_gap8)
+    def __init__(self, have_gap8: bool, vehicle: Vehicle | None = None) -> None:
+        """vehicle: what the app is built for; AppCore's if left out."""
+        self._core = AppCore(have_gap8=have_gap8, vehicle=vehicle)
         self._gap8 = Gap8Core() if have_gap8 else None
         self._booted_s = self._beat_s = 0.0
         self.gap8_silent = False

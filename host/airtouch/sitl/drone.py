@@ -35,7 +35,7 @@ class Drone:
         self._start[controller.MOTORS] = 0.0
         self._table = np.zeros((1, loop.COLUMNS))
         self._setpoint = np.zeros((1, controller.SETPOINT_SIZE))
-        self.commander, self.app = Commander(), App(ai_deck)
+        self.commander, self.app = Commander(), App(ai_deck, vehicle)
         self.ticks = 0
         self.row = self._table[0]
         self.setpoint = self._setpoint[0]

@@ -4,6 +4,7 @@ import numpy as np
 
 from airtouch.detector.c_source import fields, float_literal, golden_header, golden_source, layer_arrays
 from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.vehicle_header import thrust_text
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
 from airtouch.reference.int8_network import quantise
@@ -36,7 +37,7 @@ def golden_flight(network: StreamNetwork) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _header(model: StreamModel) -> str:
-    network = model.int8
+    network, motion, decoder = model.int8, model.recipe.motion, model.decoder
     return f"""// The `best` detector: {parameter_bytes(network)} bytes of constants.
 // Input: {network.channels} motion channels a sample (motion_channels.h), quantised by airtouchStreamQuantisation.
 // Output: three logits on every {network.stride}nd sample: over a platform, entry, exit (edge_decoder.h).
@@ -47,13 +48,15 @@ def _header(model: StreamModel) -> str:
 
 #define AIRTOUCH_STREAM_SHA256 "{model.digest}"
 #define AIRTOUCH_STREAM_ARENA_BYTES {arena_bytes(network)}  // what streamInt8ArenaBytes says
-#define AIRTOUCH_STREAM_ENTRY_SCORE {float_literal(model.decoder.entry_score)}  // airtouchStreamDecoder.entryScore
-#define AIRTOUCH_STREAM_EXIT_SCORE {float_literal(model.decoder.exit_score)}
+#define AIRTOUCH_STREAM_VEHICLE "{motion.vehicle.name}"  // it was trained for
+#define AIRTOUCH_STREAM_THRUST "{thrust_text(motion.vehicle, motion.arm_pwm)}"
+#define AIRTOUCH_STREAM_ENTRY_SCORE {float_literal(decoder.entry_score)}  // airtouchStreamDecoder.entryScore
+#define AIRTOUCH_STREAM_EXIT_SCORE {float_literal(decoder.exit_score)}
 
 extern const streamInt8_t airtouchStream;
 extern const streamQuantisation_t airtouchStreamQuantisation;
 extern const decoderConfig_t airtouchStreamDecoder;
-extern const motionConfig_t airtouchStreamMotion;  // for {model.recipe.motion.vehicle.name}
+extern const motionConfig_t airtouchStreamMotion;
 """
 
 
@@ -69,8 +72,9 @@ def _source(model: StreamModel) -> str:
     text, pointers = layer_arrays("head", network.head)
     first, head = network.convs[0].layer, ",\n    ".join(fields(network.head) + pointers)
     settings = {
-        "overShare": decoder.over_share, "entryScore": decoder.entry_score, "exitScore": decoder.exit_score,
-        "lateEntry": decoder.late_entry, "lateExit": decoder.late_exit, "smoothGain": decoder.smooth_gain}
+        "overShare": float_literal(decoder.over_share), "entryScore": "AIRTOUCH_STREAM_ENTRY_SCORE",
+        "exitScore": "AIRTOUCH_STREAM_EXIT_SCORE", "lateEntry": float_literal(decoder.late_entry),
+        "lateExit": float_literal(decoder.late_exit), "smoothGain": float_literal(decoder.smooth_gain)}
     counts = {"dwellSteps": decoder.dwell_steps, "armSteps": decoder.arm_steps, "lookBack": decoder.look_back,
               "holdSteps": decoder.hold_steps}
     return "\n".join([
@@ -84,7 +88,7 @@ def _source(model: StreamModel) -> str:
         f"    .inputZeroPoint = {first.input_zero_point},",
         f"    .outputZeroPoint = {network.head.output_zero_point},", "};", "",
         "const decoderConfig_t airtouchStreamDecoder = {",
-        *(f"    .{name} = {float_literal(value)}," for name, value in settings.items()),
+        *(f"    .{name} = {value}," for name, value in settings.items()),
         *(f"    .{name} = {value}," for name, value in counts.items()), "};", "", _motion(model.recipe.motion)])
 
 

@@ -1,0 +1,2 @@
+// The configuration comes from the compiler's command line.
+#pragma once

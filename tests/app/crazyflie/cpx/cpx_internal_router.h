@@ -1,0 +1,5 @@
+#pragma once
+
+#include "cpx.h"
+
+bool cpxSendPacketBlockingTimeout(const CPXPacket_t *packet, const uint32_t timeout);

@@ -1,0 +1,392 @@
+// The app's shell over stand-ins of the firmware (crazyflie/); built with sanitizers by test_shell.py.
+// One scenario a run, named on the command line. The drone hovers; time is what the scenario makes of it.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "airtouch_app.c"
+
+#define HIDDEN 0xffffu
+#define HOVER_PWM 42000.0f
+
+static void check(bool good, const char *what) {
+  if (!good) {
+    fprintf(stderr, "broken promise: %s\n", what);
+    abort();
+  }
+}
+
+// ---- time and tasks
+
+static TickType_t tick = 5000;
+static jmp_buf landed;
+static int stepsLeft;
+static TickType_t delay;               // ticks that the next step begins late
+static void (*between)(int step);      // runs before each step, as another task would
+static void (*afterClock)(void);       // runs once, right after the clock was read
+static void (*beforeCritical)(void);   // runs once, as a task that comes in just before interrupts go off
+static int critical;
+
+TickType_t xTaskGetTickCount(void) {
+  const TickType_t now = tick;
+  if (afterClock != NULL) {
+    void (*const task)(void) = afterClock;
+    afterClock = NULL;
+    task();
+  }
+  return now;
+}
+
+void vTaskDelayUntil(TickType_t *due, TickType_t period) {
+  static int count;
+  if (stepsLeft-- == 0) {
+    longjmp(landed, 1);
+  }
+  *due += period;
+  if ((int32_t)(*due - tick) > 0) {
+    tick = *due;
+  }
+  tick += delay;
+  delay = 0;
+  if (between != NULL) {
+    between(count);
+  }
+  count++;
+}
+
+void taskENTER_CRITICAL(void) {
+  if (beforeCritical != NULL) {
+    void (*const task)(void) = beforeCritical;
+    beforeCritical = NULL;
+    task();
+  }
+  critical++;
+}
+
+void taskEXIT_CRITICAL(void) { check(critical-- > 0, "critical sections are balanced"); }
+uint64_t usecTimestamp(void) { return 1000u * (uint64_t)tick; }
+
+void debugPrint(const char *format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  vprintf(format, arguments);
+  va_end(arguments);
+}
+
+static void fly(int steps) {
+  stepsLeft = steps;
+  if (setjmp(landed) == 0) {
+    appMain();
+  }
+  check(critical == 0, "interrupts are on again");
+}
+
+// ---- log variables and parameters
+
+static const char *const names[] = {"stateEstimate.ax", "stateEstimate.ay", "stateEstimate.az", "gyro.x", "gyro.y",
+                                    "gyro.z", "motor.m1", "motor.m2", "motor.m3", "motor.m4", "pm.vbat",
+                                    "stateEstimate.qx", "stateEstimate.qy", "stateEstimate.qz", "stateEstimate.qw"};
+static const float values[] = {0,         0,         0,         0,         0, 0, HOVER_PWM, HOVER_PWM,
+                               HOVER_PWM, HOVER_PWM, 3.8f, 0, 0, 0, 1};
+static const char *hidden = "";
+static unsigned int deck = 1;
+
+logVarId_t logGetVarId(const char *group, const char *name) {
+  char whole[64];
+  snprintf(whole, sizeof whole, "%s.%s", group, name);
+  for (unsigned i = 0; i < sizeof names / sizeof *names; i++) {
+    if (strcmp(names[i], whole) == 0 && strcmp(hidden, whole) != 0) {
+      return (logVarId_t)i;
+    }
+  }
+  return HIDDEN;
+}
+
+float logGetFloat(logVarId_t id) {
+  check(id < sizeof values / sizeof *values, "logGetFloat() gets a valid identifier: it halts the drone on others");
+  return values[id] + (id < 2 ? 1e-4f * (float)(tick % 7) : 0.0f);  // no two samples are the same in flight
+}
+
+paramVarId_t paramGetVarId(const char *group, const char *name) {
+  const bool there = deck != HIDDEN && strcmp(group, "deck") == 0 && strcmp(name, "bcAI") == 0;
+  return (paramVarId_t){.id = there ? 0 : HIDDEN, .index = there ? 0 : HIDDEN};
+}
+
+unsigned int paramGetUint(paramVarId_t id) {
+  check(PARAM_VARID_IS_VALID(id), "paramGetUint() gets a valid identifier: it halts the drone on others");
+  return deck;
+}
+
+// ---- CPX and the GAP8
+
+static int sent, registered;
+
+#ifdef CONFIG_DECK_AI
+#include "app_core_batch.h"
+#include "cpx_internal_router.h"
+#include "queue.h"
+
+static void *gap8;
+static cpxAppMessageHandlerCallback_t handler;
+
+QueueHandle_t xQueueCreateStatic(uint32_t slots, uint32_t size, uint8_t *storage, StaticQueue_t *memory) {
+  *memory = (StaticQueue_t){storage, slots, size, 0, 0};
+  return memory;
+}
+
+BaseType_t xQueueSend(QueueHandle_t queue, const void *item, TickType_t wait) {
+  check(queue != NULL && wait == 0, "the app never waits for a queue");
+  if (queue->count == queue->slots) {
+    return pdFALSE;
+  }
+  memcpy(queue->storage + (queue->first + queue->count++) % queue->slots * queue->size, item, queue->size);
+  return pdTRUE;
+}
+
+BaseType_t xQueueReceive(QueueHandle_t queue, void *item, TickType_t wait) {
+  check(queue != NULL && wait == 0, "the app never waits for a queue");
+  if (queue->count == 0) {
+    return pdFALSE;
+  }
+  memcpy(item, queue->storage + queue->first * queue->size, queue->size);
+  queue->first = (queue->first + 1) % queue->slots;
+  queue->count--;
+  return pdTRUE;
+}
+
+void cpxInitRoute(const CPXTarget_t source, const CPXTarget_t destination, const CPXFunction_t function,
+                  CPXRouting_t *route) {
+  *route = (CPXRouting_t){.source = source, .destination = destination, .function = function};
+}
+
+void cpxRegisterAppMessageHandler(cpxAppMessageHandlerCallback_t callback) {
+  registered++;
+  handler = callback;
+}
+
+static void answer(CPXTarget_t source, const uint8_t *bytes, uint16_t length) {
+  CPXPacket_t packet = {.dataLength = length};
+  cpxInitRoute(source, CPX_T_STM32, CPX_F_APP, &packet.route);
+  memcpy(packet.data, bytes, length < CPX_MAX_PAYLOAD_SIZE ? length : CPX_MAX_PAYLOAD_SIZE);
+  handler(&packet);
+}
+
+bool cpxSendPacketBlockingTimeout(const CPXPacket_t *packet, const uint32_t timeout) {
+  uint8_t reply[EDGE_LINK_MAX_BYTES];
+  check(timeout == 0, "the app never waits for CPX");
+  check(packet->route.destination == CPX_T_GAP8 && packet->route.function == CPX_F_APP, "packets go to the GAP8's app");
+  check(packet->dataLength <= 98, "the firmware's UART transport asserts on longer packets");
+  check(handler != NULL, "answers are taken before questions are asked");
+  if (sent++ == 0) {
+    gap8 = aligned_alloc(8, ((size_t)gap8HostBytes() + 7) / 8 * 8);
+    gap8HostInit(gap8);
+  }
+  const uint16_t length = gap8HostTake(gap8, packet->data, packet->dataLength, reply);
+  if (length > 0) {
+    answer(CPX_T_GAP8, reply, length);
+  }
+  return true;
+}
+#endif
+
+// ---- scenarios
+
+static void silent(void) {
+  fly(600);
+  check(core.log.detector == APP_BEST && core.log.answers > 0 && core.log.health == 0, "best runs on the STM32");
+  check(sent == 0 && registered == 0, "unless it is asked to, the app has nothing to do with CPX");
+}
+
+#ifdef CONFIG_DECK_AI
+static int sentBefore;
+
+static void chooseGap8(int step) {
+  wanted.detector = step >= 100 && step < 700 ? APP_BEST_GAP8 : APP_BEST;
+  check(step > 100 || (sent == 0 && registered == 0), "nothing is sent before it is asked for");
+  if (step == 700) {
+    check(registered == 1 && sent > 500, "the GAP8 gets the samples");
+    check(core.log.link == LINK_UP && core.log.detector == APP_BEST_GAP8 && core.log.health == 0, "and answers");
+    sentBefore = sent;
+  }
+}
+
+static void gap8OnRequest(void) {
+  between = chooseGap8;
+  fly(800);
+  check(sentBefore > 0 && sent == sentBefore && core.log.detector == APP_BEST, "and is left alone again");
+}
+
+static void wantGap8(int step) {
+  (void)step;
+  wanted.detector = APP_BEST_GAP8;
+}
+
+static void noDeck(void) {
+  between = wantGap8;
+  fly(100);
+  check(sent == 0 && registered == 0 && core.log.detector == APP_BEST, "without an AI-deck the STM32 runs the network");
+  check(core.log.health == APP_NO_GAP8, "and health says so");
+}
+
+static void foreignPackets(int step) {
+  uint8_t bytes[CPX_MAX_PAYLOAD_SIZE];
+  wanted.detector = APP_BEST_GAP8;
+  for (int i = 0; handler != NULL && step < 400 && i < 6; i++) {  // more than the inbox holds
+    for (unsigned k = 0; k < sizeof bytes; k++) {
+      bytes[k] = (uint8_t)(step * 31 + i * 7 + (int)k);
+    }
+    answer(i % 2 ? CPX_T_GAP8 : CPX_T_WIFI_HOST, bytes, (uint16_t)(i == 3 ? 65535 : (step * 13 + i) % 101));
+  }
+}
+
+static void foreign(void) {
+  between = foreignPackets;
+  fly(800);
+  check(core.log.link == LINK_UP && core.log.answers > 0, "the link comes up after any packets");
+}
+#endif
+
+static void missingVariable(void) {
+  hidden = "stateEstimate.ax";
+  fly(100);
+  check(core.log.health & APP_NO_SENSOR, "health says that a log variable is missing");
+  hidden = "pm.vbat";
+  fly(100);
+  check(core.log.health & APP_NO_SENSOR, "health says that a log variable is missing");
+}
+
+static void badParameter(int step) {
+  if (step == 50) {
+    wanted.pFa = NAN;
+    wanted.detector = 200;
+  }
+}
+
+static void parameters(void) {
+  const float usual = wanted.pFa;
+  wanted.scoreIn = 4.5f;  // before the app starts
+  between = badParameter;
+  fly(200);
+  check(wanted.scoreIn == 4.5f && core.params.scoreIn == 4.5f, "a parameter set before the start is kept");
+  check(wanted.pFa == usual && wanted.detector == APP_PAPER_GAP8, "what is out of range is put right");
+  check(core.log.paramErrors == 2, "and counted once");
+}
+
+static void setAnother(void) { wanted.scoreOut = 3.25f; }
+
+static void writeBetween(void) {
+  wanted.pFa = -1.0f;
+  beforeCritical = setAnother;
+  fly(1);
+  check(wanted.scoreOut == 3.25f, "a parameter written while another is put right is not lost");
+  fly(1);
+  check(wanted.scoreOut == 3.25f && wanted.pFa == 1e-12f && core.params.scoreOut == 3.25f, "and is in force next");
+}
+
+static void finishStep(void) { lastStep = ++tick; }
+
+static bool stalledNow(void) { return (healthLogger.acquireUInt16(0, NULL) & APP_STALLED) != 0; }
+
+static void stalled(void) {
+  check(stalledNow(), "before the first step nothing runs");
+  fly(20);
+  check(!stalledNow(), "it runs");
+  afterClock = finishStep;
+  check(!stalledNow(), "a step that ends while health is read is none that does not come");
+  tick += 51;
+  check(stalledNow(), "no step for more than 50 ms");
+  tick = UINT32_MAX - 20;
+  fly(20);
+  check(!stalledNow() && core.log.samples == 20, "ticks wrap");
+}
+
+static void hold(int step) { delay = step == 100 ? 40 : (step == 150 ? 500 : 0); }
+
+static void late(void) {
+  between = hold;
+  const TickType_t begin = tick;
+  fly(200);
+  check(core.log.late >= 4 && core.log.late <= 6, "steps that begin late are counted");
+  check(core.log.samples == 200 && tick - begin >= 2000 + 500 - 20, "what is missed by far is left out");
+}
+
+#ifdef CONFIG_CONTROLLER_OOT
+#include "controller_pid.h"
+
+static int controlled;
+void controllerPidInit(void) {}
+bool controllerPidTest(void) { return true; }
+void controllerPid(control_t *control, const setpoint_t *setpoint, const sensorData_t *sensors, const state_t *state,
+                   const stabilizerStep_t stabilizerStep) {
+  (void)control, (void)setpoint, (void)sensors, (void)state, (void)stabilizerStep;
+  controlled++;
+}
+
+static void controlTenTimes(int step) {
+  if (step >= 50) {
+    return;  // another controller is chosen
+  }
+  for (int i = 0; i < 10; i++) {
+    const sensorData_t sensors = {{{0.1f * (float)i, 0.0f, 1.0f}}, {{(float)i, 0.0f, -90.0f}}};
+    controllerOutOfTree(NULL, NULL, &sensors, NULL, 0);
+  }
+}
+
+static void tap(void) {
+  between = controlTenTimes;
+  fly(60);
+  check(controlled == 500, "the firmware's controller is called each time");
+  check(fabsf(core.pipeline.held[0]) < 0.01f, "where it is not called the log variables count");
+}
+
+static void tapMean(void) {
+  between = controlTenTimes;
+  fly(20);
+  const float *held = core.pipeline.held;
+  check(fabsf(held[0] - 0.45f * 9.81f) < 1e-4f && fabsf(held[2] - 9.81f) < 1e-4f, "the mean acceleration, in m/s^2");
+  check(fabsf(held[3] - 0.0785398f) < 1e-5f && fabsf(held[5] + 1.5707963f) < 1e-5f, "the mean rate, in rad/s");
+}
+#endif
+
+/** The PARAM group as a client finds it before the app has started. */
+static void tables(void) {
+  for (const variableEntry_t *entry = logs; entry->name != NULL; entry++) {
+    printf("log %s.%s %d\n", logGroup, entry->name, entry->type);
+  }
+  for (const variableEntry_t *entry = params; entry->name != NULL; entry++) {
+    const double value = entry->type == PARAM_FLOAT ? (double)*(float *)entry->address
+                         : entry->type == PARAM_UINT8 ? *(uint8_t *)entry->address : *(uint16_t *)entry->address;
+    printf("param %s.%s %d %a\n", paramGroup, entry->name, entry->type, value);
+  }
+}
+
+typedef struct {
+  const char *name;
+  void (*run)(void);
+} scenario_t;
+
+static const scenario_t scenarios[] = {
+    {"silent", silent}, {"missing-variable", missingVariable}, {"parameters", parameters},
+    {"write-between", writeBetween}, {"stalled", stalled}, {"late", late}, {"tables", tables},
+#ifdef CONFIG_DECK_AI
+    {"gap8-on-request", gap8OnRequest}, {"no-deck", noDeck}, {"foreign", foreign},
+#endif
+#ifdef CONFIG_CONTROLLER_OOT
+    {"tap", tap}, {"tap-mean", tapMean},
+#endif
+};
+
+int main(int argc, char **argv) {
+  deck = argc > 2 ? (unsigned)atoi(argv[2]) : 1;
+  for (unsigned i = 0; argc > 1 && i < sizeof scenarios / sizeof *scenarios; i++) {
+    if (strcmp(argv[1], scenarios[i].name) == 0) {
+      scenarios[i].run();
+      return 0;
+    }
+  }
+  fprintf(stderr, "no such scenario\n");
+  return 2;
+}
