@@ -20,7 +20,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.thrust_stand import read_thrust_stand
 
 RATES = (100.0, 100.0, 50.0, 7.3, 250.0, 1000.0, 10000.0)
-LONGEST_MESSAGE = 400
+LONGEST_MESSAGE = 450
 
 
 def walk(data: bytes, source: str, r: Random) -> str:
