@@ -37,9 +37,14 @@ def parse(data: bytes, source: str) -> FlightLog:
     return checked(log)
 
 
+def load_bytes(path: str | Path) -> bytes:
+    """A file's bytes, unzipped."""
+    return unzipped(_bytes(path), str(path), [])
+
+
 def load_text(path: str | Path) -> bytes:
     """A text file's bytes, unzipped, line ends LF."""
-    return _text(unzipped(_bytes(path), str(path), []), str(path))
+    return _text(load_bytes(path), str(path))
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
@@ -62,7 +67,7 @@ def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
 
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
     """Bytes into a file through a temporary one beside it."""
-    if path.exists() and not force:
+    if os.path.exists(path) and not force:
         raise AirTouchError(f"{path}: exists already; use --force to replace it")
     temporary = None
     try:
@@ -127,7 +132,7 @@ def _by_header(text: Sheet, source: str) -> FlightLog:
         return imrclab.read(text, source)
     if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
-    raise AirTouchError(f"{source}:{text.line}: unknown header {shown(text.first[:200].decode('utf-8', 'replace'), 60)!r}; "
+    raise AirTouchError(f"{source}:{text.line}: unknown header '{shown(text.first[:200].decode('utf-8', 'replace'), 60)}'; "
                         "name the columns as in the table of columns")
 
 

@@ -64,7 +64,7 @@ def _check(schema: Any, footer: Any, types: Any, source: str) -> None:
     for field in schema:
         if not any(check(field.type) for check in (types.is_integer, types.is_floating, types.is_boolean,
                                                    types.is_decimal, types.is_null)):
-            raise AirTouchError(f"{source}: column {shown(field.name)!r} holds {shown(str(field.type))}, not numbers; "
+            raise AirTouchError(f"{source}: column '{shown(field.name)}' holds {shown(str(field.type))}, not numbers; "
                                 "leave it out")
     if not set(schema.names) & set(COLUMNS) or not footer.num_rows:
         raise AirTouchError(f"{source}: no known column or no row in this Parquet file; "

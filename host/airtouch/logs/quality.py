@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.channel_faults import duplicates, saturated, spikes, stuck
-from airtouch.logs.clock import Gap, lost_samples, sample_period, true_period
+from airtouch.logs.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
@@ -83,8 +83,8 @@ def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
 
 
 def _duration(clock: np.ndarray, samples: int, period: float) -> float:
-    span = float(clock[-1] - clock[0]) if len(clock) else np.nan
-    return span if np.isfinite(span) else max(samples - 1, 0) * period
+    timed = clock[np.abs(clock) <= LATEST_S]
+    return float(timed[-1] - timed[0]) if len(timed) else max(samples - 1, 0) * period
 
 
 def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment], period: float | None) -> list[str]:

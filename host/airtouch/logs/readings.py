@@ -42,24 +42,27 @@ def _without(values: np.ndarray, bad: np.ndarray, problem: str, warnings: list[s
 
 
 def _impossible_times(time_s: np.ndarray, source: str) -> np.ndarray:
-    """Times too far from the log's median time for its number of samples, bool (n,)."""
+    """Times that no stretch of n times 5 s can hold together with the most others, bool (n,)."""
     with np.errstate(invalid="ignore"):
-        late = np.abs(time_s) > LATEST_S
-    possible = time_s[~late & ~np.isnan(time_s)]
+        wrong = np.abs(time_s) > LATEST_S
+    there = ~np.isnan(time_s)
+    possible = time_s[there & ~wrong]
     if not len(possible):
-        return late
-    steps = np.diff(possible)
-    step = np.median(steps[steps > 0]) if (steps > 0).any() else FASTEST_S
-    if step > SLOWEST_S:
-        raise AirTouchError(f"{source}: {step:g} s between its samples, where {SLOWEST_S:g} s is the most; "
-                            "give t_s in seconds")
-    with np.errstate(invalid="ignore"):
-        far = late | (np.abs(time_s - np.median(possible)) > 0.5 * SLOWEST_S * len(time_s))
-    if far.sum() > 0.5 * len(time_s):
-        first = np.flatnonzero(far)[0]
-        raise AirTouchError(f"{source}: {far.sum()} of {len(time_s)} times cannot be, the first "
-                            f"{time_s[first]:g} s (sample {first}); correct t_s or leave it out")
-    return far
+        return wrong
+    first = np.sort(possible)
+    last = first + SLOWEST_S * len(time_s)
+    most = np.argmax(np.searchsorted(first, last, side="right") - np.arange(len(first)))
+    wrong |= (time_s < first[most]) | (time_s > last[most])
+    if wrong.sum() > 0.5 * len(time_s) or _step(time_s[there & ~wrong]) > SLOWEST_S:
+        raise AirTouchError(f"{source}: {_step(possible):g} s from sample to sample, and {wrong.sum()} of "
+                            f"{len(time_s)} times cannot be; give t_s in seconds, correct it or leave it out")
+    return wrong
+
+
+def _step(time_s: np.ndarray) -> float:
+    """Median step forward in seconds, 0 where there is none."""
+    steps = np.diff(time_s)
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
 def _checked_meta(meta: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:

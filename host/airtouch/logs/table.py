@@ -54,7 +54,7 @@ def check_names(names: list[str], place: str) -> None:
                  "has too long a name" if len(name) > LONGEST_NAME else
                  "has another one's name" if name in names[:i] else "")
         if fault:
-            raise AirTouchError(f"{place}: column {i + 1} {fault} ({shown(name)!r}); give each its own short name")
+            raise AirTouchError(f"{place}: column {i + 1} {fault} ('{shown(name)}'); give each its own short name")
 
 
 def named_table(text: Sheet, source: str, warnings: list[str]) -> dict[str, np.ndarray]:
@@ -118,7 +118,7 @@ def _first_problem(body: bytes, columns: int) -> tuple[int, str, bool]:
             return i, f"{cells} cells where {columns} are expected", place >= last
         for number, cell in enumerate(line.split(b","), start=1):
             if not _is_number(cell):
-                return i, f"cell {number} holds {shown(cell.strip()[:80].decode('ascii', 'replace'), 20)!r}, not a number", \
+                return i, f"cell {number} holds '{shown(cell.strip()[:80].decode('ascii', 'replace'), 20)}', not a number", \
                     place >= last
     return 0, "not a table of numbers", False
 

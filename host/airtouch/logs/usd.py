@@ -109,7 +109,7 @@ def _event(name: str, declared: list[str], version: int, source: str) -> Event:
     for i, text in enumerate(declared):
         letter = text[-2:-1]
         if len(text) < 4 or text[-3] != "(" or text[-1] != ")" or letter not in _TYPES:
-            raise AirTouchError(f"{source}: damaged uSD header: variable {shown(text, 30)!r} has no known type; "
+            raise AirTouchError(f"{source}: damaged uSD header: variable '{shown(text, 30)}' has no known type; "
                                 "copy it from the card again")
         fields.append((f"v{i}", _TYPES[letter]))
     return Event(name, tuple(text[:-3] for text in declared), np.dtype(fields))
