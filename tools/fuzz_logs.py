@@ -76,8 +76,8 @@ def one(name: str, seed: int, number: int, folder: Path, every: int = COMMAND_EV
     if number % every == 0:
         path.write_bytes(data)
         walk.command(["check", str(path), *(["--json"] if number % (2 * every) else [])], path)
-        walk.command(["convert", str(path), "--out", str(folder / "out"), "--force", "--format", "csv", "--rate", "100"],
-                     path)
+        convert = ["convert", str(path), "--out", str(folder / "out"), "--force", "--format", "csv", "--rate", "100"]
+        walk.command(convert, path)
     seconds, mb = time.process_time() - start, memory_mb("VmHWM") - held
     size = len(data) / 1e6
     assert seconds < MOST_S + MOST_S_PER_MB * size, f"{seconds:.2f} s for {len(data)} bytes"
@@ -99,17 +99,18 @@ def memory_mb(key: str) -> float:
         return next(int(line.split()[1]) / 1024 for line in status if line.startswith(key))
 
 
-def fuzz(name: str, seed: int, first: int, count: int, folder: Path, every: int = COMMAND_EVERY) -> Count:
+def fuzz(name: str, seed: int, first: int, count: int, folder: Path) -> Count:
     """Inputs first to first + count - 1 of one format."""
     result = Count()
     walk.walk(files_of(name)[-1], name, Random(0))  # what is imported on the way counts for no input
     for number in range(first, first + count):
         try:
-            outcome, seconds, mb = one(name, seed, number, folder, every)
+            outcome, seconds, mb = one(name, seed, number, folder)
         except Exception as error:
             result.failed += 1
             place = traceback.extract_tb(error.__traceback__)[-1]
-            what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {str(error).replace(str(folder), '')[:100]!r}"
+            message = str(error).replace(str(folder), "")[:100]
+            what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {message!r}"
             result.failures.setdefault(what, []).append(number)
             continue
         setattr(result, outcome, getattr(result, outcome) + 1)
@@ -135,12 +136,12 @@ def main() -> int:
             print(one(options.format[0], options.seed, options.only, Path(folder), 1))
             return 0
         failed = 0
-        print(f"{'format':14}{'inputs':>9}{'logs':>9}{'refused':>9}{'failed':>8}{'worst s':>9}{'worst MB':>10}", flush=True)
+        print("format          inputs     logs  refused  failed  worst s (input)  worst MB (input)", flush=True)
         for name in options.format or sound.FORMATS:
             c = fuzz(name, options.seed, options.first, options.count, Path(folder))
             failed += c.failed
-            print(f"{name:14}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}{c.worst_mb[0]:10.1f}",
-                  flush=True)
+            print(f"{name:13}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}"
+                  f" {c.worst_s[1]:<7}{c.worst_mb[0]:10.1f} {c.worst_mb[1]}", flush=True)
             for what, numbers in sorted(c.failures.items(), key=lambda item: -len(item[1])):
                 print(f"  {len(numbers)} times {what}\n    python tools/fuzz_logs.py --seed {options.seed} "
                       f"--format {name} --only {numbers[0]}")

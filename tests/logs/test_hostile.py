@@ -184,6 +184,15 @@ def test_text_of_another_encoding_names_the_remedy():
         parse(flying().decode().encode("utf-16"), "made")
 
 
+@pytest.mark.parametrize("blank", [b"", b"  ", b"\t", b"\x0c", b"\r", b" \r\n"])
+def test_lines_of_blanks_are_skipped_and_errors_name_the_line_after_them(blank):
+    text = b"t_s,x_m\n" + blank + b"\n1,2\n" + blank + b"\n3,4\n"
+    assert parse(text, "made")["x_m"].tolist() == [2, 4]
+    line = (text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).count(b"\n") + 1
+    with pytest.raises(AirTouchError, match=f"made:{line}: cell 2 holds 'x', not a number; correct or delete"):
+        parse(text + b"5,x\n7,8\n", "made")
+
+
 # uSD logs
 
 

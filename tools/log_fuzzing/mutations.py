@@ -5,19 +5,22 @@ from collections.abc import Callable
 from random import Random
 
 #: numbers and near-numbers that a cell may come to hold
-EXTREMES = tuple(
-    b"nan NaN -nan inf -inf Infinity 1e308 -1e308 1e309 1.8e308 5e-324 -5e-324 2.3e-308 1e-300 -0 0 1 -1 -0.0 1e38 4e38"
-    b" -4e38 1e19 18446744073709551616 9223372036854775807 -9223372036854775808 4294967296 4294967295 65535 65536 -32768"
-    b" 32767 1e10 1.1e10 1e16 2e9 1e-9 0x10 1_000 1e 1e+ . - + +5 .5 5. 1,5 1.5.2 12abc null None NULL N/A # true \"1\" "
-    b" '1' 1d5 1f \xd9\xa1 \xc2\xb2 \xff\xfe \x00 \xe2\x88\x92" b"5".split(b" ")) + (b"", b" ", b"9" * 400, b"0." + b"3" * 400)
-NAMES = (b"t_s timestamp_ms acc_x_mps2 gyro_x_radps m1_pwm zrange_m x_m vx_mps roll_rad rpm_1 range_left_m acc.x gyro.x"
-         b" gyro.xRaw motor.m1 pwm.m1_pwm stateEstimate.ax stateEstimateZ.ax stateEstimateZ.quat stateEstimate.qw"
-         b" pm.vbat range.zrange pwm vbat[V] rpm1 1 nan humidity T_S \xff \xc3\xa9 \x1b[31m \"t_s\" t_s# a:b").split(b" ")
-META = (b"# sample_period_s: %s\n# warnings: [1, {\"a\": \"\\ud800\"}]\n# warnings: \"x\"\n# acc_frame: 3\n# vehicle: [[]]\n"
-        b"# condition: {\"wind\": NaN}\n# source: 5\n# format: {}\n# : 1\n# a\n#\n# resampled: []\n# x: \xff\xfe\n"
-        b"# acc_frame: \"world\"\n# sample_period_s: \"0.01\"\n# sample_period_s: [1]\n# warnings: [\"a\\nb\", \"\\u001b[2J\"]"
-        ).split(b"\n")
-
+EXTREMES = (
+    *b"nan NaN -nan inf -inf Infinity 1e308 -1e308 1e309 1.8e308 5e-324 -5e-324 2.3e-308 1e-300 -0 0 1 -1 -0.0".split(),
+    *b"1e38 4e38 -4e38 1e19 18446744073709551616 9223372036854775807 -9223372036854775808 4294967296 65535".split(),
+    *b"65536 -32768 32767 1e10 1.1e10 1e16 2e9 1e-9 0x10 1_000 1e 1e+ . - + +5 .5 5. 1,5 1.5.2 12abc null".split(),
+    *b"None NULL N/A # true \"1\" '1' 1d5 1f \xd9\xa1 \xc2\xb2 \xff\xfe \x00 \xe2\x88\x925 (5+0j) +-1 1e5e5".split(),
+    b"", b" ", b"9" * 400, b"0." + b"3" * 400)
+NAMES = (
+    *b"t_s timestamp_ms acc_x_mps2 gyro_x_radps m1_pwm zrange_m x_m vx_mps roll_rad rpm_1 range_left_m acc.x".split(),
+    *b"gyro.x gyro.xRaw motor.m1 pwm.m1_pwm stateEstimate.ax stateEstimateZ.ax stateEstimateZ.quat".split(),
+    *b"stateEstimate.qw pm.vbat range.zrange pwm vbat[V] rpm1 1 nan humidity T_S \xff \xc3\xa9 \x1b[31m".split(),
+    *b"\"t_s\" t_s# a:b".split())
+META = (
+    b"# sample_period_s: %s", b'# sample_period_s: "0.01"', b"# sample_period_s: [1]", b'# warnings: "x"',
+    b'# warnings: [1, {"a": "\\ud800"}]', b'# warnings: ["a\\nb", "\\u001b[2J"]', b"# acc_frame: 3",
+    b'# acc_frame: "world"', b"# vehicle: [[]]", b'# condition: {"wind": NaN}', b"# source: 5", b"# format: {}",
+    b"# : 1", b"# a", b"#", b"# resampled: []", b"# x: \xff\xfe", b"# y: " + b"[" * 2000)
 
 def any_bytes(data: bytes, r: Random) -> bytes:
     """Flipped, replaced, inserted, deleted, repeated or cut-off bytes."""
@@ -64,7 +67,8 @@ def rows(data: bytes, r: Random) -> bytes:
         elif kind == 5:
             lines.reverse()
         elif kind == 6:
-            lines[a:a] = [r.choice((b"\n", b" \n", b"#\n", b"# a: 1\n", b",\n", b"\t\n", b"\x0c\n"))] * r.choice((1, 30))
+            blank = r.choice((b"\n", b" \n", b"#\n", b"# a: 1\n", b",\n", b"\t\n", b"\x0c\n"))
+            lines[a:a] = [blank] * r.choice((1, 30))
         elif len(lines) > 1:
             del lines[a]
         lines = lines or [b""]
@@ -148,7 +152,8 @@ def encoding(data: bytes, r: Random) -> bytes:
     kind = r.randrange(9)
     place = r.randrange(len(data) + 1)
     if kind == 0:
-        return data.decode("latin-1").encode(r.choice(("utf-16", "utf-16-le", "utf-32", "utf-8-sig", "cp037", "utf-7")))
+        other = r.choice(("utf-16", "utf-16-le", "utf-32", "utf-8-sig", "cp037", "utf-7"))
+        return data.decode("latin-1").encode(other)
     if kind == 1:
         return data.replace(b",", r.choice((b";", b"\t", b" ", b", ", b" , ", b",,", b"|")))
     if kind == 2:
@@ -163,16 +168,18 @@ def encoding(data: bytes, r: Random) -> bytes:
         giant = r.choice((b"1", b"0", b"x", b",", b"\n", b" ", b"-", b"1e", b"#", b"[", b"\xff", b"1,", b",\n", b"1\n"))
         return data[:place] + giant * r.choice((1000, 20000)) + data[place:]
     if kind == 6:
-        return r.choice((b"\xef\xbb\xbf", b"\xff\xfe", b"\x00", b"\xbc", b"PAR1", b"\x1f\x8b", b" ", b"\n\n", b"sep=,\n")) + data
+        marks = (b"\xef\xbb\xbf", b"\xff\xfe", b"\x00", b"\xbc", b"PAR1", b"\x1f\x8b", b" ", b"\n\n", b"sep=,\n")
+        return r.choice(marks) + data
     if kind == 7:
-        return data[:place] + r.choice(("é", "１", "٣", "\ud800", "\u202e", "−", "​")).encode("utf-8", "surrogatepass") + data[place:]
+        odd = r.choice(("\u00e9", "\uff11", "\u0663", "\ud800", "\u202e", "\u2212", "\u200b"))
+        return data[:place] + odd.encode("utf-8", "surrogatepass") + data[place:]
     return data.replace(b"e", r.choice((b"E", b"d", b"")))
 
 
 def zipped(data: bytes, r: Random) -> bytes:
     """Packed again, in several members, with a tail, cut or damaged."""
     half = len(data) // 2
-    kind = r.randrange(6)
+    kind = r.randrange(10)
     if kind == 0:
         return gzip.compress(data[:half], 1, mtime=0) + gzip.compress(data[half:], 1, mtime=0)
     packed = gzip.compress(data, 1, mtime=0)
@@ -184,11 +191,11 @@ def zipped(data: bytes, r: Random) -> bytes:
         return gzip.compress(packed, 1, mtime=0)
     if kind == 4:
         return gzip.compress(b"", mtime=0) * r.choice((1, 300)) + packed
-    return any_bytes(packed, r)
+    return any_bytes(packed, r) if kind == 5 else packed
 
 
 TEXT: tuple[Callable[[bytes, Random], bytes], ...] = (
-    any_bytes, any_bytes, cut, rows, rows, columns, columns, numbers, numbers, numbers, numbers, header, header, encoding)
+    any_bytes, any_bytes, cut, rows, rows, columns, columns, *[numbers] * 4, header, header, encoding)
 
 
 def text(data: bytes, r: Random) -> bytes:

@@ -13,32 +13,36 @@ from pyarrow import parquet
 from log_fuzzing.mutations import META, any_bytes, cut, zipped
 
 EXTREMES = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, 4e38, -0.0, 1e19, 1e10, 1e12, 65536.0)
-JSON = tuple(line.partition(b":")[2].strip() for line in META if b":" in line) + (
-    b"[" * 5000, b'{"sample_period_s": 1e-300}', b'{"sample_period_s": 1e400}', b'{"warnings": ["a\\nb", "\\ud800"]}',
-    b'{"acc_frame": 5, "vehicle": [], "condition": NaN}', b"\xff", b"9" * 5000, b'{"source": 1, "format": 2}')
-NAMES = ("t_s", "acc_x_mps2", "m1_pwm", "zrange_m", "", " ", "a\nb", "\x1b[31m", "é", "n" * 3000, "a,b", "__index_level_0__")
-INTEGERS = (pa.int8(), pa.uint8(), pa.int16(), pa.int32(), pa.uint32(), pa.int64(), pa.uint64(), pa.float32(), pa.float16())
+JSON = (
+    *(b'{"%s": %s}' % tuple(line[2:].split(b": ", 1)) for line in META if b": " in line),
+    b"[" * 5000, b'{"sample_period_s": 1e-300}', b'{"sample_period_s": 1e400}', b"\xff", b"9" * 5000, b"[]", b"1", b"",
+    b'{"warnings": ["a\\nb", "\\ud800"]}', b'{"acc_frame": 5, "vehicle": [], "condition": NaN}', b'{"source": 1}')
+NAMES = ("t_s", "acc_x_mps2", "m1_pwm", "zrange_m", "", " ", "a\nb", "\x1b[31m", "\u00e9", "n" * 3000, "a,b",
+         "__index_level_0__")
+NUMBERS = (pa.int8(), pa.uint8(), pa.int16(), pa.int32(), pa.uint32(), pa.int64(), pa.uint64(), pa.float32())
+PAIR = pa.list_(pa.float64(), 2)
 
 
 def _odd(values: list, r: Random) -> pa.Array:
     """The same number of values in an unusual type."""
     n = len(values)
     whole = [int(v) % 100 if v == v and abs(v) < 1e15 else 0 for v in values]
+    text = [str(v) for v in values]
     kinds: tuple[Callable[[], pa.Array], ...] = (
-        lambda: pa.array(whole, r.choice(INTEGERS[:-1])), lambda: pa.array([float(v) for v in whole]).cast(pa.float16()),
-        lambda: pa.array([bool(v) for v in whole]), lambda: pa.array([str(v) for v in values]),
-        lambda: pa.array([str(v) for v in values], pa.large_string()), lambda: pa.array([b"\xff"] * n),
-        lambda: pa.array(["x" * r.choice((1, 3000))] * n), lambda: pa.nulls(n), lambda: pa.nulls(n, pa.float64()),
-        lambda: pa.array([decimal.Decimal(v) for v in whole]), lambda: pa.array([[v] for v in values]),
-        lambda: pa.array([[v] * (i % 3) for i, v in enumerate(values)]), lambda: pa.array([[[v]] for v in values]),
-        lambda: pa.array([{"a": v, "b": [v]} for v in values]), lambda: pa.array([[("k", v)] for v in values],
-                                                                                 pa.map_(pa.string(), pa.float64())),
+        lambda: pa.array(whole, r.choice(NUMBERS)), lambda: pa.array([float(v) for v in whole]).cast(pa.float16()),
+        lambda: pa.array([2**63 + v for v in whole], pa.uint64()), lambda: pa.array([-(2**63)] * n, pa.int64()),
+        lambda: pa.array([bool(v) for v in whole]), lambda: pa.array([decimal.Decimal(v) for v in whole]),
+        lambda: pa.nulls(n), lambda: pa.nulls(n, pa.float64()),
+        lambda: pa.array(text), lambda: pa.array(text, pa.large_string()), lambda: pa.array(text).dictionary_encode(),
+        lambda: pa.array(["x" * r.choice((1, 3000))] * n), lambda: pa.array([b"\xff"] * n),
+        lambda: pa.array([b"12345678"] * n, pa.binary(8)), lambda: pa.array(values).dictionary_encode(),
+        lambda: pa.array([[v] for v in values]), lambda: pa.array([[v] * (i % 3) for i, v in enumerate(values)]),
+        lambda: pa.array([[[v]] for v in values]), lambda: pa.array([[v, v] for v in values], PAIR),
+        lambda: pa.array([{"a": v, "b": [v]} for v in values]),
+        lambda: pa.array([[("k", v)] for v in values], pa.map_(pa.string(), pa.float64())),
         lambda: pa.array([datetime.datetime(2026, 1, 1)] * n), lambda: pa.array(whole, pa.duration("ms")),
         lambda: pa.array(whole, pa.timestamp("ns", "UTC")), lambda: pa.array(whole, pa.date32()),
-        lambda: pa.array(whole, pa.time64("us")), lambda: pa.array(values).dictionary_encode(),
-        lambda: pa.array([str(v) for v in values]).dictionary_encode(), lambda: pa.array([b"12345678"] * n, pa.binary(8)),
-        lambda: pa.array([[v, v] for v in values], pa.list_(pa.float64(), 2)),
-        lambda: pa.array([2**63 + v for v in whole], pa.uint64()), lambda: pa.array([-(2**63)] * n, pa.int64()))
+        lambda: pa.array(whole, pa.time64("us")))
     return r.choice(kinds)()
 
 
@@ -58,10 +62,10 @@ def _written(names: list[str], arrays: list[pa.Array], meta: bytes | None, r: Ra
     if meta is not None:
         table = table.replace_schema_metadata({b"airtouch": meta})
     sink = io.BytesIO()
-    dictionary = r.random() < 0.5
-    parquet.write_table(table, sink, compression=r.choice(("none", "snappy", "zstd", "gzip")), use_dictionary=dictionary,
-                        row_group_size=r.choice((1, 7, 1000)), data_page_version=r.choice(("1.0", "2.0")),
-                        write_page_checksum=r.random() < 0.3, store_schema=r.random() < 0.7)
+    parquet.write_table(table, sink, compression=r.choice(("none", "snappy", "zstd", "gzip")),
+                        use_dictionary=r.random() < 0.5, row_group_size=r.choice((1, 7, 1000)),
+                        data_page_version=r.choice(("1.0", "2.0")), write_page_checksum=r.random() < 0.3,
+                        store_schema=r.random() < 0.7)
     return sink.getvalue()
 
 

@@ -81,6 +81,7 @@ def _clear(message: str, source: str) -> None:
     assert message.startswith(source), message
     assert message.isprintable() and len(message) < LONGEST_MESSAGE + len(source), message
     assert ";" in message, f"no remedy: {message}"
+    assert "not a table of numbers" not in message, f"no place: {message}"
 
 
 def _sound(log: FlightLog) -> None:
@@ -96,12 +97,12 @@ def _sound(log: FlightLog) -> None:
 
 
 def _use(log: FlightLog) -> None:
-    """The quality report, and phases that cover the log without holes."""
-    report = logs.check(log).as_dict()
-    json.dumps(report)
-    for warning in report["warnings"]:
+    """The quality report; its phases are those of `segments` and cover the log without holes."""
+    report = logs.check(log)
+    json.dumps(report.as_dict())
+    for warning in report.warnings:
         assert warning.isprintable() and len(warning) < LONGEST_MESSAGE, warning
-    parts = _or_refusal(lambda: logs.segments(log), log.source)
+    parts = report.segments or _or_refusal(lambda: logs.segments(log), log.source)
     if parts is not None:
         bounds = [0, *[part.stop for part in parts]]
         assert bounds[-1] == len(log) and [part.start for part in parts] == bounds[:-1]

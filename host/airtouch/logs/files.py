@@ -132,7 +132,8 @@ def _by_header(text: Sheet, source: str) -> FlightLog:
         return imrclab.read(text, source)
     if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
-    raise AirTouchError(f"{source}:{text.line}: unknown header '{shown(text.first[:200].decode('utf-8', 'replace'), 60)}'; "
+    header = shown(text.first[:200].decode("utf-8", "replace"), 60)
+    raise AirTouchError(f"{source}:{text.line}: unknown header '{header}'; "
                         "name the columns as in the table of columns")
 
 

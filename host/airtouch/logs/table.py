@@ -11,6 +11,7 @@ from airtouch.errors import AirTouchError, shown
 MOST_COLUMNS = 256  #: those of the schema and any others
 LONGEST_NAME = 100  #: characters
 _EMPTY_CELL = re.compile(rb"(?<=,)(?=[,\n])|(?<=\n)(?=,)")
+_BLANK = re.compile(rb"(?<=\n)[^\S\n]+(?=\n)")
 _HEAD = re.compile(rb"(?:[^\S\n]*+(?:#[^\n]*+)?\n)*+")  # blank lines and comments
 _COMMENT = re.compile(rb"#[^\n]*")
 
@@ -85,6 +86,9 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
     if b",," in body or b",\n" in body or b"\n," in body or body.startswith(b","):
         body = _EMPTY_CELL.sub(b"nan", b"\n" + body)[1:]
     table = _bulk(body, columns)
+    if table is None and _BLANK.search(b"\n" + body):  # NumPy skips empty lines only
+        body = _BLANK.sub(b"", b"\n" + body)[1:]
+        table = _bulk(body, columns)
     if table is not None:
         return table
     bad_line, problem, is_last = _first_problem(body, columns)
@@ -118,8 +122,8 @@ def _first_problem(body: bytes, columns: int) -> tuple[int, str, bool]:
             return i, f"{cells} cells where {columns} are expected", place >= last
         for number, cell in enumerate(line.split(b","), start=1):
             if not _is_number(cell):
-                return i, f"cell {number} holds '{shown(cell.strip()[:80].decode('ascii', 'replace'), 20)}', not a number", \
-                    place >= last
+                held = shown(cell.strip()[:80].decode("ascii", "replace"), 20)
+                return i, f"cell {number} holds '{held}', not a number", place >= last
     return 0, "not a table of numbers", False
 
 
