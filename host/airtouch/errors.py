@@ -1,4 +1,4 @@
-"""The one exception that users see."""
+"""The one exception that users see, and text from files made fit for its message."""
 
 
 class AirTouchError(ValueError):
@@ -6,3 +6,9 @@ class AirTouchError(ValueError):
 
     The command line prints it without a traceback and exits with code 2.
     """
+
+
+def shown(text: str, most: int = 40) -> str:
+    """At most `most` characters of a text that a file brought with it, unprintable ones as escapes."""
+    short = text if len(text) <= most else text[:most - 3] + "..."
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in short)

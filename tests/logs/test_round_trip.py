@@ -18,7 +18,9 @@ from airtouch.logs.files import parse
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 NAMES = st.lists(st.sampled_from([*COLUMNS, "extra", "my column"]), min_size=1, max_size=6, unique=True)
-VALUES = st.floats(width=64, allow_nan=True, allow_infinity=True)
+LARGEST = float(np.finfo(np.float32).max)  # more than that is no reading
+VALUES = st.floats(-LARGEST, LARGEST, width=64) | st.just(np.nan)
+TIMES = st.floats(0, 2.5, width=64) | st.just(np.nan)  # within reach of one another, however few
 META = st.dictionaries(st.sampled_from(["vehicle", "condition", "note_2", "seed"]),
                        st.one_of(st.text(), st.integers(), st.booleans(),
                                  st.lists(st.floats(allow_nan=False))))
@@ -27,7 +29,7 @@ META = st.dictionaries(st.sampled_from(["vehicle", "condition", "note_2", "seed"
 @st.composite
 def flight_logs(draw):
     rows = draw(st.integers(1, 8))
-    columns = {n: draw(arrays(np.float64, rows, elements=VALUES)) for n in draw(NAMES)}
+    columns = {n: draw(arrays(np.float64, rows, elements=TIMES if n == "t_s" else VALUES)) for n in draw(NAMES)}
     if not set(columns) & set(COLUMNS):
         columns["t_s"] = np.arange(rows, dtype=float)
     return FlightLog(columns, {"source": "a.csv", "format": "made", **draw(META)})
@@ -119,12 +121,12 @@ def test_any_bytes_give_a_log_or_one_line(head, tail, zipped):
     b"# a: " + b"[" * 100_000 + b"\nt_s\n1\n",
 ], ids=["blank lines", "comments", "comments before variables", "columns", "cells", "no line", "deep meta"])
 def test_odd_shapes_are_read_or_refused_at_once(data):
-    start = time.perf_counter()
+    start = time.process_time()
     try:
         assert len(parse(data, "odd")) == 1
     except AirTouchError as error:
         assert str(error).startswith("odd") and len(str(error)) < 300
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
 
 
 @settings(max_examples=150, deadline=None)

@@ -56,7 +56,9 @@ def airtouch() -> None:
 
 
 def main() -> None:
-    """Entry point: one clear line and exit code 2 for bad input."""
+    """Entry point: one clear line and exit code 2 for bad input; names that the terminal cannot show as escapes."""
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")
     try:
         airtouch()
     except AirTouchError as error:

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import click
 
 from airtouch import logs
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, shown
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
 FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
@@ -103,7 +104,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, rate: float | None, f
         target = folder / f"{_stem(path)}.{ending}"
         if target in written:
             raise AirTouchError(f"{path}: another file of this call is {target} already; rename one of them")
-        if target.exists() and path.exists() and target.samefile(path):
+        if os.path.exists(target) and os.path.exists(path) and target.samefile(path):
             raise AirTouchError(f"{path}: would be replaced by its own conversion; choose another --out")
         log = logs.read(path)
         logs.write(log if rate is None else logs.resample(log, rate), target, force)
@@ -128,12 +129,14 @@ def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], 
 
 def _expand(files: Iterable[str]) -> Iterator[Path]:
     for name in files:
-        path = Path(name)
-        if path.is_dir():
-            yield from sorted(p for p in path.iterdir()
-                              if p.name.endswith(ENDINGS) and p.name != "manifest.csv")
-        else:
-            yield path
+        if not os.path.isdir(name):
+            yield Path(name)
+            continue
+        try:
+            inside = sorted(Path(name).iterdir())
+        except OSError as error:
+            raise AirTouchError(f"{name}: cannot be listed: {error.strerror}; check its rights") from None
+        yield from (p for p in inside if p.name.endswith(ENDINGS) and p.name != "manifest.csv")
 
 
 def _progress(paths: list[Path]) -> Iterable[Path]:
@@ -154,7 +157,7 @@ def _summary(path: Path) -> dict[str, Any]:
         "channels": [name for name, column in GROUPS.items() if log.has(column)],
         "entries": sum(edge.kind == "entry" for edge in report.edges),
         "exits": sum(edge.kind == "exit" for edge in report.edges),
-        "condition": str(log.meta.get("condition", "")), "warnings": len(report.warnings),
+        "condition": shown(str(log.meta.get("condition", ""))), "warnings": len(report.warnings),
     }
 
 

@@ -131,7 +131,10 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
         path = part.with_name(part.name.removesuffix(PART))
         try:
             log = logs.read(part)
-            kept = in_order(np.round(log["t_s"] * 1000.0).astype(np.int64))
+            timed = np.flatnonzero(np.isfinite(log["t_s"]))
+            if not len(timed):
+                raise AirTouchError(f"{part}: no row has a time; correct t_s")
+            kept = timed[in_order(np.round(log["t_s"][timed] * 1000.0).astype(np.int64))]
             whole = FlightLog({name: values[kept] for name, values in log.columns.items()}, dict(log.meta))
             missing = gaps(np.round(whole["t_s"] * 1000.0))
             whole.meta |= {"ended": "the process was killed", "lost_samples": sum(g.lost for g in missing),

@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
 from airtouch.logs.quaternion import decompress, euler, to_body
-from airtouch.logs.table import parse_table, split_header
+from airtouch.logs.table import Sheet, parse_table
 
 GRAVITY = 9.81  #: m/s^2 in one g, as the Crazyflie firmware counts it
 GYRO_LSB = np.deg2rad(2000 * 2 / 65536)  #: rad/s in one LSB of `gyro.xRaw`
@@ -25,24 +25,22 @@ LAYOUTS = {
 }
 
 
-def read(text: bytes, source: str) -> FlightLog:
-    """A FlightLog from the bytes of an authors' CSV.
+def read(text: Sheet, source: str) -> FlightLog:
+    """A FlightLog from an authors' CSV.
 
     12, 13 and 14 columns give `acc_world_*`; with the quaternion of the 13-column
     layout `acc_*` are in the body frame, otherwise they repeat the world values and
     meta["acc_frame"] and a warning say so. Raises AirTouchError for other widths
     and for rows that are not numbers.
     """
-    _, first, rest, line_number = split_header(text)
-    width = first.count(b",") + 1
+    width = text.first.count(b",") + 1
     if width not in LAYOUTS:
         known = ", ".join(str(n) for n in LAYOUTS)
-        raise AirTouchError(f"{source}:{line_number}: {width} columns without a header; "
+        raise AirTouchError(f"{source}:{text.line}: {width} columns without a header; "
                             f"known layouts have {known}; "
                             "add a header with column names as `airtouch logs convert` writes them")
     warnings: list[str] = []
-    body = first + b"\n" + rest if rest or text.endswith(b"\n") else first
-    rows = parse_table(body, source, width, line_number, warnings)
+    rows = parse_table(text.first + text.end + text.rest, source, width, text.line, warnings)
     layout = LAYOUTS[width]
     raw = {kind: rows[:, [i for i, k in enumerate(layout) if k == kind]] for kind in set(layout)}
     columns = {"t_s": raw["t"][:, 0]}

@@ -8,45 +8,36 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, shown
 from airtouch.logs.flight_log import COLUMNS, FlightLog
-from airtouch.logs.table import names_of, parse_table, split_header
+from airtouch.logs.table import Sheet, named_table
 
-MOST_COLUMNS = 256  #: those of the schema and any others
+DEEPEST = 50  #: levels of lists in lists in a metadata value
+LONGEST_WARNING = 400  #: characters of a warning that comes with a file
 _KEY = re.compile(r"[A-Za-z_][\w .-]*")
 
 
-def read(text: bytes, source: str) -> FlightLog:
-    """A FlightLog from the bytes of a canonical CSV (line ends LF).
+def read(text: Sheet, source: str) -> FlightLog:
+    """A FlightLog from a canonical CSV.
 
     Metadata values are JSON, or plain text where they are not. Columns that the
     schema does not know are kept and named in a warning.
     Raises AirTouchError for a repeated name, a missing header and bad rows.
     """
     meta: dict[str, Any] = {}
-    comments, header, body, line_number = split_header(text)
-    for line in comments:
+    for line in text.comments:
         key, colon, value = line.decode("utf-8", "replace").lstrip("#").partition(":")
         if colon and _KEY.fullmatch(key.strip()):
-            meta[key.strip()] = _value(value.strip())
-    names = names_of(header)
-    if len(names) > MOST_COLUMNS:
-        raise AirTouchError(f"{source}:{line_number}: {len(names)} columns; "
-                            f"a flight log has at most {MOST_COLUMNS}")
-    if len(set(names)) < len(names) or "" in names:
-        raise AirTouchError(f"{source}:{line_number}: a column name is empty or repeated; "
-                            "give each its own name")
-    stored = meta.get("warnings")
-    warnings = [str(w) for w in stored] if isinstance(stored, list) else []
-    unknown = [name for name in names if name not in COLUMNS]
+            meta[key.strip()] = json_value(value.strip())
+    warnings = stored_warnings(meta)
+    columns = named_table(text, source, warnings)
+    unknown = [shown(name) for name in columns if name not in COLUMNS]
     if unknown:
         note = f"columns not in the schema, kept as they are: {', '.join(unknown[:8])}"
         if note not in warnings:
             warnings.append(note)
-    rows = parse_table(body, source, len(names), line_number + 1, warnings)
     meta = {"vehicle": "", "condition": "", "acc_frame": "body"} | meta
-    meta |= {"source": source, "format": "canonical", "warnings": warnings}
-    return FlightLog(dict(zip(names, np.ascontiguousarray(rows.T), strict=True)), meta)
+    return FlightLog(columns, meta | {"source": source, "format": "canonical", "warnings": warnings})
 
 
 def to_bytes(log: FlightLog, compress: bool = False) -> bytes:
@@ -93,11 +84,19 @@ def _shortest(value: float) -> str:
     return repr(value)
 
 
-def _value(text: str) -> Any:
+def json_value(text: str) -> Any:
+    """The value of a JSON text; the text itself where it is none, or nested more than 50 deep."""
+    depth = np.cumsum([(c in "[{") - (c in "]}") for c in text]) if text.count("[") + text.count("{") > DEEPEST else [0]
     try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
+        return json.loads(text) if max(depth) <= DEEPEST else text
+    except ValueError:
         return text
+
+
+def stored_warnings(meta: dict[str, Any]) -> list[str]:
+    """The warnings that were written with a log, as a list of short printable texts."""
+    stored = meta.get("warnings")
+    return [shown(str(w), LONGEST_WARNING) for w in stored] if isinstance(stored, list) else []
 
 
 def plain(value: Any) -> Any:

@@ -1,5 +1,6 @@
-"""The clock of a log: true rate, and the samples that were lost on the way."""
+"""The clock of a log: true rate, the samples that were lost on the way, and those in order."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,9 @@ from airtouch.logs.flight_log import FlightLog
 
 WINDOW = 100  #: samples on both sides over which the least delay is taken
 LEAST_AFTER = 20  #: samples that must follow, to tell a loss from a burst at the end
+FASTEST_S = 1e-4  #: between samples; the fastest IMU on a Crazyflie gives 6.7 kHz
+SLOWEST_S = 5.0  #: between samples; the firmware's slowest log block comes every 2.55 s
+LATEST_S = 1e10  #: no clock shows more, even one that counts from 1970
 
 
 @dataclass(frozen=True)
@@ -22,20 +26,20 @@ class Gap:
 def sample_period(log: FlightLog) -> float:
     """Seconds between samples: meta["sample_period_s"], else the clock's median step, else 0.01."""
     known = log.meta.get("sample_period_s")
-    if isinstance(known, (int, float)) and np.isfinite(known) and known > 0:
+    if isinstance(known, (int, float)) and FASTEST_S <= known <= SLOWEST_S:
         return float(known)
     if log.has("t_s") and len(log) > 1:
         with np.errstate(invalid="ignore", over="ignore"):
             steps = np.diff(log["t_s"])
         steps = steps[np.isfinite(steps) & (steps > 0)]
-        if len(steps):
+        if len(steps) and FASTEST_S <= np.median(steps) <= SLOWEST_S:
             return float(np.median(steps))
     return 0.01
 
 
 def true_period(time_s: np.ndarray) -> float | None:
     """Seconds between samples: the median slope over long stretches, so that bursts and a few
-    lost samples do not count. None for a clock that does not run."""
+    lost samples do not count. None for a clock that does not run, or not at 0.0001 to 5 s."""
     lag = max(min(500, len(time_s) // 16), min(50, len(time_s) // 4), 1)
     if len(time_s) < 2:
         return None
@@ -43,35 +47,38 @@ def true_period(time_s: np.ndarray) -> float | None:
         slopes = (time_s[lag:] - time_s[:-lag]) / lag
     slopes = slopes[np.isfinite(slopes)]
     period = float(np.median(slopes)) if len(slopes) else 0.0
-    return period if 0 < period < np.inf else None
+    return period if FASTEST_S <= period <= SLOWEST_S else None
 
 
 def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
-    """Gaps after which the clock stays behind for good.
+    """Gaps after which the clock stays behind for good. Samples without a time are passed over.
 
     A host clock that stamps arrivals is late in bursts and then catches up: only a
     delay whose minimum over the next second is at least 0.7 periods above that
     of the second before is a loss.
     """
     time_s = np.asarray(time_s, dtype=np.float64)
-    if len(time_s) < 3 or not np.isfinite(time_s).all():
+    with np.errstate(invalid="ignore"):
+        place = np.flatnonzero(np.abs(time_s) <= LATEST_S)
+    if len(place) < 3:
         return []
-    delay = time_s - period * np.arange(len(time_s))
+    time_s = time_s[place]
+    delay = time_s - period * place
     gaps: list[Gap] = []
     since = 0
-    late = np.diff(time_s[:len(time_s) - LEAST_AFTER]) if len(time_s) > LEAST_AFTER else np.empty(0)
+    late = np.diff(time_s[:-LEAST_AFTER]) - period * (np.diff(place[:-LEAST_AFTER]) - 1)
     for sample in np.flatnonzero(late > 1.5 * period) + 1:
         before = delay[max(since, sample - WINDOW):sample].min()
         after = delay[sample:sample + WINDOW].min()
         lost = int(round((after - before) / period))
         if after - before > 0.7 * period and lost >= 1:
-            gaps.append(Gap(int(sample), lost, float(time_s[sample] - time_s[sample - 1])))
+            gaps.append(Gap(int(place[sample]), lost, float(time_s[sample] - time_s[sample - 1])))
             since = int(sample)
     return gaps
 
 
 def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
-    """When the samples were taken, seconds from the first, and the gaps.
+    """When the samples were taken, seconds from the first that has a time, and the gaps.
 
     Logs with meta["sample_period_s"] carry arrival times: there the index is the
     clock, moved on by the samples that were lost. Others carry the drone's own
@@ -81,10 +88,32 @@ def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
     stated = log.meta.get("sample_period_s")
     if stated is None and log.has("t_s"):
         period = true_period(clock) or sample_period(log)
-        return clock - clock[0], lost_samples(clock, period)
+        start = clock[np.isfinite(clock)][:1]
+        with np.errstate(over="ignore"):
+            return clock - (start[0] if len(start) else 0.0), lost_samples(clock, period)
     period = sample_period(log)
     gaps = lost_samples(clock, true_period(clock) or period)
     shift = np.zeros(len(log))
     for gap in gaps:
-        shift[gap.sample:] += gap.lost
-    return (np.arange(len(log)) + shift) * period, gaps
+        shift[gap.sample] += gap.lost
+    return (np.arange(len(log)) + np.cumsum(shift)) * period, gaps
+
+
+def rising(time_s: np.ndarray) -> np.ndarray:
+    """Indices of the most samples whose times rise: a wrong time costs its own sample and no other."""
+    place = np.flatnonzero(np.isfinite(time_s))
+    times = time_s[place]
+    if not (np.diff(times) <= 0).any():
+        return place
+    ends: list[float] = []  # ends[k]: least last time of a rising sequence of k + 1 samples
+    last: list[int] = []  # which sample that is
+    before = np.empty(len(times), dtype=np.intp)
+    for i, time in enumerate(times.tolist()):
+        length = bisect_left(ends, time)
+        before[i] = last[length - 1] if length else -1
+        ends[length:length + 1], last[length:length + 1] = [time], [i]
+    kept, i = [], last[-1]
+    while i >= 0:
+        kept.append(i)
+        i = int(before[i])
+    return place[kept[::-1]]

@@ -46,7 +46,7 @@ def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
         if sample < settled:
             continue
         settled = sample + settling
-        before = float(np.median(height[max(sample - level, 0):max(sample - 1, 1)]))
+        before = float(np.median(height[max(sample - max(level, 2), 0):max(sample - 1, 1)]))
         later = height[settled:settled + level]
         after = float(np.median(later)) if len(later) else float(height[-1])
         if abs(after - before) > step_m:
@@ -65,9 +65,12 @@ def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
 def _in_flight(log: FlightLog) -> np.ndarray:
     """Airborne now and for IN_FLIGHT_S before and after."""
     margin = max(int(round(IN_FLIGHT_S / sample_period(log))), 1)
-    if len(log) <= 2 * margin:
-        return np.zeros(len(log), dtype=bool)
-    return np.convolve(~airborne(log), np.ones(2 * margin + 1), mode="same") < 0.5
+    n = len(log)
+    if n <= 2 * margin:
+        return np.zeros(n, dtype=bool)
+    grounded = np.r_[0, np.cumsum(~airborne(log))]
+    place = np.arange(n)
+    return grounded[np.minimum(place + margin + 1, n)] == grounded[np.maximum(place - margin, 0)]
 
 
 def _held(values: np.ndarray) -> np.ndarray:

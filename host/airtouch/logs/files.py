@@ -5,12 +5,15 @@ import tempfile
 import zlib
 from pathlib import Path
 
-from airtouch.errors import AirTouchError
-from airtouch.logs import authors, canonical, crazypad, imrclab, usd
-from airtouch.logs.flight_log import COLUMNS, FlightLog
-from airtouch.logs.table import names_of, split_header
+import numpy as np
 
-LARGEST_BYTES = 1 << 30  #: unpacked; more than this is no flight log
+from airtouch.errors import AirTouchError, shown
+from airtouch.logs import authors, canonical, crazypad, imrclab, usd
+from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
+from airtouch.logs.readings import checked
+from airtouch.logs.table import Sheet, names_of, sheet
+
+PIECE_BYTES = 1 << 14  #: read or unpacked at a time
 
 
 def read(path: str | Path) -> FlightLog:
@@ -22,16 +25,26 @@ def read(path: str | Path) -> FlightLog:
 
 
 def parse(data: bytes, source: str) -> FlightLog:
-    """A flight log from a file's bytes; `source` names it in messages."""
+    """A flight log from a file's bytes; `source` names it in messages.
+
+    Values and times that cannot be are NaN, with a warning (see `readings.checked`).
+    """
     notes: list[str] = []
-    log = _by_content(_unzipped(data, source, notes), source)
-    log.meta["warnings"] = notes + list(log.meta.get("warnings", []))
-    return log
+    data = unzipped(data, source, notes)
+    with np.errstate(invalid="ignore", over="ignore"):  # what comes of it is found by `checked`
+        log = _by_content(data, source)
+    log.meta["warnings"] = notes + log.meta["warnings"]
+    return checked(log)
+
+
+def load_bytes(path: str | Path) -> bytes:
+    """A file's bytes, unzipped."""
+    return unzipped(_bytes(path), str(path), [])
 
 
 def load_text(path: str | Path) -> bytes:
     """A text file's bytes, unzipped, line ends LF."""
-    return _text(_unzipped(_bytes(path), str(path), []))
+    return _text(load_bytes(path), str(path))
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
@@ -54,7 +67,7 @@ def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
 
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
     """Bytes into a file through a temporary one beside it."""
-    if path.exists() and not force:
+    if os.path.exists(path) and not force:
         raise AirTouchError(f"{path}: exists already; use --force to replace it")
     temporary = None
     try:
@@ -70,7 +83,7 @@ def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
 
 
 def _by_content(data: bytes, source: str) -> FlightLog:
-    if not data.strip(b" \t\r\n"):
+    if not data or data.isspace():
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
     if data[:4] == b"PAR1":
         from airtouch.logs import parquet
@@ -78,33 +91,37 @@ def _by_content(data: bytes, source: str) -> FlightLog:
         return parquet.read(data, source)
     if data[0] == usd.MAGIC:
         return usd.read(data, source)
-    text = _text(data)
-    if b"\x00" in text:
-        raise AirTouchError(f"{source}: binary data of no known kind; known are uSD logs, Parquet and CSV")
-    return _by_header(text, source)
+    return _by_header(sheet(_text(data, source)), source)
 
 
-def _text(data: bytes) -> bytes:
+def _text(data: bytes, source: str) -> bytes:
+    """A text's bytes with line ends LF."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise AirTouchError(f"{source}: text in UTF-16; save it as UTF-8 (in PowerShell: -Encoding utf8)")
+    if b"\x00" in data:
+        raise AirTouchError(f"{source}: binary data of no known kind; give a uSD log, Parquet or CSV")
     return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 
 
 def _bytes(path: str | Path) -> bytes:
+    """A file's bytes; pipes and devices, whose size nobody knows, are read no further than 1 GiB either."""
+    parts: list[bytes] = []
     try:
-        size = os.stat(path).st_size
-        data = Path(path).read_bytes() if size <= LARGEST_BYTES else b""
+        with open(path, "rb") as file:
+            while len(parts) <= LARGEST_BYTES // PIECE_BYTES and (piece := file.read(PIECE_BYTES)):
+                parts.append(piece)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise AirTouchError(f"{path}: cannot be read: {reason}") from None
-    if size > LARGEST_BYTES:
-        raise AirTouchError(f"{path}: {size / 2**30:.1f} GiB is too large for a flight log; split it")
-    return data
+        raise AirTouchError(f"{path}: cannot be read: {reason}; check the name and the rights") from None
+    if len(parts) > LARGEST_BYTES // PIECE_BYTES:
+        raise AirTouchError(f"{path}: more than 1 GiB is too large for a flight log; split it")
+    return b"".join(parts)
 
 
-def _by_header(text: bytes, source: str) -> FlightLog:
-    _, first, _, line_number = split_header(text)
-    if not first:
+def _by_header(text: Sheet, source: str) -> FlightLog:
+    if not text.first:
         raise AirTouchError(f"{source}: only comments, no data; log the flight again or leave it out")
-    names = names_of(first)
+    names = names_of(text.first)
     if _numeric(names[0]):
         return authors.read(text, source)
     if any(name in COLUMNS for name in names):
@@ -115,8 +132,8 @@ def _by_header(text: bytes, source: str) -> FlightLog:
         return imrclab.read(text, source)
     if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
-    shown = first[:60].decode("ascii", "replace")
-    raise AirTouchError(f"{source}:{line_number}: unknown header {shown!r}; "
+    header = shown(text.first[:200].decode("utf-8", "replace"), 60)
+    raise AirTouchError(f"{source}:{text.line}: unknown header '{header}'; "
                         "name the columns as in the table of columns")
 
 
@@ -128,24 +145,30 @@ def _numeric(cell: str) -> bool:
     return True
 
 
-def _unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
-    """Data as it is, or its gzip members joined; a file that is cut off gives what can be read."""
+def unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
+    """Data as it is, or its gzip members joined; a file that is cut off gives what can be read.
+
+    Raises AirTouchError for damaged data and for more than 1 GiB unpacked.
+    """
     if data[:2] != b"\x1f\x8b":
         return data
     parts: list[bytes] = []
-    total = 0
-    while data[:2] == b"\x1f\x8b":
-        stream = zlib.decompressobj(wbits=31)
+    total, place, stream = 0, 0, zlib.decompressobj(wbits=31)
+    while place < len(data):
+        piece = data[place:place + PIECE_BYTES]
         try:
-            parts.append(stream.decompress(data, LARGEST_BYTES - total + 1))
+            parts.append(stream.decompress(piece, LARGEST_BYTES - total + 1))
         except zlib.error as error:
             raise AirTouchError(f"{source}: the gzip data is damaged ({error}); "
                                 "copy the file again") from None
         total += len(parts[-1])
         if total > LARGEST_BYTES:
-            raise AirTouchError(f"{source}: unpacks to more than 1 GiB; no flight log is that large")
-        if not stream.eof:
-            notes.append("the gzip file is cut off; what could be unpacked was read")
-            break
-        data = stream.unused_data
+            raise AirTouchError(f"{source}: unpacks to more than 1 GiB, which no flight log does; split it")
+        place += len(piece) - len(stream.unused_data)
+        if stream.eof:
+            if data[place:place + 2] != b"\x1f\x8b":
+                break
+            stream = zlib.decompressobj(wbits=31)
+    if not stream.eof:
+        notes.append("the gzip file is cut off; what could be unpacked was read")
     return b"".join(parts)

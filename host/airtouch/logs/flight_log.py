@@ -19,6 +19,7 @@ VELOCITY = tuple(f"v{a}_mps" for a in AXES)
 ATTITUDE = ("roll_rad", "pitch_rad", "yaw_rad")
 RPM = tuple(f"rpm_{i}" for i in range(1, 5))
 
+LARGEST_BYTES = 1 << 30  #: of a log, unpacked; more than this is no flight
 #: Every column a flight log may have, in the order in which it is written.
 COLUMNS = (
     ("t_s",) + ACC + GYRO + PWM + ("zrange_m",) + RANGES + ("vbat_V",)
@@ -43,10 +44,10 @@ class FlightLog:
     meta: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        lengths = {name: len(values) for name, values in self.columns.items()}
-        if len(set(lengths.values())) > 1:
-            raise AirTouchError(f"{self.source}: columns of unequal length: {lengths}")
         self.columns = {k: np.asarray(v, dtype=np.float64) for k, v in self.columns.items()}
+        shapes = {name: values.shape for name, values in self.columns.items()}
+        if len(set(shapes.values())) > 1 or any(len(shape) != 1 for shape in shapes.values()):
+            raise AirTouchError(f"{self.source}: columns of unequal length: {shapes}; give each one value a sample")
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -68,7 +69,7 @@ class FlightLog:
         """Raise AirTouchError that names the columns that are missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
-            raise AirTouchError(f"{self.source}: no column {', '.join(missing)} in this log")
+            raise AirTouchError(f"{self.source}: no column {', '.join(missing)} in this log; log it too")
 
     def stack(self, names: Iterable[str]) -> np.ndarray:
         """The named columns side by side, shape (samples, columns)."""

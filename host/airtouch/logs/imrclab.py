@@ -5,6 +5,7 @@ from pathlib import Path
 
 from airtouch.logs.crazypad import read_variables
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.table import Sheet
 
 
 def matches(names: list[str]) -> bool:
@@ -12,7 +13,7 @@ def matches(names: list[str]) -> bool:
     return "timestamp_ms" in names and any("." in name for name in names)
 
 
-def read(text: bytes, source: str) -> FlightLog:
+def read(text: Sheet, source: str) -> FlightLog:
     """A FlightLog; pose and velocity are the on-board estimate."""
     meta = {"source": source, "format": "crazyflie-csv", "vehicle": "crazyflie-2.1", "condition": "",
             "warnings": []}

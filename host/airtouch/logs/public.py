@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import load_bytes
 
 REPOSITORY = "ChenyuZhaoTHU/crazyflie_filter_constant"
 COMMIT = "b4c403e620fbce96d1539665b2fb342955ccf9ee"
@@ -52,8 +53,8 @@ def fetch(
 def _has(path: Path, sha256: str) -> bool:
     """Whether the file is there, can be unpacked and has this hash."""
     try:
-        return hashlib.sha256(gzip.decompress(path.read_bytes())).hexdigest() == sha256
-    except (OSError, EOFError, ValueError):
+        return hashlib.sha256(load_bytes(path)).hexdigest() == sha256
+    except AirTouchError:
         return False
 
 
@@ -69,9 +70,8 @@ def _from_folder(folder: Path) -> Callable[[str, str], bytes | None]:
     def read(name: str, sha256: str) -> bytes | None:
         for path in (folder / name, folder / name.removesuffix(".gz")):
             try:
-                content = path.read_bytes()
-                return gzip.decompress(content) if path.suffix == ".gz" else content
-            except (OSError, EOFError, ValueError):
+                return load_bytes(path)
+            except AirTouchError:
                 continue
         return None
 

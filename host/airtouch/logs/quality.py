@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.channel_faults import duplicates, saturated, spikes, stuck
-from airtouch.logs.clock import Gap, lost_samples, sample_period, true_period
+from airtouch.logs.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
@@ -65,7 +65,7 @@ def check(log: FlightLog) -> Quality:
         "saturated": saturated(log),
         "spikes": spikes(log),
     }
-    warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, found, phases)
+    warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, found, phases, period)
     return Quality(
         source=log.source, format=str(log.meta.get("format", "")), samples=len(log),
         duration_s=_duration(clock, len(log), sample_period(log)), rate_hz=1.0 / period if period else None,
@@ -83,11 +83,11 @@ def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
 
 
 def _duration(clock: np.ndarray, samples: int, period: float) -> float:
-    span = float(clock[-1] - clock[0]) if len(clock) else np.nan
-    return span if np.isfinite(span) else max(samples - 1, 0) * period
+    timed = clock[np.abs(clock) <= LATEST_S]
+    return float(timed[-1] - timed[0]) if len(timed) else max(samples - 1, 0) * period
 
 
-def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment]) -> list[str]:
+def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment], period: float | None) -> list[str]:
     words = []
     if found["gaps"]:
         lost = sum(gap.lost for gap in found["gaps"])
@@ -97,6 +97,8 @@ def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment]) -> l
         words.append(f"the clock stands still {found['clock_repeats']} times")
     if found["clock_backwards"]:
         words.append(f"the clock runs backwards {found['clock_backwards']} times")
+    if log.has("t_s") and period is None and len(log) > 1:
+        words.append("the clock does not run, or not in seconds")
     for name, count in found["missing"].items():
         words.append(f"{name}: {count} of {len(log)} samples missing")
     words += [f"{b} repeats {a}" for a, b in found["duplicated"]]

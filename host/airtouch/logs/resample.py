@@ -3,13 +3,15 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.clock import regular_time, true_period
-from airtouch.logs.flight_log import PWM, RANGES, FlightLog
+from airtouch.logs.clock import FASTEST_S, SLOWEST_S, regular_time, rising, true_period
+from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
 LONGEST_BRIDGE_S = 0.1  #: gaps longer than this become NaN, never values
 CUTOFF = 0.4  #: of the new rate: corner of the low-pass used when going down
 HELD = ("zrange_m", *RANGES, "vbat_V")  #: slow or stepping channels: the last value is held, not filtered
 ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
+MOST_GROWTH = 100  #: samples, at the old rate or the new one, for each that was logged
+ALWAYS_SAMPLES = 10_000  #: that are few enough for any log
 
 
 def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
@@ -19,71 +21,107 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
     the new rate) keeps higher frequencies from folding in. Between samples values
     are interpolated linearly; ranges and battery hold their last value. What lies
     in a gap of more than 0.1 s is NaN. meta["resampled"] says all this.
-    Raises AirTouchError for a rate that is not in (0, 10000] Hz and a log whose
-    clock does not run.
+    Samples without a time, or with one out of order, are left out; a warning counts them.
+    Raises AirTouchError for a rate that is not in 0.2 to 10000 Hz, a log whose clock does
+    not run, and one that would have more than 100 samples for each that was logged, or more
+    than 1 GiB.
     """
-    if not 0 < rate_hz <= 10000:
-        raise AirTouchError(f"{log.source}: a rate of {rate_hz:g} Hz is not possible; give 1 to 10000 Hz")
+    if not 1 / SLOWEST_S <= rate_hz <= 1 / FASTEST_S:
+        raise AirTouchError(f"{log.source}: a rate of {rate_hz:g} Hz is not possible; "
+                            f"give {1 / SLOWEST_S:g} to {1 / FASTEST_S:g} Hz")
     time_s, gaps = regular_time(log) if len(log) else (np.empty(0), [])
-    latest = np.maximum.accumulate(np.r_[-np.inf, np.where(np.isfinite(time_s), time_s, -np.inf)])[:-1]
-    rising = np.isfinite(time_s) & (time_s > latest)
-    time_s = time_s[rising]
+    kept = rising(time_s)
+    time_s = time_s[kept]
     period = true_period(time_s)
-    if len(time_s) < 2 or period is None:
+    if period is None:
         raise AirTouchError(f"{log.source}: its clock does not run, so it cannot be resampled; "
                             "correct t_s or leave it out")
-    count = int(np.floor((time_s[-1] - time_s[0]) * rate_hz + 1e-6)) + 1
-    if count > 50_000_000:
-        raise AirTouchError(f"{log.source}: {count} samples at {rate_hz:g} Hz; "
-                            "correct t_s or ask for a lower rate")
+    count = _count(log, float(time_s[-1] - time_s[0]), period, rate_hz)
     new_time = time_s[0] + np.arange(count) / rate_hz
     down = rate_hz < 0.98 / period
-    columns = {"t_s": np.arange(count) / rate_hz}
-    for name, values in log.columns.items():
-        if name != "t_s":
-            columns[name] = _column(name, time_s, values[rising], new_time, period, rate_hz if down else None)
+    columns = {name: values[kept] for name, values in log.columns.items() if name != "t_s"}
+    columns = _columns(columns, time_s, new_time, period, rate_hz if down else None)
     low_pass = f"zero-phase Butterworth, {CUTOFF * rate_hz:g} Hz" if down else "none"
     done = {"from_hz": 1.0 / period, "to_hz": rate_hz, "low_pass": low_pass,
-            "lost_samples": sum(gap.lost for gap in gaps), "longest_bridge_s": LONGEST_BRIDGE_S}
-    note = f"resampled from {1.0 / period:.2f} to {rate_hz:g} Hz"
-    return FlightLog(columns, {**log.meta, "resampled": done, "sample_period_s": 1.0 / rate_hz,
-                               "warnings": [*log.meta.get("warnings", []), note]})
+            "lost_samples": sum(gap.lost for gap in gaps), "longest_bridge_s": LONGEST_BRIDGE_S,
+            "left_out": len(log) - len(kept)}
+    notes = [f"resampled from {1.0 / period:.2f} to {rate_hz:g} Hz"]
+    if done["left_out"]:
+        notes.append(f"{done['left_out']} of {len(log)} samples have no time, or one out of order, and were left out")
+    return FlightLog({"t_s": np.arange(count) / rate_hz} | columns,
+                     {**log.meta, "resampled": done, "sample_period_s": 1.0 / rate_hz,
+                      "warnings": [*log.meta.get("warnings", []), *notes]})
 
 
-def _column(name: str, time_s: np.ndarray, values: np.ndarray, new_time: np.ndarray, period: float,
-            low_pass_for: float | None) -> np.ndarray:
-    """One channel at the new times."""
-    valid = np.isfinite(values)
-    time_s, values = time_s[valid], values[valid]
-    new = np.full(len(new_time), np.nan)
+def _count(log: FlightLog, span_s: float, period: float, rate_hz: float) -> int:
+    """Samples at the new rate. Raises AirTouchError where these, or those at the old rate, are too many."""
+    finest = span_s * max(rate_hz, 1.0 / period) + 1
+    if finest > max(MOST_GROWTH * len(log), ALWAYS_SAMPLES):
+        raise AirTouchError(f"{log.source}: {len(log)} samples in {span_s:g} s would become {finest:.0f}; "
+                            "correct t_s, cut the log to the flight or ask for a lower rate")
+    count = int(np.floor(span_s * rate_hz + 1e-6)) + 1
+    if count * len(log.columns) * 8 > LARGEST_BYTES:
+        raise AirTouchError(f"{log.source}: {count} samples at {rate_hz:g} Hz are more than 1 GiB; "
+                            "ask for a lower rate or split the log")
+    return count
+
+
+def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.ndarray, period: float,
+             low_pass_for: float | None) -> dict[str, np.ndarray]:
+    """The channels at the new times. Those whose values are there at the same samples share the work."""
+    low_pass = _low_pass(period, low_pass_for) if low_pass_for else None
+    alike: dict[tuple[bool, bytes], list[str]] = {}
+    for name, values in columns.items():
+        alike.setdefault((name in HELD, np.isfinite(values).tobytes()), []).append(name)
+    new: dict[str, np.ndarray] = {}
+    for (held, mask), names in alike.items():
+        valid = np.frombuffer(mask, dtype=bool)
+        values = np.array([columns[name][valid] for name in names])
+        for name in set(names) & set(ANGLES):
+            values[names.index(name)] = np.unwrap(values[names.index(name)])
+        values = _at(values, time_s[valid], new_time, period, held, low_pass)
+        new |= dict(zip(names, values, strict=True))
+    for name in set(new) & set(ANGLES):
+        new[name] = np.angle(np.exp(1j * new[name]))
+    for name in set(new) & set(PWM if low_pass else ()):
+        new[name] = np.clip(new[name], 0, 65535)
+    return {name: new[name] for name in columns}
+
+
+def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float, held: bool,
+        low_pass: tuple[np.ndarray, int] | None) -> np.ndarray:
+    """Channels (k, n) at the new times, shape (k, m); NaN in gaps that are too long."""
+    new = np.full((len(values), len(new_time)), np.nan)
     bridge = max(LONGEST_BRIDGE_S, 1.5 * period)
     bounds = np.r_[0, np.flatnonzero(np.diff(time_s) > bridge) + 1, len(time_s)]
     for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
         if stop == start:
             continue
-        t, v = time_s[start:stop], values[start:stop]
+        t, v = time_s[start:stop], values[:, start:stop]
         first, last = np.searchsorted(new_time, (t[0] - 1e-9, t[-1] + 1e-9))
         at = new_time[first:last]
-        if name in HELD:
-            new[first:last] = v[np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
-            continue
-        if name in ANGLES:
-            v = np.unwrap(v)
-        if low_pass_for:
-            t, v = _smoothed(t, v, period, low_pass_for)
-        new[first:last] = np.interp(at, t, v)
-    if name in ANGLES:
-        new = np.angle(np.exp(1j * new))
-    return np.clip(new, 0, 65535) if name in PWM and low_pass_for else new
+        if held:
+            new[:, first:last] = v[:, np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
+        else:
+            t, v = _smoothed(t, v, period, *low_pass) if low_pass else (t, v)
+            new[:, first:last] = [np.interp(at, t, one) for one in v]
+    return new
 
 
-def _smoothed(t: np.ndarray, v: np.ndarray, period: float, rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
-    """Low-passed on an even grid at the old rate; stretches too short to filter stay as they are."""
+def _low_pass(period: float, rate_hz: float) -> tuple[np.ndarray, int]:
+    """The filter in second-order sections, and how many samples it needs before and after."""
+    from scipy.signal import butter  # slow to import, and seldom needed
+
+    return butter(8, CUTOFF * rate_hz, fs=1.0 / period, output="sos"), int(3.0 / (CUTOFF * rate_hz * period)) + 1
+
+
+def _smoothed(t: np.ndarray, v: np.ndarray, period: float, sos: np.ndarray,
+              padding: int) -> tuple[np.ndarray, np.ndarray]:
+    """Channels (k, n) low-passed on an even grid at the old rate; stretches too short to filter stay as they are."""
+    from scipy.signal import sosfiltfilt
+
     grid = t[0] + np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1) * period
     if len(grid) < 4:
         return t, v
-    from scipy.signal import butter, sosfiltfilt  # slow to import, and seldom needed
-
-    sos = butter(8, CUTOFF * rate_hz, fs=1.0 / period, output="sos")
-    padding = min(len(grid) - 1, int(3.0 / (CUTOFF * rate_hz * period)) + 1)
-    return grid, sosfiltfilt(sos, np.interp(grid, t, v), padlen=padding)
+    even = np.array([np.interp(grid, t, one) for one in v])
+    return grid, sosfiltfilt(sos, even, padlen=min(len(grid) - 1, padding))

@@ -1,6 +1,8 @@
 """Phases of a flight: ground, take-off, hover, cruise, platform, landing."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,9 +43,10 @@ def segments(log: FlightLog) -> list[Segment]:
     edges = true_edges(log, PLATFORM_STEP_M) if log.has("zrange_m") else []
     edges = [e for e in edges if flying[e.sample]]
     ground_height = _height(log, edges)
+    at = [e.sample for e in edges]
     for start, stop in _runs(flying):
         here = slice(start, stop)
-        crossing = [e for e in edges if start <= e.sample < stop]
+        crossing = edges[bisect_left(at, start):bisect_left(at, stop)]
         kinds[here] = KINDS.index("cruise" if crossing and not log.has(*VELOCITY[:2]) else "hover")
         if log.has(*VELOCITY[:2]):
             speed = np.hypot(log[VELOCITY[0]][here], log[VELOCITY[1]][here])
@@ -53,19 +56,21 @@ def segments(log: FlightLog) -> list[Segment]:
             kinds[here] = KINDS.index("ground")
         elif ground_height is not None:
             _ends(kinds[here], ground_height[here])
-        _over_platforms(kinds, crossing, start, stop)
+        for edge, following in pairwise([*crossing, None]):
+            if edge.kind == "entry":
+                kinds[edge.sample:following.sample if following else stop] = KINDS.index("over platform")
     return [Segment(KINDS[kinds[start]], start, stop) for start, stop in _constant_runs(kinds)]
 
 
 def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray | None:
     """Height above the ground, the platform's own height added while over it."""
     if log.has("zrange_m"):
-        height = log["zrange_m"].copy()
-        for i, edge in enumerate(edges):
-            if edge.kind == "entry":
-                stop = next((e.sample for e in edges[i + 1:] if e.kind == "exit"), len(height))
-                height[edge.sample:stop] += edge.height_before_m - edge.height_after_m
-        return height
+        added, total = np.zeros(len(log) + 1), 0.0
+        for edge in edges:
+            step = edge.height_before_m - edge.height_after_m if edge.kind == "entry" else -total
+            added[edge.sample] += step
+            total += step
+        return log["zrange_m"] + np.cumsum(added[:-1])
     return log["z_m"] if log.has("z_m") else None
 
 
@@ -75,13 +80,6 @@ def _ends(kinds: np.ndarray, height: np.ndarray) -> None:
     if len(level):
         kinds[:level[0]] = KINDS.index("take-off")
         kinds[level[-1] + 1:] = KINDS.index("landing")
-
-
-def _over_platforms(kinds: np.ndarray, edges: list, start: int, stop: int) -> None:
-    for i, edge in enumerate(edges):
-        if edge.kind == "entry":
-            end = next((e.sample for e in edges[i + 1:]), stop)
-            kinds[edge.sample:end] = KINDS.index("over platform")
 
 
 def _smooth(values: np.ndarray, width: int) -> np.ndarray:

@@ -2,36 +2,71 @@
 
 import re
 from io import BytesIO
+from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, shown
 
+MOST_COLUMNS = 256  #: those of the schema and any others
+LONGEST_NAME = 100  #: characters
 _EMPTY_CELL = re.compile(rb"(?<=,)(?=[,\n])|(?<=\n)(?=,)")
+_BLANK = re.compile(rb"(?<=\n)[^\S\n]+(?=\n)")
+_HEAD = re.compile(rb"(?:[^\S\n]*+(?:#[^\n]*+)?\n)*+")  # blank lines and comments
+_COMMENT = re.compile(rb"#[^\n]*")
 
 
-def split_header(text: bytes) -> tuple[list[bytes], bytes, bytes, int]:
-    """Leading comment lines, the first line that is none, what follows, and that line's number.
+class Sheet(NamedTuple):
+    """A text in parts: comment lines, the first line that is none, its end, what follows, and its number.
 
-    Blank lines before it are skipped; without such a line it and the rest are empty.
+    Without such a line it and the rest are empty; the end is LF, or nothing where the text is cut off.
     """
-    comments: list[bytes] = []
-    place, number = 0, 1
-    while place < len(text):
-        end = text.find(b"\n", place)
-        end = len(text) if end < 0 else end
-        line = text[place:end].strip()
-        if line and not line.startswith(b"#"):
-            return comments, text[place:end], text[end + 1:], number
-        if line:
-            comments.append(line)
-        place, number = end + 1, number + 1
-    return comments, b"", b"", number
+
+    comments: list[bytes]
+    first: bytes
+    end: bytes
+    rest: bytes
+    line: int
+
+
+def sheet(text: bytes) -> Sheet:
+    """A text, line ends LF, in parts; blank lines before the first that is no comment are left out."""
+    head = _HEAD.match(text).group()
+    first, end, rest = text[len(head):].partition(b"\n")
+    comments = [line.strip() for line in _COMMENT.findall(head)]
+    if first.lstrip().startswith(b"#"):
+        comments.append(first.strip())
+    if first.lstrip()[:1] in (b"", b"#"):
+        first = b""
+    return Sheet(comments, first, end, rest, head.count(b"\n") + 1)
 
 
 def names_of(header: bytes) -> list[str]:
-    """The column names in a header line."""
-    return [name.strip() for name in header.decode("utf-8", "replace").split(",")]
+    """The column names in a header line; of more than 256 the rest as one."""
+    return [name.strip() for name in header.decode("utf-8", "replace").split(",", MOST_COLUMNS)]
+
+
+def check_names(names: list[str], place: str) -> None:
+    """Raise AirTouchError for more than 256 columns and a name that is empty, repeated, long or not printable."""
+    if len(names) > MOST_COLUMNS:
+        raise AirTouchError(f"{place}: more than {MOST_COLUMNS} columns; leave out those that are no readings")
+    for i, name in enumerate(names):
+        fault = ("has no name" if not name.strip() else "is not printable" if not name.isprintable() else
+                 "has too long a name" if len(name) > LONGEST_NAME else
+                 "has another one's name" if name in names[:i] else "")
+        if fault:
+            raise AirTouchError(f"{place}: column {i + 1} {fault} ('{shown(name)}'); give each its own short name")
+
+
+def named_table(text: Sheet, source: str, warnings: list[str]) -> dict[str, np.ndarray]:
+    """The columns (n,) of a CSV with a header, by name.
+
+    Raises AirTouchError for names that `check_names` and rows that `parse_table` refuses.
+    """
+    names = names_of(text.first)
+    check_names(names, f"{source}:{text.line}")
+    rows = parse_table(text.rest, source, len(names), text.line + 1, warnings)
+    return dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
 
 
 def parse_table(body: bytes, source: str, columns: int, first_line: int,
@@ -44,19 +79,22 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
     AirTouchError that names file and line for any other bad cell or row.
     """
     cut = not body.endswith(b"\n")
-    if cut and body.rpartition(b"\n")[2].endswith(b","):  # an unfinished row, not an empty cell
-        body = _without_last_line(body, source, first_line, warnings)
-    if not body.strip():
+    if cut and body.endswith(b","):  # an unfinished row, not an empty cell
+        body = _without_last_line(body, first_line, warnings)
+    if not body or body.isspace():
         raise AirTouchError(f"{source}: no complete row of data; log the flight again or leave the file out")
     if b",," in body or b",\n" in body or b"\n," in body or body.startswith(b","):
         body = _EMPTY_CELL.sub(b"nan", b"\n" + body)[1:]
     table = _bulk(body, columns)
+    if table is None and _BLANK.search(b"\n" + body):  # NumPy skips empty lines only
+        body = _BLANK.sub(b"", b"\n" + body)[1:]
+        table = _bulk(body, columns)
     if table is not None:
         return table
     bad_line, problem, is_last = _first_problem(body, columns)
     if is_last:
-        shorter = _without_last_line(body, source, first_line, warnings)
-        table = _bulk(shorter, columns) if shorter.strip() else None
+        shorter = _without_last_line(body, first_line, warnings)
+        table = None if shorter.isspace() or not shorter else _bulk(shorter, columns)
         if table is not None:
             return table
     raise AirTouchError(f"{source}:{first_line + bad_line}: {problem}; correct or delete that line")
@@ -73,18 +111,19 @@ def _bulk(body: bytes, columns: int) -> np.ndarray | None:
 
 def _first_problem(body: bytes, columns: int) -> tuple[int, str, bool]:
     """Line offset of the first bad row, what is wrong, and whether it is the last row."""
-    lines = body.split(b"\n")
-    last = max((i for i, line in enumerate(lines) if line.strip()), default=0)
-    for i, line in enumerate(lines):
-        if not line.strip():
+    last = len(body.rstrip())
+    place = 0
+    for i, line in enumerate(BytesIO(body)):
+        place += len(line)
+        if line.isspace():
             continue
-        cells = line.split(b",")
-        if len(cells) != columns:
-            return i, f"{len(cells)} cells where {columns} are expected", i == last
-        for number, cell in enumerate(cells, start=1):
+        cells = line.count(b",") + 1
+        if cells != columns:
+            return i, f"{cells} cells where {columns} are expected", place >= last
+        for number, cell in enumerate(line.split(b","), start=1):
             if not _is_number(cell):
-                shown = cell.strip()[:20].decode("ascii", "replace")
-                return i, f"cell {number} holds {shown!r}, not a number", i == last
+                held = shown(cell.strip()[:80].decode("ascii", "replace"), 20)
+                return i, f"cell {number} holds '{held}', not a number", place >= last
     return 0, "not a table of numbers", False
 
 
@@ -96,7 +135,7 @@ def _is_number(cell: bytes) -> bool:
     return b"_" not in cell
 
 
-def _without_last_line(body: bytes, source: str, first_line: int, warnings: list[str]) -> bytes:
+def _without_last_line(body: bytes, first_line: int, warnings: list[str]) -> bytes:
     kept, newline, _ = body.rstrip(b"\n").rpartition(b"\n")
     number = first_line + kept.count(b"\n") + (1 if newline else 0)
     warnings.append(f"line {number} is cut off and was dropped")

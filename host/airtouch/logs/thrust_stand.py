@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import load_text
-from airtouch.logs.table import names_of, parse_table, split_header
+from airtouch.logs.table import named_table, names_of, sheet
 
 #: header -> column of the table; the weight is in grams in every known file
 STAND_COLUMNS = {
@@ -23,10 +23,9 @@ def read_thrust_stand(path: str | Path) -> dict[str, np.ndarray]:
     and for rows that are not numbers.
     """
     source = str(path)
-    _, header, body, line_number = split_header(load_text(path))
-    names = names_of(header)
-    if not {"pwm", "vbat[V]", "rpm1"} <= set(names):
-        raise AirTouchError(f"{source}:{line_number}: not the header of a thrust-stand run "
-                            "(pwm, vbat[V], rpm1, ...)")
-    rows = parse_table(body, source, len(names), line_number + 1, [])
-    return {STAND_COLUMNS[n]: rows[:, i] for i, n in enumerate(names) if n in STAND_COLUMNS}
+    text = sheet(load_text(path))
+    if not {"pwm", "vbat[V]", "rpm1"} <= set(names_of(text.first)):
+        raise AirTouchError(f"{source}:{text.line}: not the header of a thrust-stand run; "
+                            "name the columns pwm, vbat[V], rpm1, ...")
+    table = named_table(text, source, [])
+    return {STAND_COLUMNS[name]: values for name, values in table.items() if name in STAND_COLUMNS}

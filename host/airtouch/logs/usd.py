@@ -10,12 +10,14 @@ Then the CRC-32 of all before it.
 
 import struct
 import zlib
+from array import array
 from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, shown
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.table import MOST_COLUMNS
 from airtouch.logs.variables import to_columns
 
 MAGIC = 0xBC
@@ -58,7 +60,8 @@ def read(data: bytes, source: str) -> FlightLog:
             "warnings": warnings}
     columns = to_columns(table, meta)
     if not columns:
-        raise AirTouchError(f"{source}: none of its variables is known ({', '.join(event.variables[:6])}); "
+        names = ", ".join(shown(name) for name in event.variables[:6])
+        raise AirTouchError(f"{source}: none of its variables is known ({names}); "
                             "log acc, gyro, motor and range")
     return FlightLog({"t_s": records["time"] * (1e-3 if version == 1 else 1e-6)} | columns, meta)
 
@@ -68,7 +71,8 @@ def _header(data: bytes, source: str) -> tuple[int, dict[int, Event], int]:
     try:
         version, count = struct.unpack_from("<HH", data, 1)
         if version not in (1, 2):
-            raise AirTouchError(f"{source}: uSD log of version {version}; versions 1 and 2 can be read")
+            raise AirTouchError(f"{source}: uSD log of version {version}; "
+                                "versions 1 and 2 can be read, copy it from the card again")
         events: dict[int, Event] = {}
         place = 5
         for _ in range(count):
@@ -76,10 +80,16 @@ def _header(data: bytes, source: str) -> tuple[int, dict[int, Event], int]:
             name, place = _text(data, place + 2)
             (variables,) = struct.unpack_from("<H", data, place)
             place += 2
+            if variables > MOST_COLUMNS:
+                raise AirTouchError(f"{source}: damaged uSD header: {variables} variables in one event, where "
+                                    f"{MOST_COLUMNS} are the most; copy it from the card again")
             declared = []
             for _ in range(variables):
                 text, place = _text(data, place)
                 declared.append(text)
+            if number in events:
+                raise AirTouchError(f"{source}: damaged uSD header: two events have the number {number}; "
+                                    "copy it from the card again")
             events[number] = _event(name, declared, version, source)
     except (struct.error, IndexError):
         raise AirTouchError(f"{source}: the uSD log ends within its header; "
@@ -99,14 +109,15 @@ def _event(name: str, declared: list[str], version: int, source: str) -> Event:
     for i, text in enumerate(declared):
         letter = text[-2:-1]
         if len(text) < 4 or text[-3] != "(" or text[-1] != ")" or letter not in _TYPES:
-            raise AirTouchError(f"{source}: damaged uSD header: variable {text[:30]!r} has no known type")
+            raise AirTouchError(f"{source}: damaged uSD header: variable '{shown(text, 30)}' has no known type; "
+                                "copy it from the card again")
         fields.append((f"v{i}", _TYPES[letter]))
     return Event(name, tuple(text[:-3] for text in declared), np.dtype(fields))
 
 
-def _offsets(data: bytes, place: int, end: int, events: dict[int, Event]) -> tuple[dict[int, list[int]], int]:
+def _offsets(data: bytes, place: int, end: int, events: dict[int, Event]) -> tuple[dict[int, array], int]:
     """Offsets of the whole records of each event, and where reading had to stop."""
-    found: dict[int, list[int]] = {number: [] for number in events}
+    found = {number: array("q") for number in events}
     sizes = {number: event.dtype.itemsize for number, event in events.items()}
     while place + 2 <= end:
         number = data[place] | data[place + 1] << 8
@@ -118,7 +129,7 @@ def _offsets(data: bytes, place: int, end: int, events: dict[int, Event]) -> tup
     return found, place
 
 
-def _main_event(events: dict[int, Event], offsets: dict[int, list[int]], source: str) -> int:
+def _main_event(events: dict[int, Event], offsets: dict[int, array], source: str) -> int:
     """The id of `fixedFrequency`, or of the event with most records in logs that have none."""
     filled = [number for number in events if offsets[number]]
     if not filled:

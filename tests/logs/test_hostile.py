@@ -1,0 +1,309 @@
+"""Files that once ended in a traceback, or took time or memory beyond their size: now a log or one clear line."""
+
+import gzip
+import json
+import os
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from log_fuzzing.hostile import HOSTILE, table, usd  # noqa: E402
+from log_fuzzing.sound import META, canonical, motion, packed, parquet, si_columns  # noqa: E402
+
+from airtouch import logs  # noqa: E402
+from airtouch.cli import airtouch, main  # noqa: E402
+from airtouch.crazyflie.recorder import recover  # noqa: E402
+from airtouch.errors import AirTouchError, shown  # noqa: E402
+from airtouch.logs import clock, public  # noqa: E402
+from airtouch.logs.files import parse  # noqa: E402
+from airtouch.logs.flight_log import FlightLog  # noqa: E402
+
+
+def flying(n=200, **changed):
+    return table({**si_columns(motion(n, 0.01, 0)), **changed})
+
+
+# the clock
+
+
+def test_one_damaged_time_costs_its_own_sample_and_no_other():
+    """A flipped bit in a time of a uSD log: 882 bytes once took 94 s and 4 GB."""
+    times = 1000 * np.arange(40)
+    for place in (0, 20, 39):
+        for bit in (20, 30, 36, 50, 63):
+            wrong = times.astype(np.uint64)
+            wrong[place] ^= np.uint64(1 << bit)
+            log = parse(usd(wrong), "log00")
+            new = logs.resample(log, 1000.0)
+            assert len(new) <= 10_000
+            assert np.isfinite(new["acc_x_mps2"]).sum() >= 38
+            if bit > 30:
+                assert any("t_s: not of this flight" in w and "1 of 40" in w for w in log.meta["warnings"])
+
+
+def test_a_wrong_time_among_the_others_does_not_take_the_rest_with_it():
+    time = 0.01 * np.arange(300)
+    time[100] += 2.5
+    time[200] -= 1.5
+    new = logs.resample(FlightLog({"t_s": time, "acc_x_mps2": np.arange(300.0)}, {"source": "made"}))
+    np.testing.assert_allclose(new["acc_x_mps2"], np.arange(300.0), atol=1e-6)
+    assert new.meta["resampled"]["left_out"] == 2
+    assert any("2 of 300 samples" in w for w in new.meta["warnings"])
+
+
+def test_most_samples_in_order_are_kept():
+    """Against all subsets of a few samples."""
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        times = rng.integers(0, 6, 7).astype(float)
+        times[rng.random(7) < 0.1] = np.nan
+        kept = clock.rising(times)
+        assert (np.diff(times[kept]) > 0).all() and not np.isnan(times[kept]).any()
+        subsets = (np.flatnonzero([bits >> i & 1 for i in range(7)]) for bits in range(128))
+        assert len(kept) == max(len(s) for s in subsets if (np.diff(times[s]) > 0).all() and not np.isnan(times[s]).any())
+
+
+def test_a_clock_that_is_not_in_seconds_is_refused_with_the_remedy():
+    for scale in (1e3, 1e6, 1e9):
+        with pytest.raises(AirTouchError, match="made: 1.* s from sample to sample.*give t_s in seconds"):
+            parse(flying(t_s=3.0 + scale * 0.01 * np.arange(200)), "made")
+    assert parse(flying(t_s=1.7e9 + 0.01 * np.arange(200)), "made").meta["warnings"] == parse(
+        flying(), "made").meta["warnings"]  # seconds since 1970 are seconds
+
+
+@pytest.mark.parametrize("steps", [1e-9, 1e-5, 1e-300])
+def test_a_clock_faster_than_any_sensor_is_not_resampled(steps):
+    """Steps of a nanosecond with pauses between: a grid of 30 million samples, MemoryError or LinAlgError."""
+    log = parse(flying(t_s=np.cumsum(np.where(np.arange(200) > 190, 0.09 * (steps > 1e-200), steps))), "made")
+    assert any("does not run" in w for w in logs.check(log).warnings)
+    with pytest.raises(AirTouchError, match="clock does not run"):
+        logs.resample(log)
+
+
+def test_few_samples_over_a_long_time_are_refused():
+    log = parse(flying(t_s=np.r_[0.001 * np.arange(199), 400.0]), "made")
+    with pytest.raises(AirTouchError, match=r"made: 200 samples in 400 s would become 40\d* ?.*; correct t_s"):
+        logs.resample(log, 1000.0)
+    with pytest.raises(AirTouchError, match="more than 1 GiB"):
+        logs.resample(FlightLog({"t_s": 0.01 * np.arange(3_000_000)} | {f"c{i}": np.zeros(3_000_000) for i in range(5)}),
+                      1000.0)
+
+
+@pytest.mark.parametrize("period", ["5e-324", "1e-300", "1e308", "1e999", "-1", "0", "NaN", "true", '"0.01"', "[0.01]", "9" * 400])
+def test_a_stated_period_that_cannot_be_is_left_out(period):
+    """1 / 5e-324 was an OverflowError, 1e-300 a convolution as long as the log."""
+    log = parse(f"# sample_period_s: {period}\n".encode() + flying(), "made")
+    assert "sample_period_s" not in log.meta and any("sample_period_s" in w for w in log.meta["warnings"])
+    assert logs.check(log).rate_hz == pytest.approx(100) and len(logs.segments(log)) > 3
+    made = FlightLog(log.columns, {**log.meta, "sample_period_s": 5e-324})
+    assert clock.sample_period(made) == pytest.approx(0.01)
+
+
+def test_logs_made_in_memory_overflow_nowhere():
+    n = 60
+    for time in (np.full(n, 1e308), np.where(np.arange(n) % 2, 1e308, -1e308), np.r_[0.01 * np.arange(n - 1), np.inf], np.full(n, 5e-324)):
+        for meta in ({}, {"sample_period_s": 0.01}):
+            log = FlightLog({"t_s": time, "zrange_m": np.ones(n)}, {"source": "made", "warnings": [], **meta})
+            logs.check(log)
+            try:
+                assert len(logs.resample(log)) <= 10_000
+            except AirTouchError as error:
+                assert "clock" in str(error) or "would become" in str(error)
+
+
+def test_rates_that_cannot_be_are_refused():
+    log = parse(flying(), "made")
+    for rate in (np.nan, 1e-300, 0.01, 1e5, -1.0):
+        with pytest.raises(AirTouchError, match="not possible; give 0.2 to 10000 Hz"):
+            logs.resample(log, rate)
+
+
+# values and names
+
+
+def test_values_that_no_sensor_reads_are_missing_and_said_so():
+    values = np.arange(200.0)
+    values[[7, 9, 11]] = np.inf, -1e300, 3e38
+    log = parse(flying(vx_mps=values), "made")
+    assert np.flatnonzero(np.isnan(log["vx_mps"])).tolist() == [7, 9] and log["vx_mps"][11] == 3e38
+    assert "vx_mps: no sensor reads inf (sample 7); 2 of 200 values were taken as missing" in log.meta["warnings"]
+    variables = [(f"acc.{a}", "d") for a in "xyz"]
+    data = packed(2, [(1, "fixedFrequency", variables)], [(1, 1000 * i, [1e308, 0.0, 1.0]) for i in range(5)])
+    assert np.isnan(parse(data, "log00")["acc_x_mps2"]).all()
+
+
+def test_slow_logs_have_edges_without_a_warning():
+    logs.check(FlightLog({"t_s": 0.3 * np.arange(60), "zrange_m": np.where(np.arange(60) % 20 < 10, 0.8, 0.2),
+                          **{f"m{i}_pwm": np.full(60, 4e4) for i in range(1, 5)}}, {"source": "made"}))
+
+
+def test_names_from_a_file_can_be_printed(tmp_path, capsys):
+    """Lone surrogates in stored warnings, and file names that are no UTF-8, ended `logs check` in a traceback."""
+    assert shown("a\ud800\x1b[2J\u202e\n") == "a\\ud800\\x1b[2J\\u202e\\n" and len(shown("n" * 999)) == 40
+    stored = b'# warnings: ["\\ud800 \\u001b[2J", "a\\nb"]\n# condition: "\\ud800"\n'
+    path = tmp_path / os.fsdecode(b"flight\xff.csv")
+    path.write_bytes(stored + flying())
+    for arguments in (["check"], ["check", "--json"], ["info"]):
+        assert _command(arguments[0], path, *arguments[1:]) == 0
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err and "\x1b" not in out and "flight" in out
+    with pytest.raises(AirTouchError, match=r"column 2 is not printable \('\\x1b\[31m'\)"):
+        parse(b"t_s,\x1b[31m\n0,1\n", "made")
+
+
+@pytest.mark.parametrize("name", ["n" * 300, "none.csv", "."])
+def test_what_is_no_file_is_said_in_one_line(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "locked").mkdir()
+    code = _command("check", name)
+    lines = capsys.readouterr().err.splitlines()
+    assert code == (0 if name == "." else 2) and len(lines) == (1 if name == "." else 2)
+
+
+def test_a_device_is_read_no_further_than_a_log_can_be_long(monkeypatch):
+    monkeypatch.setattr("airtouch.logs.files.LARGEST_BYTES", 1 << 20)
+    with pytest.raises(AirTouchError, match="too large for a flight log; split it"):
+        logs.read("/dev/zero")
+
+
+@pytest.mark.parametrize("header", [b"timestamp_ms,gyro.x,gyro.x", b"timestamp_ms,stateEstimate.ax,", b"t_s,t_s",
+                                    b"timestamp_ms,gyro.x," + b"n" * 5000])
+def test_names_that_repeat_or_lack_are_refused_in_every_csv(header):
+    with pytest.raises(AirTouchError, match=r"made:2: column [23] .*; give each its own short name"):
+        parse(b"\n" + header + b"\n1,2,3\n", "made")
+
+
+def test_text_of_another_encoding_names_the_remedy():
+    with pytest.raises(AirTouchError, match="UTF-16; save it as UTF-8"):
+        parse(flying().decode().encode("utf-16"), "made")
+
+
+@pytest.mark.parametrize("blank", [b"", b"  ", b"\t", b"\x0c", b"\r", b" \r\n"])
+def test_lines_of_blanks_are_skipped_and_errors_name_the_line_after_them(blank):
+    text = b"t_s,x_m\n" + blank + b"\n1,2\n" + blank + b"\n3,4\n"
+    assert parse(text, "made")["x_m"].tolist() == [2, 4]
+    line = (text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")).count(b"\n") + 1
+    with pytest.raises(AirTouchError, match=f"made:{line}: cell 2 holds 'x', not a number; correct or delete"):
+        parse(text + b"5,x\n7,8\n", "made")
+
+
+# uSD logs
+
+
+def test_damaged_usd_headers_are_refused_with_the_remedy():
+    variables = [(f"acc.{a}", "f") for a in "xyz"]
+    twice = packed(2, [(1, "fixedFrequency", variables), (1, "other", variables[:1])], [])
+    with pytest.raises(AirTouchError, match="two events have the number 1; copy it from the card again"):
+        parse(twice, "log00")
+    many = packed(2, [(1, "fixedFrequency", variables * 100)], [])
+    with pytest.raises(AirTouchError, match="300 variables in one event.*; copy it"):
+        parse(many, "log00")
+    odd = packed(2, [(1, "fixedFrequency", [("a\nb" * 3000, "f")])], [(1, 0, [0.0])])
+    with pytest.raises(AirTouchError, match="none of its variables is known") as caught:
+        parse(odd, "log00")
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 200
+
+
+# Parquet
+
+
+def _parquet(meta=b"{}", **columns):
+    import io
+
+    import pyarrow
+    from pyarrow import parquet as writer
+
+    sink = io.BytesIO()
+    made = pyarrow.table({"t_s": [0.0, 0.01], **columns}).replace_schema_metadata({b"airtouch": meta})
+    writer.write_table(made, sink)
+    return sink.getvalue()
+
+
+def test_parquet_columns_that_are_no_numbers_are_refused_not_guessed():
+    """Text of digits was read as numbers, and dates as nanoseconds since 1970."""
+    import datetime
+
+    for values in (["1.5", "2.5"], [datetime.datetime(2026, 1, 1)] * 2, [[1.0], [2.0]], [{"a": 1.0}] * 2, [b"1", b"2"]):
+        with pytest.raises(AirTouchError, match="made: column 'zrange_m' holds .*, not numbers; leave it out"):
+            parse(_parquet(zrange_m=values), "made")
+    log = parse(_parquet(zrange_m=[None, 1], vbat_V=[True, None], x_m=[None, None]), "made")
+    assert np.isnan(log["zrange_m"][0]) and log["vbat_V"][0] == 1 and np.isnan(log["x_m"]).all()
+    log["zrange_m"][0] = 3.0  # a log's arrays can be written, whatever file they came from
+
+
+def test_parquet_is_measured_before_it_is_unpacked(monkeypatch):
+    monkeypatch.setattr("airtouch.logs.parquet.LARGEST_BYTES", 1 << 20)
+    with pytest.raises(AirTouchError, match="100000 rows of 2 columns are more than 1 GiB; split the log"):
+        parse(HOSTILE["constant Parquet"](100_000), "made")
+    footer = parquet(motion(40, 0.01, 0))
+    claimed = footer[:-8] + struct.pack("<I", 2**31) + footer[-4:]
+    with pytest.raises(AirTouchError, match="damaged Parquet file .*; copy or write it again"):
+        parse(claimed, "made")
+
+
+@pytest.mark.parametrize("meta", [b"\xff", b"[" * 5000, b"{", b"9" * 5000, b"[]", b'{"sample_period_s": 1e-300}'])
+def test_odd_metadata_are_left_out_or_refused(meta):
+    try:
+        log = parse(_parquet(meta), "made")
+        assert "sample_period_s" not in log.meta
+    except AirTouchError as error:
+        assert "damaged Parquet file" in str(error)
+
+
+# packed files, and the commands that read raw logs elsewhere
+
+
+def test_damaged_packed_data_in_the_public_flights_are_no_traceback(tmp_path):
+    """A right gzip header before damaged data raises zlib.error, which is no ValueError."""
+    path = tmp_path / "f.csv.gz"
+    path.write_bytes(gzip.compress(b"1,2\n" * 100)[:10] + b"\xff" * 40)
+    assert not public._has(path, "0")
+    assert public._from_folder(tmp_path)("f.csv.gz", "0") is None
+
+
+def test_recovery_leaves_out_rows_without_a_time_and_keeps_a_file_without_any(tmp_path):
+    (tmp_path / "a_0001.csv.gz.part").write_bytes(b"t_s,zrange_m\n0,1\n,1\n0.01,1\n1e300,1\n0.02,1\n")
+    (tmp_path / "b_0001.csv.gz.part").write_bytes(b"t_s,zrange_m\n,1\n,1\n")
+    (found,), (unreadable,) = recover(tmp_path)
+    assert logs.read(found)["t_s"].tolist() == [0, 0.01, 0.02]
+    assert "b_0001.csv.gz.part: no row has a time" in unreadable and (tmp_path / "b_0001.csv.gz.part").exists()
+
+
+# shapes, as long as is wanted
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_shapes_cost_no_more_than_their_size(name):
+    """Work is bounded by the samples: no result is longer than 100 times the log (or 10,000 samples)."""
+    try:
+        log = parse(HOSTILE[name](3000), "made")
+        logs.check(log)
+        for rate in (50.0, 1000.0):
+            assert len(logs.resample(log, rate)) <= max(100 * len(log), 10_000)
+    except AirTouchError as error:
+        assert str(error).startswith("made") and ";" in str(error) and len(str(error)) < 300
+
+
+def test_metadata_survive():
+    log = parse(canonical(motion(70, 0.01, 0)), "made")
+    assert {key: log.meta[key] for key in META if key != "warnings"} == {k: v for k, v in META.items() if k != "warnings"}
+    assert log.meta["warnings"] == ["windy", "columns not in the schema, kept as they are: humidity"]
+    json.dumps(logs.check(log).as_dict())
+
+
+def _command(*arguments):
+    """`airtouch logs ...` in this process through its entry point; the exit code."""
+    before, sys.argv = sys.argv, ["airtouch", "logs", *map(str, arguments)]
+    try:
+        main()
+    except SystemExit as ended:
+        return ended.code or 0
+    finally:
+        sys.argv = before
+    return 0

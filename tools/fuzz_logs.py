@@ -1,0 +1,152 @@
+"""Fuzz the log readers: mutated files of every format through read, check, segments, resample and the command.
+
+    python tools/fuzz_logs.py --seed 1 --count 1000
+    python tools/fuzz_logs.py --seed 1 --format usd-2 --only 4711
+
+Prints per format the number of inputs, logs, refusals and failures, and the worst time and memory.
+Exit code 1 when anything failed. One input is known by seed, format and number: the last line of a
+failure is the command that repeats it.
+"""
+
+import argparse
+import os
+import resource
+import sys
+import tempfile
+import time
+import traceback
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+
+from log_fuzzing import mutations, sound, usd_mutations, walk
+
+MOST_S, MOST_S_PER_MB = 1.0, 10.0  #: processor time for one input
+MOST_MB, MOST_MB_PER_MB = 96.0, 400.0  #: memory above what the process held before
+ADDRESS_SPACE = 6 << 30  #: a hard limit for the whole process
+MEASURED = os.access("/proc/self/clear_refs", os.W_OK)  #: Linux tells a process its memory
+COMMAND_EVERY = 20  #: inputs that also go through `airtouch logs check` and `convert`
+
+
+@dataclass
+class Count:
+    """What became of one format's inputs."""
+
+    log: int = 0
+    refused: int = 0
+    failed: int = 0
+    worst_s: tuple[float, int] = (0.0, -1)
+    worst_mb: tuple[float, int] = (0.0, -1)
+    failures: dict[str, list[int]] = field(default_factory=dict)
+
+
+def mutated(name: str, seed: int, number: int) -> tuple[bytes, Random]:
+    """One input, and the generator for what the walk chooses."""
+    r = Random(f"{seed} {name} {number}")
+    base = r.choice(files_of(name))
+    if name.startswith("usd"):
+        return usd_mutations.usd(base, r), r
+    if name == "parquet":
+        from log_fuzzing import parquet_mutations
+
+        return parquet_mutations.parquet_file(base, r), r
+    return (mutations.packed_text if name.endswith("gz") else mutations.text)(base, r), r
+
+
+_FILES: dict[str, list[bytes]] = {}
+
+
+def files_of(name: str) -> list[bytes]:
+    """The sound files of one format, made once."""
+    return _FILES.setdefault(name, []) or _FILES[name].extend(sound.files(name)) or _FILES[name]
+
+
+def one(name: str, seed: int, number: int, folder: Path, every: int = COMMAND_EVERY) -> tuple[str, float, float]:
+    """Put one input through everything: outcome, seconds of processor time, MB of memory."""
+    data, r = mutated(name, seed, number)
+    path = folder / "flight.log"
+    clear_peak()
+    held, start = memory_mb("VmRSS"), time.process_time()
+    if name == "thrust-stand":
+        path.write_bytes(data)
+        outcome = walk.stand(path)
+        walk.walk(data, str(path), r)
+    else:
+        outcome = walk.walk(data, str(path), r)
+    if number % every == 0:
+        path.write_bytes(data)
+        walk.command(["check", str(path), *(["--json"] if number % (2 * every) else [])], path)
+        convert = ["convert", str(path), "--out", str(folder / "out"), "--force", "--format", "csv", "--rate", "100"]
+        walk.command(convert, path)
+    seconds, mb = time.process_time() - start, memory_mb("VmHWM") - held
+    size = len(data) / 1e6
+    assert seconds < MOST_S + MOST_S_PER_MB * size, f"{seconds:.2f} s for {len(data)} bytes"
+    assert mb < MOST_MB + MOST_MB_PER_MB * size, f"{mb:.0f} MB for {len(data)} bytes"
+    return outcome, seconds, mb
+
+
+def clear_peak() -> None:
+    """Start the process's peak of resident memory anew."""
+    if MEASURED:
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def memory_mb(key: str) -> float:
+    """A line of /proc/self/status in MB; 0 where there is none."""
+    if not MEASURED:
+        return 0.0
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) / 1024 for line in status if line.startswith(key))
+
+
+def fuzz(name: str, seed: int, first: int, count: int, folder: Path) -> Count:
+    """Inputs first to first + count - 1 of one format."""
+    result = Count()
+    walk.walk(files_of(name)[-1], name, Random(0))  # what is imported on the way counts for no input
+    for number in range(first, first + count):
+        try:
+            outcome, seconds, mb = one(name, seed, number, folder)
+        except Exception as error:
+            result.failed += 1
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            message = str(error).replace(str(folder), "")[:100]
+            what = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}: {message!r}"
+            result.failures.setdefault(what, []).append(number)
+            continue
+        setattr(result, outcome, getattr(result, outcome) + 1)
+        result.worst_s = max(result.worst_s, (seconds, number))
+        result.worst_mb = max(result.worst_mb, (mb, number))
+    return result
+
+
+def main() -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=1000, help="inputs of each format (default 1000)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first input (default 0)")
+    parser.add_argument("--format", choices=sound.FORMATS, action="append", help="only this format; may be repeated")
+    parser.add_argument("--only", type=int, help="one input, with its traceback; its bytes go to out/fuzzed.log")
+    options = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
+    with tempfile.TemporaryDirectory() as folder:
+        if options.only is not None:
+            Path("out").mkdir(exist_ok=True)
+            Path("out/fuzzed.log").write_bytes(mutated(options.format[0], options.seed, options.only)[0])
+            print(one(options.format[0], options.seed, options.only, Path(folder), 1))
+            return 0
+        failed = 0
+        print("format          inputs     logs  refused  failed  worst s (input)  worst MB (input)", flush=True)
+        for name in options.format or sound.FORMATS:
+            c = fuzz(name, options.seed, options.first, options.count, Path(folder))
+            failed += c.failed
+            print(f"{name:13}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}"
+                  f" {c.worst_s[1]:<7}{c.worst_mb[0]:10.1f} {c.worst_mb[1]}", flush=True)
+            for what, numbers in sorted(c.failures.items(), key=lambda item: -len(item[1])):
+                print(f"  {len(numbers)} times {what}\n    python tools/fuzz_logs.py --seed {options.seed} "
+                      f"--format {name} --only {numbers[0]}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Fuzzing of the log readers: sound files of every format, mutations of them, and the path that a file takes."""
