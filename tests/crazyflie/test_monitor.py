@@ -7,9 +7,9 @@ import pytest
 
 from airtouch.crazyflie import app_log, blocks
 from airtouch.crazyflie.board import Board
-from airtouch.crazyflie.drone import Sample
 from airtouch.crazyflie.host_detector import HostDetector
 from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.crazyflie.monitor import Monitor
 from airtouch.detector import best
 from airtouch.logs.flight_log import ACC_WORLD, ATTITUDE, PWM, FlightLog

@@ -6,7 +6,6 @@ import struct
 import threading
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,32 +13,13 @@ from airtouch.crazyflie.autopilot import CODES, Command
 from airtouch.crazyflie.blocks import Block
 from airtouch.crazyflie.checks import representable
 from airtouch.crazyflie.link import connect, disconnect
+from airtouch.crazyflie.log_blocks import LogBlocks, Sample
 from airtouch.errors import AirTouchError
 
 CONNECT_S = 20.0
-BLOCK_S = 1.5  #: that a log block gets until its first packet
-BLOCK_ATTEMPTS = 6  #: a lost "create" makes the "append" after it fail
 TAKEN_S = 0.1  #: that an app gets to put a parameter right
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
-LOG_PORT, SETTINGS_CHANNEL, DATA_CHANNEL = 5, 1, 2
-DELETE_BLOCK, CREATE_BLOCK, LOG_HEADER = 2, 6, 4  #: bytes before the values: number, 24-bit clock
-INCOMPLETE = 256  #: no error of the firmware: an "append" that came before its "create" is lost
-FORGET_S = 0.3
-LOG_COMMANDS = {0: "create", 1: "append to", 3: "start", 6: "create", 7: "append to"}
-LOG_ERRORS = {2: "a variable or the block is unknown to it", 7: "it is larger than a packet",
-              8: "it does not know the command", 12: "its memory for log blocks is full; restart the drone",
-              17: "another block has its number", INCOMPLETE: "it left variables out"}
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One log packet: its block, the drone's 24-bit clock (ms), arrival (host, s) and values."""
-
-    block: str
-    stamp: int
-    arrival_s: float
-    values: dict[str, float]
 
 
 class Drone:
@@ -56,9 +36,7 @@ class Drone:
         self.blocks: list[Block] = []
         self.lost = threading.Event()
         self.round_trip_s = float("nan")
-        self._refusals: queue.SimpleQueue[tuple[int, int]] = queue.SimpleQueue()
-        self._asked: dict[str, tuple[Block, Any]] = {}  #: name -> block and cflib's view of it
-        self._forgot_s: dict[int, float] = {}
+        self._log = LogBlocks(self.samples)
         self._reviving: threading.Thread | None = None
         self._cf: Any = None
         self._listen(connect(uri, cache, patience_s, self._console.put))
@@ -70,8 +48,7 @@ class Drone:
         self.lost.clear()
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
-        cf.add_header_callback(self._on_log_setting, LOG_PORT, SETTINGS_CHANNEL)
-        cf.add_header_callback(self._on_log_data, LOG_PORT, DATA_CHANNEL)
+        self._log.attach(cf)
         cf.link_statistics.stop()  # its thread would wait for itself where the link breaks under it
         cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
 
@@ -161,48 +138,9 @@ class Drone:
 
         Raises AirTouchError that says what the drone has against it.
         """
-        reason = f"log block {block.name}: the drone sends none of it; is the link good?"
-        for _ in range(BLOCK_ATTEMPTS):
-            drain(self._refusals)
-            came = self._configure(block)
-            until = time.monotonic() + BLOCK_S
-            while not came.wait(0.02) and time.monotonic() < until:
-                if not self._refusals.empty():
-                    command, code = self._refusals.get()
-                    reason = (f"log block {block.name} rejected: the drone could not "
-                              f"{LOG_COMMANDS[command]} it: {LOG_ERRORS.get(code, f'error {code}')}")
-                    break
-            if came.is_set():
-                if block not in self.blocks:
-                    self.blocks.append(block)
-                return
-        raise AirTouchError(reason)
-
-    def _configure(self, block: Block) -> threading.Event:
-        """Ask for the block under a new number; the event is set by its first packet.
-
-        An older one is given up.
-        """
-        from cflib.crazyflie.log import LogConfig
-
-        config, came = LogConfig(block.name, block.period_ms), threading.Event()
-        for name, kind in block.variables:
-            config.add_variable(name, kind)
-
-        def take(stamp: int, values: dict[str, float], _: Any) -> None:
-            if self._asked.get(block.name, (None, None))[1] is not config:
-                return
-            came.set()
-            self.samples.put(Sample(block.name, stamp, time.monotonic(), values))
-
-        config.data_received_cb.add_callback(take)
-        try:
-            self._cf.log.add_config(config)
-            self._asked[block.name] = block, config
-            config.start()
-        except (KeyError, AttributeError) as error:
-            raise AirTouchError(f"log block {block.name}: {str(error).strip(chr(39))}") from None
-        return came
+        self._log.start(block)
+        if block not in self.blocks:
+            self.blocks.append(block)
 
     def revive(self) -> None:
         """Ask for the log blocks again, in the background: with the link down the firmware forgets them."""
@@ -214,25 +152,6 @@ class Drone:
         for block in list(self.blocks):
             with contextlib.suppress(AirTouchError):
                 self.start(block)
-
-    def _on_log_data(self, packet: Any) -> None:
-        """Sees to blocks that are none of ours any more, or only half of one."""
-        number, size = packet.data[0], len(packet.data) - LOG_HEADER
-        wanted = {config.id: block.size for block, config in list(self._asked.values())}
-        if number in wanted and size < wanted[number]:
-            self._refusals.put((CREATE_BLOCK, INCOMPLETE))
-        elif number not in wanted and time.monotonic() - self._forgot_s.get(number, 0.0) > FORGET_S:
-            from cflib.crtp.crtpstack import CRTPPacket
-
-            self._forgot_s[number] = time.monotonic()
-            delete = CRTPPacket()
-            delete.set_header(LOG_PORT, SETTINGS_CHANNEL)
-            delete.data = (DELETE_BLOCK, number)
-            self._cf.send_packet(delete)
-
-    def _on_log_setting(self, packet: Any) -> None:
-        if len(packet.data) >= 3 and packet.data[0] in LOG_COMMANDS and packet.data[2] not in (0, 17):
-            self._refusals.put((packet.data[0], packet.data[2]))
 
     # commands
 
