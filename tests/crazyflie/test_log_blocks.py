@@ -2,6 +2,7 @@
 
 import errno
 import threading
+from unittest.mock import Mock
 
 import pytest
 
@@ -11,26 +12,22 @@ from airtouch.crazyflie.link import disconnect
 from airtouch.errors import AirTouchError
 from airtouch.sitl.packet import LOG, Packet
 
-scripted_link = pytest.importorskip("scripted_link", reason="flying needs cflib")
-APPEND, CREATE, SETTINGS, URI, Timer = (getattr(scripted_link, name) for name in (
-    "APPEND", "CREATE", "SETTINGS", "URI", "Timer"))
-PATIENCE_S = 60.0  #: for what happens at once, on however busy a machine
-SLOW = 200  #: turns; the first log packet then comes long after every answer
+pytest.importorskip("cflib", reason="flying needs cflib")
+from simulated_link import APPEND, CREATE, SETTINGS, URI, simulated  # noqa: E402
+
+PATIENCE_S = 120.0  #: real seconds for what happens at once
 
 
 @pytest.fixture
-def link(monkeypatch):
-    made = scripted_link.ScriptedLink()
-    monkeypatch.setattr("cflib.crtp.CLASSES", [lambda: made])
-    monkeypatch.setattr("cflib.crazyflie.Timer", Timer)
-    monkeypatch.setattr("airtouch.crazyflie.link.FIRST_S", PATIENCE_S)
-    monkeypatch.setattr("airtouch.crazyflie.link.NEXT_S", PATIENCE_S)
-    return made
+def far(monkeypatch):
+    """A drone with its clock."""
+    with simulated(monkeypatch) as made:
+        yield made
 
 
 @pytest.fixture
-def drone(link):
-    made = Drone(URI, patience_s=PATIENCE_S)
+def drone(far):
+    made = Drone(URI)
     yield made
     made.close()
 
@@ -44,37 +41,35 @@ def is_setting(packet, command):
     return (packet.port, packet.channel) == (LOG, SETTINGS) and packet.data[0] == command
 
 
-def test_an_answer_about_another_block_refuses_nothing(link, drone):
+def test_an_answer_about_another_block_refuses_nothing(far, drone):
     drone.start(blocks.MOTION)
-    number = link.settings(CREATE)[0][1]
+    number = far.settings(CREATE)[0][1]
+    far.delay(0.05)  # the block's first packet comes long after the answer
 
     def stale_first(packet, answers):
         late = [Packet(LOG, SETTINGS, bytes([APPEND, number, errno.E2BIG]))] if is_setting(packet, CREATE) else []
-        return late + answers, []
+        return late + answers
 
-    link.script, link.turns = stale_first, SLOW
+    far.script = stale_first
     drone.start(blocks.STATE)
-    assert len(link.settings(CREATE)) == 2  # one for each block: the second was not given up
+    assert len(far.settings(CREATE)) == 2  # one for each block: the second was not given up
 
 
-def test_an_answer_to_a_repeated_packet_refuses_nothing(link, drone):
-    link.script = lambda packet, answers: ([], answers) if is_setting(packet, APPEND) else (answers, [])
-    link.turns = SLOW
+def test_an_answer_to_a_repeated_packet_refuses_nothing(far, drone):
+    far.delay(0.15)  # there and back 0.3 s, and cflib repeats after 0.2 s
     drone.start(blocks.MOTION)
-    (asked,) = link.settings(CREATE)
-    assert link.settings(APPEND)[0] == link.settings(APPEND)[1]  # the answer was late, so it was repeated
-    assert asked[1] in link.firmware.log.blocks
+    (asked,) = {data[1] for data in far.settings(CREATE)}
+    assert len(far.settings(CREATE)) == len(far.settings(APPEND)) == 2
+    assert asked in far.firmware.log.blocks
 
 
-def test_what_was_answered_in_time_is_not_repeated(link, drone):
+def test_what_was_answered_in_time_is_not_repeated(far, drone):
     drone.start(full("three packets"))
-    assert len(link.settings(APPEND)) == 2
-    for timer in list(Timer.started):
-        timer.expire()
-    assert len(link.settings(APPEND)) == 2
+    far.clock.sleep(1.0)
+    assert len(far.settings(APPEND)) == 2
 
 
-def test_a_refusal_says_why(link, drone, monkeypatch):
+def test_a_refusal_says_why(far, drone, monkeypatch):
     monkeypatch.setattr("cflib.crazyflie.log.Log.MAX_VARIABLES", 1000)  # so that it is the drone that refuses
     for number in range(4):
         drone.start(full(f"full{number}"))
@@ -82,27 +77,28 @@ def test_a_refusal_says_why(link, drone, monkeypatch):
         drone.start(full("one more"))
 
 
-def test_a_block_whose_number_is_taken_gets_another(link, drone):
+def test_a_block_whose_number_is_taken_gets_another(far, drone):
     drone.start(blocks.MOTION)
-    number = link.settings(CREATE)[0][1]
-    link.firmware.log.blocks[number + 1] = link.firmware.log.blocks[number]
+    number = far.settings(CREATE)[0][1]
+    far.firmware.log.blocks[number + 1] = far.firmware.log.blocks[number]
     drone.start(blocks.STATE)
-    assert [data[1] for data in link.settings(CREATE)] == [number, number + 1, number + 2]
+    assert [data[1] for data in far.settings(CREATE)] == [number, number + 1, number + 2]
 
 
-def test_blocks_are_asked_for_again_however_often_the_drone_forgets_them(link, drone):
+def test_blocks_are_asked_for_again_however_often_the_drone_forgets_them(far, drone):
     for block in (blocks.MOTION, blocks.STATE):
         drone.start(block)
     for _ in range(20):  # cflib counts 16 blocks and 128 variables at most
-        link.firmware.log.reset()
+        far.firmware.log.reset()
         drone.revive()
-        drone._reviving.join(PATIENCE_S)
-        assert len(link.firmware.log.blocks) == 2
+        far.clock.wait_for(lambda: not drone._reviving.is_alive())
+        assert len(far.firmware.log.blocks) == 2
     drain(drone.samples)
-    assert {drone.samples.get(timeout=PATIENCE_S).block for _ in range(12)} == {"motion", "state"}
+    far.clock.sleep(0.2)
+    assert {sample.block for sample in drain(drone.samples)} == {"motion", "state"}
 
 
-def test_the_link_may_go_while_a_command_is_sent(link, drone):
+def test_the_link_may_go_while_a_command_is_sent(far, drone):
     closed = threading.Event()
 
     def close():
@@ -114,6 +110,7 @@ def test_the_link_may_go_while_a_command_is_sent(link, drone):
         threading.Thread(target=close, daemon=True).start()
         assert closed.wait(PATIENCE_S)
 
+    (link,) = far.links
     link.about_to_send = break_off
     drone._cf.log.reset()
     assert closed.is_set()
@@ -124,16 +121,16 @@ def test_the_link_may_go_while_a_command_is_sent(link, drone):
 def test_answers_come_while_their_packet_is_repeated():
     from airtouch.crazyflie.cflib_crazyflie import Unanswered
 
-    table, old, new = Unanswered(), Timer(0.2, lambda: pytest.fail("repeated")), Timer(0.2, lambda: None)
+    table, old, new = Unanswered(), Mock(), Mock()
     assert not table["answered"]
     del table["answered"]
     table["same"] = old
     table["same"] = new
-    old.expire()  # its packet counts as answered with the newer one's answer
+    old.cancel.assert_called_once()  # its packet counts as answered with the newer one's answer
     assert table["same"] is new and list(table) == ["same"]
 
 
-def test_a_block_on_a_dead_link_is_told_in_plain_words(link, drone):
+def test_a_block_on_a_dead_link_is_told_in_plain_words(far, drone):
     disconnect(drone._cf)
     with pytest.raises(AirTouchError, match="log block motion: the link is closed"):
         drone.start(blocks.MOTION)

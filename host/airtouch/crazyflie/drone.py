@@ -5,7 +5,7 @@ import queue
 import struct
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -100,31 +100,26 @@ class Drone:
         wanted = representable(name, text, element.ctype)
         if self.parameter(name, patience_s) is None:
             raise AirTouchError(f"{name}: the drone does not tell its value; is the link good?")
-        echoed, told = threading.Event(), []
+        told: list[float] = []
 
         def seen(_: str, value: str) -> None:
             told.append(float(value))
-            echoed.set()
 
         group, short = name.split(".", 1)
         self._cf.param.add_update_callback(group, short, seen)
+        deadline = time.monotonic() + patience_s
         try:
-            deadline = time.monotonic() + patience_s
             while not self._cf.param.is_updated and time.monotonic() < deadline:
                 time.sleep(0.02)
-            self._cf.param.set_value(name, wanted)
-            echoed.wait(patience_s)
-            time.sleep(TAKEN_S)
-            self._cf.param.request_param_update(name)  # what it says it was given is not what it keeps
-            count = len(told)
-            while len(told) <= count and time.monotonic() < deadline:
-                time.sleep(0.02)
+            _next(told, deadline, lambda: self._cf.param.set_value(name, wanted))
+            time.sleep(TAKEN_S)  # what it says it was given is not what it keeps
+            kept = _next(told, deadline, lambda: self._cf.param.request_param_update(name))
         finally:
             self._cf.param.remove_update_callback(group, short, seen)
-        if not told:
+        if kept is None:
             raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
-        if abs(told[-1] - wanted) > 1e-6 * max(abs(wanted), 1.0):
-            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {told[-1]:g}")
+        if abs(kept - wanted) > 1e-6 * max(abs(wanted), 1.0):
+            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {kept:g}")
 
     @property
     def protocol(self) -> int:
@@ -145,7 +140,7 @@ class Drone:
     def revive(self) -> None:
         """Ask for the log blocks again, in the background: with the link down the firmware forgets them."""
         if self._reviving is None or not self._reviving.is_alive():
-            self._reviving = threading.Thread(target=self._revive, daemon=True)
+            self._reviving = threading.Thread(target=self._revive, name="airtouch-revive", daemon=True)
             self._reviving.start()
 
     def _revive(self) -> None:
@@ -194,6 +189,15 @@ class Drone:
     def _on_answer(self, packet: Any) -> None:
         if len(packet.data) >= 4 and packet.data[0] in KINDS:
             self.answers.put((KINDS[packet.data[0]], packet.data[3]))
+
+
+def _next(told: list[float], deadline: float, ask: Callable[[], None]) -> float | None:
+    """The first value that is told after `ask`, None where none comes until the deadline."""
+    count = len(told)
+    ask()
+    while len(told) == count and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return told[count] if len(told) > count else None
 
 
 def drain(source: "queue.SimpleQueue[Any]") -> list[Any]:

@@ -77,11 +77,12 @@ class LogBlocks:
         """
         reason = f"log block {block.name}: the drone sends none of it; is the link good?"
         for _ in range(BLOCK_ATTEMPTS):
-            attempt = self._ask(block)
-            try:
-                refusal = attempt.said.get(timeout=BLOCK_S)
-            except queue.Empty:
+            attempt, until = self._ask(block), time.monotonic() + BLOCK_S
+            while attempt.said.empty() and time.monotonic() < until:
+                time.sleep(0.01)
+            if attempt.said.empty():
                 continue
+            refusal = attempt.said.get()
             if refusal is None:
                 return
             command, code = refusal
