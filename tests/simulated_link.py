@@ -121,6 +121,16 @@ class SimulatedDrone(Server):
         always = SimpleNamespace(random=lambda: 1.0)  # as late as can be
         self._up, self._down = (Line([Fault("late", amount=seconds)], always) for _ in range(2))
 
+    def once_it_logs(self, action: Callable[[], None]) -> None:
+        """Call `action` at the first log block, when cflib has connected."""
+        def script(packet: Packet, answers: list[Packet]) -> list[Packet]:
+            if packet in [Packet(LOG, SETTINGS, data) for data in self.settings(CREATE)]:
+                self.script = lambda packet, answers: answers
+                action()
+            return answers
+
+        self.script = script
+
     def take(self, packet: Packet, link: "Link") -> None:
         """A packet of cflib's."""
         with self._turn:
