@@ -24,7 +24,7 @@ from airtouch.sitl.packet import LOG, PARAM, Packet
 
 URI = "simulated://"
 CLOCKED = [f"airtouch.crazyflie.{name}" for name in ("collect", "drone", "flight", "log_blocks", "monitor")]
-CLOCKED += ["cflib.crazyflie.link_statistics"]
+CLOCKED += ["cflib.crazyflie.link_statistics", "cflib.positioning.motion_commander"]
 PATIENCE_S = 120.0  #: real seconds for what takes milliseconds; then the test fails
 LOOK_S = 0.0002
 CREATE, APPEND, SETTINGS = 6, 7, 1
@@ -33,7 +33,7 @@ CREATE, APPEND, SETTINGS = 6, 7, 1
 class Clock:
     """In the place of the module `time`. `sleep` lets the drone's time pass where the test's thread calls it.
 
-    Other threads that sleep (our own, which revives log blocks) wait until that much has passed.
+    Another thread that sleeps waits until that much has passed; nothing passes while such a thread works.
     """
 
     def __init__(self, drone: "SimulatedDrone") -> None:
@@ -41,6 +41,7 @@ class Clock:
         self._now, self._order = drone.drone.now_s, itertools.count()
         self._due: list[tuple[float, int, Callable[[], None]]] = []
         self._asleep: dict[threading.Thread, threading.Event] = {}
+        self._sleepers: set[threading.Thread] = set()
 
     def monotonic(self) -> float:
         """The drone's time, s."""
@@ -55,7 +56,7 @@ class Clock:
     def sleep(self, seconds: float) -> None:
         """Let so much time pass."""
         if threading.current_thread() is not self._mine:
-            self._sleep_beside(seconds)
+            self.wait(self.fall_asleep(seconds))
             return
         self.settle()
         end = self._now + seconds
@@ -83,21 +84,55 @@ class Clock:
     def settle(self) -> None:
         """Wait until cflib's threads and ours have nothing left to do now."""
         end = time.monotonic() + PATIENCE_S
-        while self._drone.busy() or any(t.name == "airtouch-revive" and t not in self._asleep
-                                        for t in threading.enumerate()):
+        while self._drone.busy() or any(t not in self._asleep for t in threading.enumerate()
+                                        if t in self._sleepers or t.name == "airtouch-revive"):
             assert time.monotonic() < end, "a thread never comes to rest"
             time.sleep(LOOK_S)
 
-    def _sleep_beside(self, seconds: float) -> None:
-        awake, me = threading.Event(), threading.current_thread()
+    def fall_asleep(self, seconds: float) -> threading.Event:
+        """The event of this thread's alarm, set after so many seconds or by `wake`."""
+        me, alarm = threading.current_thread(), threading.Event()
+        self._sleepers.add(me)
+        self._asleep[me] = alarm
+        self.at(self._now + seconds, lambda: self.wake(alarm))
+        return alarm
 
-        def wake() -> None:
-            del self._asleep[me]
-            awake.set()
+    def wake(self, alarm: threading.Event) -> None:
+        """Set an alarm off; its thread counts as awake from now on."""
+        for thread, its in list(self._asleep.items()):
+            if its is alarm:
+                del self._asleep[thread]
+        alarm.set()
 
-        self.at(self._now + seconds, wake)
-        self._asleep[me] = awake
-        assert awake.wait(PATIENCE_S), "nobody lets time pass"
+    def wait(self, alarm: threading.Event) -> None:
+        """Until the alarm goes off."""
+        assert alarm.wait(PATIENCE_S), "nobody lets time pass"
+
+
+class Queue:
+    """queue.Queue whose timeout is by the drone's clock; for the one thread that gets."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock, self._items, self._lock = clock, [], threading.Lock()
+        self._alarm = threading.Event()
+
+    def put(self, item: object) -> None:
+        """See queue.Queue."""
+        with self._lock:
+            self._items.append(item)
+            self._clock.wake(self._alarm)
+
+    def get(self, block: bool, timeout: float) -> object:
+        """See queue.Queue."""
+        with self._lock:
+            if not self._items:
+                self._alarm = self._clock.fall_asleep(timeout)
+        if not self._items:
+            self._clock.wait(self._alarm)
+        with self._lock:
+            if not self._items:
+                raise queue.Empty
+            return self._items.pop(0)
 
 
 class SimulatedDrone(Server):
@@ -243,6 +278,7 @@ def simulated(monkeypatch, scenario="hover", **settings) -> Iterator[SimulatedDr
     with monkeypatch.context() as patch:
         patch.setattr("cflib.crtp.CLASSES", [lambda: Link(drone)])
         patch.setattr("cflib.crazyflie.Timer", Timer)
+        patch.setattr("cflib.positioning.motion_commander.Queue", lambda: Queue(drone.clock))
         patch.setattr("cflib.crazyflie.link_statistics.LinkStatistics.start", lambda statistics: None)
         for name in CLOCKED:
             patch.setattr(f"{name}.time", drone.clock)
