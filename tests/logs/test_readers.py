@@ -158,9 +158,9 @@ def test_real_flights_are_read_in_time_and_completely(flights):
 
 
 def _seconds(path):
-    start = time.perf_counter()
+    start = time.process_time()
     logs.read(path)
-    return time.perf_counter() - start
+    return time.process_time() - start
 
 
 def test_real_crazypad_and_imrclab(flights):

@@ -119,12 +119,12 @@ def test_any_bytes_give_a_log_or_one_line(head, tail, zipped):
     b"# a: " + b"[" * 100_000 + b"\nt_s\n1\n",
 ], ids=["blank lines", "comments", "comments before variables", "columns", "cells", "no line", "deep meta"])
 def test_odd_shapes_are_read_or_refused_at_once(data):
-    start = time.perf_counter()
+    start = time.process_time()
     try:
         assert len(parse(data, "odd")) == 1
     except AirTouchError as error:
         assert str(error).startswith("odd") and len(str(error)) < 300
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
 
 
 @settings(max_examples=150, deadline=None)
