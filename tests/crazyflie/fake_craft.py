@@ -8,7 +8,7 @@ import random
 import threading
 
 from airtouch.crazyflie import blocks
-from airtouch.crazyflie.drone import Sample
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.errors import AirTouchError
 
 FLYING_PWM, PLATFORM_M = 38000, 0.7

@@ -7,9 +7,10 @@ import pytest
 from fake_craft import FakeCraft
 
 from airtouch.crazyflie import blocks
-from airtouch.crazyflie.drone import Sample, drain
+from airtouch.crazyflie.drone import drain
 from airtouch.crazyflie.host_detector import with_gaps
 from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.errors import AirTouchError
 
 ALL = set(blocks.MOTION.names) | set(blocks.STATE.names)

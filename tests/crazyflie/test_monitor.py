@@ -1,15 +1,15 @@
 """The board behind `monitor`: edges from packets, with and without losses, and from the app's counter."""
 
-import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from airtouch.crazyflie import app_log, blocks
 from airtouch.crazyflie.board import Board
-from airtouch.crazyflie.drone import Sample
 from airtouch.crazyflie.host_detector import HostDetector
 from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.crazyflie.monitor import Monitor
 from airtouch.detector import best
 from airtouch.logs.flight_log import ACC_WORLD, ATTITUDE, PWM, FlightLog
@@ -84,13 +84,14 @@ def test_edges_are_felt_where_the_log_feels_them(flight):
     assert monitor.intake.lost == 0 and monitor.detector.taken == len(flight)
 
 
-def test_losses_move_them_little_for_the_clock_stays_true(flight):
+def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
+    monkeypatch.setattr("airtouch.crazyflie.monitor.time", SimpleNamespace(monotonic=lambda: 5.0))
     whole, holed = watch(flight), watch(flight, loss=0.3)
     assert holed.detector.taken == pytest.approx(len(flight), abs=8)
     assert [f.kind for f in holed.board.felt] == [f.kind for f in whole.board.felt]
     for felt, expected in zip(holed.board.felt, whole.board.felt, strict=True):
         assert felt.at_s == pytest.approx(expected.at_s, abs=0.25)
-    holed.intake.last_arrival_s = time.monotonic()
+    holed.intake.last_arrival_s = 5.0
     holed.refresh(0.004)
     assert holed.board.link.lost == pytest.approx(0.3, abs=0.03) and "round trip 4 ms" in str(holed.board.link)
 

@@ -30,9 +30,9 @@ def test_ram_of_the_whole_pipeline():
 
 def test_a_flight_is_one_quick_call():
     signals = hover(4000)
-    start = time.perf_counter()
+    start = time.process_time()  # not the wall's: other programs may run
     kernels.edge_pipeline(*signals, VEHICLE)
-    took = time.perf_counter() - start
+    took = time.process_time() - start
     print(f"\n40 s of flight through the pipeline: {took * 1e3:.1f} ms")
     assert took < 1.0
 

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -96,26 +95,39 @@ def test_command_writes_flights_and_continues(quick, tmp_path):
     assert (out / "manifest.csv").read_text().count("clean") == 5
 
 
+KILLED = """
+import os, sys
+from airtouch.cli.simulate import command
+
+rename, flights = os.replace, []
+
+def wait_to_be_killed(source, target):
+    if str(target).endswith(".csv.gz"):
+        flights.append(target)
+    if len(flights) == 4:
+        print("the fourth", flush=True)
+        sys.stdin.read()
+    rename(source, target)
+
+os.replace = wait_to_be_killed
+command()
+"""
+
+
 def test_a_killed_run_continues(quick, tmp_path):
     out = tmp_path / "out"
-    code = "from airtouch.cli import main; import sys; sys.argv[0] = 'airtouch'; main()"
-    args = [sys.executable, "-c", code, "simulate", str(quick), "--flights", "60", "--out", str(out),
-            "--workers", "2"]
-    process = subprocess.Popen(args, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    for _ in range(600):
-        time.sleep(0.05)
-        if len(list(out.glob("*.csv.gz"))) >= 3:
-            break
-    process.kill()
-    process.wait()
-    time.sleep(0.5)  # its children end by themselves
+    args = [str(quick), "--flights", "8", "--out", str(out), "--workers", "2"]
+    with subprocess.Popen([sys.executable, "-c", KILLED, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                          text=True) as process:
+        assert process.stdout.readline() == "the fourth\n"
+        process.kill()
     done = {f.name: f.stat().st_mtime_ns for f in out.glob("*.csv.gz")}
-    assert 3 <= len(done) < 60
-    CliRunner().invoke(command, [*args[4:]], catch_exceptions=False)
+    assert len(done) == 3 and len(list(out.glob(".quick_*"))) == 1  # the fourth is written and has not its name yet
+    CliRunner().invoke(command, args, catch_exceptions=False)
     files = sorted(out.glob("*.csv.gz"))
-    assert len(files) == 60
+    assert len(files) == 8
     assert all((out / name).stat().st_mtime_ns == stamp for name, stamp in done.items())
-    assert all(len(logs.read(f)) > 100 for f in files[:3])
+    assert all(len(logs.read(f)) > 100 for f in files)
 
 
 def test_diverged_flights_are_reported_and_never_written(quick, tmp_path):

@@ -10,18 +10,20 @@ import subprocess
 import sys
 
 import pytest
+from sitl.clients import PATIENCE_S
 
 from airtouch.sitl import serve
 
 SCRIPT = r"""
-import datetime, json, pathlib, sys, time
+import datetime, json, pathlib, sys, threading, time
 import cfclient
+from cflib.crazyflie.log import LogConfig
 from cfclient.headless import HeadlessClient
 from cfclient.utils.logconfigreader import LogConfigReader
 from cfclient.utils.logdatawriter import LogWriter
 
 def wait_for(condition):
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 200.0
     while not condition():
         if time.monotonic() > end:
             raise SystemExit("it did not happen")
@@ -43,9 +45,20 @@ writer.stop()
 # a gamepad's assisted mode, then its thrust after it was zero
 client._jr.assisted_control_updated.call(False)
 wait_for(lambda: cf.param.get_value("flightmode.althold") == "0")
-for thrust in [0] * 5 + [55000] * 40:
+flying = LogConfig("flying", 10)
+flying.add_variable("sys.isFlying", "uint8_t")
+flies = threading.Event()
+flying.data_received_cb.add_callback(lambda stamp, values, _: values["sys.isFlying"] and flies.set())
+cf.log.add_config(flying)
+flying.start()
+
+def push(thrust):
     client._jr.input_updated.call(0.0, 0.0, 0.0, thrust)
-    time.sleep(0.01)
+    return flies.is_set()
+
+for _ in range(5):
+    push(0)
+wait_for(lambda: push(55000))
 files = [path.read_text() for path in (pathlib.Path(cfclient.config_path) / "logdata").rglob("*.csv")]
 print(json.dumps({"names": sorted(rows[0]), "files": files}), file=sys.stderr)
 cf.close_link()
@@ -57,7 +70,7 @@ def test_headless_client_log_configurations_and_log_files(tmp_path):
     environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path),
                    "QT_QPA_PLATFORM": "offscreen"}
     with serve("hover", port=0, without=["gust"]) as virtual:
-        done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri], env=environment, timeout=60,
+        done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri], env=environment, timeout=PATIENCE_S,
                               capture_output=True, text=True)
         assert done.returncode == 0, done.stderr[-2000:]
         assert virtual.drone.took_off_s is not None

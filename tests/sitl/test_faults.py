@@ -5,12 +5,14 @@ import struct
 
 import numpy as np
 import pytest
-from sitl.clients import connected, log_block, wait_for
+from sitl.clients import connected, log_block
 
 from airtouch.errors import AirTouchError
-from airtouch.sitl import serve
 from airtouch.sitl.faults import Fault, Line, parse
 from airtouch.sitl.packet import CONSOLE, LOG, PARAM, Packet
+
+pytest.importorskip("cflib")
+from simulated_link import simulated  # noqa: E402
 
 
 @pytest.mark.parametrize("text, fault", [
@@ -122,37 +124,41 @@ def test_low_battery(bench):
     assert craft.drone.low_battery and craft.height > 0.3  # it warns before it falls
 
 
-def test_lost_samples_can_be_counted(cflib):
-    with serve("hover", port=0, speed=5.0, faults=["loss=0.3"]) as virtual, connected(virtual.uri) as cf:
+def test_lost_samples_can_be_counted(monkeypatch):
+    with simulated(monkeypatch, faults=["loss=0.3"]) as virtual, connected(virtual.uri) as cf:
         rows = []
         log_block(cf, "one", 10, {"pm.vbat": "float"}, rows)
-        wait_for(lambda: rows and rows[-1][0] - rows[0][0] > 8000)
+        virtual.clock.wait_for(lambda: rows and rows[-1][0] - rows[0][0] > 8000)
         stamps = np.array([stamp for stamp, _ in rows])
     gaps = np.diff(stamps)
     assert (gaps % 10 == 0).all() and (gaps > 0).all()
     assert len(stamps) / (np.ptp(stamps) / 10 + 1) == pytest.approx(0.7, abs=0.07)
 
 
-def test_late_packets_are_seen_by_cflib(cflib):
-    speed = 10.0
-    with serve("hover", port=0, speed=speed, faults=["late=20ms"]) as virtual, connected(virtual.uri) as cf:
-        samples = []
-        cf.link_statistics.latency.latency_updated.add_callback(samples.append)
-        wait_for(lambda: len(samples) > 3)
-        assert max(samples) * speed > 8.0  # ms, 95th percentile there and back
+def test_late_packets_are_seen_by_cflib(monkeypatch):
+    with simulated(monkeypatch) as virtual, connected(virtual.uri) as cf:
+        samples, latency = [], cf.link_statistics.latency
+        latency.latency_updated.add_callback(samples.append)
+        latency.ping()
+        virtual.clock.sleep(0.02)
+        assert samples == [0.0]
+        virtual.order("late=20ms")
+        for _ in range(20):
+            latency.ping()
+            virtual.clock.sleep(0.1)
+        assert len(samples) == 21 and 8.0 < samples[-1] <= 60.0  # ms, 95th percentile there and back, in ticks of 10 ms
 
 
-def test_the_drone_flies_on_while_the_link_is_down(cflib):
-    speed = 5.0
-    with (serve("hover", port=0, speed=speed, faults=["disconnect=3,5s"]) as virtual,
-          connected(virtual.uri) as cf):
+def test_the_drone_flies_on_while_the_link_is_down(monkeypatch):
+    with simulated(monkeypatch, faults=["disconnect=3,5s"]) as virtual, connected(virtual.uri) as cf:
+        wait_for = virtual.clock.wait_for
         rows, after = [], []
         log_block(cf, "one", 10, {"stateEstimate.z": "float"}, rows)
         wait_for(lambda: rows)
         cf.high_level_commander.takeoff(0.5, 1.5)
         took_off = wait_for(lambda: virtual.drone.took_off_s)
         wait_for(lambda: virtual.drone.now_s > took_off + 8.5)
-        assert rows[-1][0] == pytest.approx(1000 * (took_off + 3.0), abs=100)
+        assert rows[-1][0] == pytest.approx(1000 * (took_off + 3.0), abs=20)
         assert virtual.drone.motors_on and virtual.drone.height_over_floor == pytest.approx(0.5, abs=0.15)
         # the blocks are gone, as after a radio's break
         log_block(cf, "again", 10, {"stateEstimate.z": "float"}, after)

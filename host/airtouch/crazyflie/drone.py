@@ -5,8 +5,7 @@ import queue
 import struct
 import threading
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,32 +13,13 @@ from airtouch.crazyflie.autopilot import CODES, Command
 from airtouch.crazyflie.blocks import Block
 from airtouch.crazyflie.checks import representable
 from airtouch.crazyflie.link import connect, disconnect
+from airtouch.crazyflie.log_blocks import LogBlocks, Sample
 from airtouch.errors import AirTouchError
 
 CONNECT_S = 20.0
-BLOCK_S = 1.5  #: that a log block gets until its first packet
-BLOCK_ATTEMPTS = 6  #: a lost "create" makes the "append" after it fail
 TAKEN_S = 0.1  #: that an app gets to put a parameter right
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
-LOG_PORT, SETTINGS_CHANNEL, DATA_CHANNEL = 5, 1, 2
-DELETE_BLOCK, CREATE_BLOCK, LOG_HEADER = 2, 6, 4  #: bytes before the values: number, 24-bit clock
-INCOMPLETE = 256  #: no error of the firmware: an "append" that came before its "create" is lost
-FORGET_S = 0.3
-LOG_COMMANDS = {0: "create", 1: "append to", 3: "start", 6: "create", 7: "append to"}
-LOG_ERRORS = {2: "a variable or the block is unknown to it", 7: "it is larger than a packet",
-              8: "it does not know the command", 12: "its memory for log blocks is full; restart the drone",
-              17: "another block has its number", INCOMPLETE: "it left variables out"}
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One log packet: its block, the drone's 24-bit clock (ms), arrival (host, s) and values."""
-
-    block: str
-    stamp: int
-    arrival_s: float
-    values: dict[str, float]
 
 
 class Drone:
@@ -56,9 +36,7 @@ class Drone:
         self.blocks: list[Block] = []
         self.lost = threading.Event()
         self.round_trip_s = float("nan")
-        self._refusals: queue.SimpleQueue[tuple[int, int]] = queue.SimpleQueue()
-        self._asked: dict[str, tuple[Block, Any]] = {}  #: name -> block and cflib's view of it
-        self._forgot_s: dict[int, float] = {}
+        self._log = LogBlocks(self.samples)
         self._reviving: threading.Thread | None = None
         self._cf: Any = None
         self._listen(connect(uri, cache, patience_s, self._console.put))
@@ -70,8 +48,7 @@ class Drone:
         self.lost.clear()
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
-        cf.add_header_callback(self._on_log_setting, LOG_PORT, SETTINGS_CHANNEL)
-        cf.add_header_callback(self._on_log_data, LOG_PORT, DATA_CHANNEL)
+        self._log.attach(cf)
         cf.link_statistics.stop()  # its thread would wait for itself where the link breaks under it
         cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
 
@@ -123,31 +100,26 @@ class Drone:
         wanted = representable(name, text, element.ctype)
         if self.parameter(name, patience_s) is None:
             raise AirTouchError(f"{name}: the drone does not tell its value; is the link good?")
-        echoed, told = threading.Event(), []
+        told: list[float] = []
 
         def seen(_: str, value: str) -> None:
             told.append(float(value))
-            echoed.set()
 
         group, short = name.split(".", 1)
         self._cf.param.add_update_callback(group, short, seen)
+        deadline = time.monotonic() + patience_s
         try:
-            deadline = time.monotonic() + patience_s
             while not self._cf.param.is_updated and time.monotonic() < deadline:
                 time.sleep(0.02)
-            self._cf.param.set_value(name, wanted)
-            echoed.wait(patience_s)
-            time.sleep(TAKEN_S)
-            self._cf.param.request_param_update(name)  # what it says it was given is not what it keeps
-            count = len(told)
-            while len(told) <= count and time.monotonic() < deadline:
-                time.sleep(0.02)
+            _next(told, deadline, lambda: self._cf.param.set_value(name, wanted))
+            time.sleep(TAKEN_S)  # what it says it was given is not what it keeps
+            kept = _next(told, deadline, lambda: self._cf.param.request_param_update(name))
         finally:
             self._cf.param.remove_update_callback(group, short, seen)
-        if not told:
+        if kept is None:
             raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
-        if abs(told[-1] - wanted) > 1e-6 * max(abs(wanted), 1.0):
-            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {told[-1]:g}")
+        if abs(kept - wanted) > 1e-6 * max(abs(wanted), 1.0):
+            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {kept:g}")
 
     @property
     def protocol(self) -> int:
@@ -161,78 +133,20 @@ class Drone:
 
         Raises AirTouchError that says what the drone has against it.
         """
-        reason = f"log block {block.name}: the drone sends none of it; is the link good?"
-        for _ in range(BLOCK_ATTEMPTS):
-            drain(self._refusals)
-            came = self._configure(block)
-            until = time.monotonic() + BLOCK_S
-            while not came.wait(0.02) and time.monotonic() < until:
-                if not self._refusals.empty():
-                    command, code = self._refusals.get()
-                    reason = (f"log block {block.name} rejected: the drone could not "
-                              f"{LOG_COMMANDS[command]} it: {LOG_ERRORS.get(code, f'error {code}')}")
-                    break
-            if came.is_set():
-                if block not in self.blocks:
-                    self.blocks.append(block)
-                return
-        raise AirTouchError(reason)
-
-    def _configure(self, block: Block) -> threading.Event:
-        """Ask for the block under a new number; the event is set by its first packet.
-
-        An older one is given up.
-        """
-        from cflib.crazyflie.log import LogConfig
-
-        config, came = LogConfig(block.name, block.period_ms), threading.Event()
-        for name, kind in block.variables:
-            config.add_variable(name, kind)
-
-        def take(stamp: int, values: dict[str, float], _: Any) -> None:
-            if self._asked.get(block.name, (None, None))[1] is not config:
-                return
-            came.set()
-            self.samples.put(Sample(block.name, stamp, time.monotonic(), values))
-
-        config.data_received_cb.add_callback(take)
-        try:
-            self._cf.log.add_config(config)
-            self._asked[block.name] = block, config
-            config.start()
-        except (KeyError, AttributeError) as error:
-            raise AirTouchError(f"log block {block.name}: {str(error).strip(chr(39))}") from None
-        return came
+        self._log.start(block)
+        if block not in self.blocks:
+            self.blocks.append(block)
 
     def revive(self) -> None:
         """Ask for the log blocks again, in the background: with the link down the firmware forgets them."""
         if self._reviving is None or not self._reviving.is_alive():
-            self._reviving = threading.Thread(target=self._revive, daemon=True)
+            self._reviving = threading.Thread(target=self._revive, name="airtouch-revive", daemon=True)
             self._reviving.start()
 
     def _revive(self) -> None:
         for block in list(self.blocks):
             with contextlib.suppress(AirTouchError):
                 self.start(block)
-
-    def _on_log_data(self, packet: Any) -> None:
-        """Sees to blocks that are none of ours any more, or only half of one."""
-        number, size = packet.data[0], len(packet.data) - LOG_HEADER
-        wanted = {config.id: block.size for block, config in list(self._asked.values())}
-        if number in wanted and size < wanted[number]:
-            self._refusals.put((CREATE_BLOCK, INCOMPLETE))
-        elif number not in wanted and time.monotonic() - self._forgot_s.get(number, 0.0) > FORGET_S:
-            from cflib.crtp.crtpstack import CRTPPacket
-
-            self._forgot_s[number] = time.monotonic()
-            delete = CRTPPacket()
-            delete.set_header(LOG_PORT, SETTINGS_CHANNEL)
-            delete.data = (DELETE_BLOCK, number)
-            self._cf.send_packet(delete)
-
-    def _on_log_setting(self, packet: Any) -> None:
-        if len(packet.data) >= 3 and packet.data[0] in LOG_COMMANDS and packet.data[2] not in (0, 17):
-            self._refusals.put((packet.data[0], packet.data[2]))
 
     # commands
 
@@ -275,6 +189,15 @@ class Drone:
     def _on_answer(self, packet: Any) -> None:
         if len(packet.data) >= 4 and packet.data[0] in KINDS:
             self.answers.put((KINDS[packet.data[0]], packet.data[3]))
+
+
+def _next(told: list[float], deadline: float, ask: Callable[[], None]) -> float | None:
+    """The first value that is told after `ask`, None where none comes until the deadline."""
+    count = len(told)
+    ask()
+    while len(told) == count and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return told[count] if len(told) > count else None
 
 
 def drain(source: "queue.SimpleQueue[Any]") -> list[Any]:

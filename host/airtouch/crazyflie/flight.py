@@ -62,8 +62,8 @@ class Flight:
     link_timeout_s: float = LINK_TIMEOUT_S
     show: Callable[["Flight"], None] = lambda _: None
     say: Callable[[str], None] = lambda _: None
-    clock: Callable[[], float] = time.monotonic
-    sleep: Callable[[float], None] = time.sleep
+    clock: Callable[[], float] = field(default_factory=lambda: time.monotonic)
+    sleep: Callable[[float], None] = field(default_factory=lambda: time.sleep)
     silences: list[float] = field(default_factory=list)
     landed: bool = False
     _volts: deque = field(default_factory=lambda: deque(maxlen=BATTERY_SAMPLES))

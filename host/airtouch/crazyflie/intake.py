@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.crazyflie import blocks
 from airtouch.crazyflie.blocks import Block
-from airtouch.crazyflie.drone import Sample
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.crazyflie.ticks import Ticks
 
 REMEMBERED_S = 1.0  #: of slow packets

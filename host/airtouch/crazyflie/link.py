@@ -55,10 +55,12 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
     told: gets pieces of what its console prints, from the first on.
     Raises AirTouchError where nobody answers.
     """
-    crazyflie = cflib_or_error().crazyflie
+    cflib_or_error()
+    from airtouch.crazyflie.cflib_crazyflie import Crazyflie
+
     deadline, reason = time.monotonic() + patience_s, "nobody answers there"
     while time.monotonic() < deadline:
-        cf = crazyflie.Crazyflie(rw_cache=_usable(cache))
+        cf = Crazyflie(rw_cache=_usable(cache))
         done, failure, heard_s = threading.Event(), [], deque([time.monotonic()], FIRST_PACKETS)
         cf.connected.add_callback(lambda _, done=done: done.set())
         for failed in (cf.connection_failed, cf.connection_lost):
@@ -66,7 +68,7 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
         cf.packet_received.add_callback(lambda _, heard_s=heard_s: heard_s.append(time.monotonic()))
         cf.console.receivedChar.add_callback(told)
         cf.open_link(uri)
-        if cf.link is not None and uri.startswith("udp"):
+        if cf.link and uri.startswith("udp"):
             cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
         while not done.wait(0.05):
             if time.monotonic() - heard_s[-1] > (FIRST_S if len(heard_s) < FIRST_PACKETS else NEXT_S):
@@ -84,6 +86,5 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
 def disconnect(cf: Any) -> None:
     """Close without the zero set-point that cflib sends: it would stop the motors of a flying drone."""
     link, cf.link = cf.link, None
-    if link is not None:
-        link.close()
+    link.close()
     cf.close_link()

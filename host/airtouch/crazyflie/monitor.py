@@ -10,10 +10,11 @@ import numpy as np
 
 from airtouch.crazyflie import app_log, blocks
 from airtouch.crazyflie.board import Board, Felt, Link
-from airtouch.crazyflie.drone import Drone, Sample, drain
+from airtouch.crazyflie.drone import Drone, drain
 from airtouch.crazyflie.flight import FORGOTTEN_S
 from airtouch.crazyflie.host_detector import HostDetector, with_gaps
 from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.crazyflie.ticks import Restarted
 from airtouch.errors import AirTouchError
 

@@ -162,14 +162,20 @@ class Server:
             takes_over = self.client is None or packet.port == crtp.LOG
             if peer != self.client and takes_over and not crtp.is_null(packet):
                 self._welcome(peer)
-            for answer in self.firmware.take(packet):
+            for answer in self.answers(packet):
                 self._down.put(answer, peer, now_s)
         for packet, peer in self._down.ready(now_s):
-            if now_s < self._cut_until_s:
-                continue
-            with contextlib.suppress(OSError):
-                self._socket.sendto(packet.to_bytes(), peer)
+            if now_s >= self._cut_until_s:
+                self.send(packet, peer)
 
+    def answers(self, packet: crtp.Packet) -> list[crtp.Packet]:
+        """What the firmware answers to a packet."""
+        return self.firmware.take(packet)
+
+    def send(self, packet: crtp.Packet, peer: object) -> None:
+        """Send a packet to a client that may be gone."""
+        with contextlib.suppress(OSError):
+            self._socket.sendto(packet.to_bytes(), peer)
 
     def _welcome(self, peer: object) -> None:
         """Another client: log data and console go there. On the ground the drone is as after its start."""

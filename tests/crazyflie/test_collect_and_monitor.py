@@ -1,0 +1,205 @@
+"""collect and monitor with cflib as it is and the virtual drone, in its own time."""
+
+import re
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli import airtouch
+from airtouch.crazyflie import blocks, collect, mission
+from airtouch.crazyflie.drone import Drone, drain
+from airtouch.crazyflie.guard import Guard
+from airtouch.errors import AirTouchError
+from airtouch.simulation import loop
+from airtouch.sitl.variables import log_variables
+
+pytest.importorskip("cflib", reason="flying needs cflib")
+from missions import HOP  # noqa: E402
+from simulated_link import simulated  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def hop(tmp_path_factory):
+    path = tmp_path_factory.mktemp("missions") / "hop.toml"
+    path.write_text(HOP)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("tables")
+
+
+@pytest.fixture
+def serve(hop, monkeypatch):
+    """serve(fault, ...): the drone at the hop's start."""
+    with monkeypatch.context() as patch:
+        yield lambda *faults: simulated(patch, hop, faults=faults)
+
+
+@pytest.fixture(autouse=True)
+def guards(monkeypatch):
+    """The guard of each flight; its process has tests of its own."""
+    made = []
+
+    @contextmanager
+    def guarding(uri, height_m, seconds):
+        made.append(Guard())
+        yield made[-1]
+
+    monkeypatch.setattr(collect, "guarding", guarding)
+    return made
+
+
+def run(*arguments):
+    return CliRunner().invoke(airtouch, [str(a) for a in arguments])
+
+
+def fly(virtual, hop, cache, out, *more):
+    return run("collect", "--uri", virtual.uri, "--mission", hop, "--out", out, "--cache", cache, "--yes", *more)
+
+
+def comes_to_rest(virtual):
+    """Whether it stands with its motors off, now or within a second."""
+    def rests():
+        row = virtual.drone.row
+        return (row[loop.PLACE + 2] < 0.1 and not row[loop.PWM:loop.PWM + 4].any()
+                and not virtual.drone.info() >> 7 & 1)
+
+    return virtual.clock.wait_for(rests, 1.0)
+
+
+def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards):
+    with serve() as virtual:
+        virtual.once_it_logs(lambda: virtual.order("late=50ms"))
+        shown = fly(virtual, hop, cache, tmp_path, "--param", "airtouch.detector=1", "--flights", "2", "--number", "4")
+        assert shown.exit_code == 0, shown.output
+        assert comes_to_rest(virtual)
+    assert [guard.landed for guard in guards] == [True, True]
+    assert logs.read(tmp_path / "hop_0005.csv.gz").meta["ended"] == "as planned"
+    log = logs.read(tmp_path / "hop_0004.csv.gz")
+    assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and shown.output.count("\ntrue ") >= 2
+    assert set(np.round(np.diff(log["t_s"]), 3)) == {0.01}  # late packets are none lost
+    assert log.meta["lost_samples"] == 0 and log.meta["mission"] == "hop" and log.meta["decks"][:2] == ["bcAI", "bcFlow2"]
+    assert log.meta["settings"] == ["airtouch.detector=1"] and log.meta["acc_frame"] == "body"
+    entry, leave = (e.sample for e in logs.true_edges(log))
+    assert log["x_m"][leave] - log["x_m"][entry] == pytest.approx(0.6, abs=0.15)
+    flying = logs.airborne(log)
+    assert np.nanmedian(log["acc_z_mps2"][flying]) == pytest.approx(9.8, abs=0.3)
+    assert np.isfinite(log.stack(("x_m", "roll_rad", "range_front_m"))[50:]).any(axis=0).all()
+    listed = (tmp_path / "manifest.csv").read_text().splitlines()
+    assert listed[1].startswith("hop_0004.csv.gz,clean,4,40mm,") and listed[1].endswith(",0.4")
+    assert run("evaluate", tmp_path).exit_code == 0
+
+
+def test_thirty_percent_packet_loss_of_everything(serve, hop, cache, tmp_path):
+    with serve() as virtual:
+        plan = collect.Plan(virtual.uri, tmp_path, "hop")
+        drone = Drone(virtual.uri, cache)
+        try:
+            ready = collect.make_ready(drone, plan, lambda _: None)
+            virtual.order("loss=0.3,all")  # the radio gets bad now
+            outcome = collect.fly(drone, ready, mission.load(hop), plan, 1, stop=threading.Event(), say=lambda _: None)
+        finally:
+            drone.close()
+        assert outcome.planned and comes_to_rest(virtual)
+    log = logs.read(outcome.path)
+    span = round((log["t_s"][-1] - log["t_s"][0]) / 0.01) + 1
+    assert len(log) + log.meta["lost_samples"] == span and 0.2 < log.meta["lost_samples"] / span < 0.4
+    assert "messy" in (tmp_path / "manifest.csv").read_text()
+
+
+def test_a_five_second_drop_in_mid_sweep(serve, hop, cache, tmp_path, guards):
+    with serve("disconnect=4,5s") as virtual:
+        shown = fly(virtual, hop, cache, tmp_path)
+        assert shown.exit_code == 1 and "link lost" in shown.output, shown.output
+        assert comes_to_rest(virtual) and guards[0].landed
+    log = logs.read(tmp_path / "hop_0001.csv.gz")
+    assert log.meta["longest_gap_s"] >= 4.9 and "link lost" in log.meta["ended"]
+    middle = int(np.argmax(np.diff(log["t_s"])))
+    assert middle > 200 and len(log) - middle > 20  # before the drop and after it
+
+
+def test_a_drop_after_which_the_drone_has_forgotten_its_log_blocks(serve, hop, cache, tmp_path):
+    with serve("disconnect=4,6s") as virtual:
+        shown = fly(virtual, hop, cache, tmp_path, "--link-timeout", "15")
+        assert shown.exit_code == 0 and "heard again" in shown.output, shown.output
+        assert comes_to_rest(virtual)
+    assert logs.read(tmp_path / "hop_0001.csv.gz").meta["longest_gap_s"] > 4.0
+
+
+@pytest.mark.parametrize("setting, says", [
+    ("airtouch.pFa=2", "airtouch.pFa = 2: out of range; the drone kept 0.5"),
+    ("airtouch.enable=300", "out of range; the drone keeps it as uint8_t, 0 to 255"),
+    ("airtouch.nothing=1", "no such parameter"), ("deck.bcFlow2=0", "read-only"),
+])
+def test_settings_that_the_drone_does_not_take(serve, hop, cache, tmp_path, setting, says):
+    with serve() as virtual:
+        shown = fly(virtual, hop, cache, tmp_path, "--param", setting)
+        assert shown.exit_code != 0 and isinstance(shown.exception, AirTouchError) and says in str(shown.exception)
+        assert comes_to_rest(virtual) and not list(tmp_path.glob("hop*"))
+
+
+def test_a_setting_that_is_never_answered_is_told(serve, hop, cache, tmp_path):
+    with serve() as virtual:
+        drone = Drone(virtual.uri, cache)
+        try:
+            virtual.clock.wait_for(lambda: drone._cf.param.is_updated)
+            virtual.script = lambda packet, answers: []
+            with pytest.raises(AirTouchError, match="airtouch.pFa: the drone did not answer; is the link good"):
+                drone.set_parameter("airtouch.pFa", "0.1")
+        finally:
+            drone.close()
+
+
+def test_firmware_without_a_variable_is_told_which(serve, hop, cache, tmp_path, monkeypatch):
+    def fewer(drone):
+        return {name: how for name, how in log_variables(drone).items() if name not in ("motor.m3", "pm.vbat")}
+
+    monkeypatch.setattr("airtouch.sitl.firmware.variables.log_variables", fewer)
+    with serve() as virtual:
+        shown = fly(virtual, hop, cache, tmp_path)
+        assert "the firmware has no log variable motor.m3, pm.vbat" in str(shown.exception)
+        assert comes_to_rest(virtual)
+
+
+def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, cache, tmp_path):
+    with serve("low-battery=start") as virtual:
+        shown = fly(virtual, hop, cache, tmp_path)
+        assert "not ready: battery at" in str(shown.exception) and "charge it" in str(shown.exception)
+        assert comes_to_rest(virtual) and not list(tmp_path.glob("hop*"))
+
+
+def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):
+    with serve("gap8-silent=start") as virtual:
+        shown = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache)
+    assert shown.exit_code == 0 and "the GAP8 does not answer" in shown.output, shown.output
+    assert "the drone says: " in shown.output and "another detector runs" in shown.output
+    assert re.search(r"\d Hz, 0.0 % lost.*round trip", shown.output)
+
+
+def test_monitor_counts_losses_and_runs_the_detector_here(serve, cache):
+    with serve("loss=0.3") as virtual:
+        shown = run("monitor", "--uri", virtual.uri, "--duration", "6", "--cache", cache, "--host-detector")
+    assert shown.exit_code == 0 and "(best on the host)" in shown.output, shown.output
+    share = float(re.findall(r"([\d.]+) % lost", shown.output)[-1])
+    assert 20 < share < 40 and "P 0.00" in shown.output
+
+
+def test_an_interrupted_link_object_is_opened_again(serve, cache):
+    with serve() as virtual:
+        drone = Drone(virtual.uri, cache)
+        try:
+            drone.start(blocks.MOTION)
+            drone.lost.set()
+            drone.reopen(5.0)
+            drain(drone.samples)
+            virtual.clock.sleep(2.0)
+            stamps = [s.stamp for s in drain(drone.samples)]
+            assert len(stamps) == 200 and not drone.lost.is_set() and set(np.diff(stamps)) == {10}
+        finally:
+            drone.close()
