@@ -176,7 +176,7 @@ def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, c
 
 def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):
     with serve("gap8-silent=start") as virtual:
-        shown = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache)
+        shown = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache, "--param", "airtouch.detector=2")
     assert shown.exit_code == 0 and "the GAP8 does not answer" in shown.output, shown.output
     assert "the drone says: " in shown.output and "another detector runs" in shown.output
     assert re.search(r"\d Hz, 0.0 % lost.*round trip", shown.output)
