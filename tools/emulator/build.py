@@ -68,6 +68,28 @@ def build(
     return program
 
 
+def compile_objects(sources: Sequence[Path], core: str, folder: Path, *, include: Sequence[Path] = (),
+                    flags: Sequence[str] = (), cache: Path = CACHE) -> list[Path]:
+    """Compiles `sources` into `folder`, one object each, and links nothing: for code that calls an operating system.
+
+    Raises AirTouchError as `build` does.
+    """
+    target = _core(core)
+    command, _ = _commands(target, _compiler(core, None))
+    objects = [folder / f"{Path(source).stem}.o" for source in sources]
+    if len(set(objects)) < len(objects):
+        raise AirTouchError("two sources have the same file name")
+    for source, made in zip(sources, objects):
+        _run([*command, *FLAGS, *(f"-I{path}" for path in include), *flags, "-c", source, "-o", made],
+             _environment(cache))
+    return objects
+
+
+def _environment(cache: Path) -> dict[str, str]:
+    """The process's environment, with zig's caches in ours."""
+    return {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache / "zig"), "ZIG_LOCAL_CACHE_DIR": str(cache / "zig")}
+
+
 def _core(name: str) -> Core:
     if name not in CORES:
         raise AirTouchError(f"no core {name!r}: there are {', '.join(CORES)}")
@@ -110,7 +132,7 @@ def _make(folder: Path, core: Core, compiler: str, flags: list[str], sources: li
     """Everything in a folder of its own, which then takes its name: two builds at once do no harm."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     compile_, link = _commands(core, compiler)
-    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache / "zig"), "ZIG_LOCAL_CACHE_DIR": str(cache / "zig")}
+    environment = _environment(cache)
     extra = [LIBC / "libc.c"] if compiler == "zig" else []
     with tempfile.TemporaryDirectory(dir=folder.parent) as work:
         new = Path(work) / "new"

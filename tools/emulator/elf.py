@@ -1,6 +1,7 @@
 """As much of a 32-bit little-endian ELF file as an emulator needs: what to load where, and the names."""
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +37,8 @@ class Symbol:
 class Elf:
     """A linked program or one object file.
 
-    machine: ARM or RISCV. sections: those that lie in memory. symbols: by name.
+    machine: ARM or RISCV. sections: those that lie in memory. symbols: by name. undefined: names of functions and
+    variables that another file must provide.
     Raises ValueError for anything that is not a 32-bit little-endian ELF file.
     """
 
@@ -49,6 +51,7 @@ class Elf:
         headers = _section_headers(data)
         self.sections = [_section(data, header) for header in headers if header["flags"] & _ALLOC and header["size"]]
         self.symbols = {symbol.name: symbol for symbol in _symbols(data, headers, thumb=self.machine == ARM)}
+        self.undefined = {name for name, _, _, info, section in _symbol_table(data, headers) if not section and info >> 4}
         self._functions = sorted((s for s in self.symbols.values() if s.is_function), key=lambda s: s.address)
 
     def where(self, address: int) -> str:
@@ -92,14 +95,20 @@ def _section(data: bytes, header: dict) -> Section:
                    bool(header["flags"] & _WRITE), bool(header["flags"] & _EXECUTE))
 
 
-def _symbols(data: bytes, headers: list[dict], thumb: bool) -> list[Symbol]:
-    found = []
+def _symbol_table(data: bytes, headers: list[dict]) -> Iterator[tuple[str, int, int, int, int]]:
+    """Name, value, size, info and section of each symbol that has a name; section 0 for those that are not here."""
     for table in (header for header in headers if header["type"] == _SYMTAB):
         text = headers[table["link"]]["offset"]
         for at in range(table["offset"], table["offset"] + table["size"], 16):
             name, value, size, info, _, section = struct.unpack_from("<IIIBBH", data, at)
-            function = info & 15 == _FUNCTION
-            if name and section and info & 15 <= _FUNCTION:
-                found.append(Symbol(_text(data, text + name), value & ~1 if function and thumb else value, size,
-                                    function, info >> 4 != 0))
+            if name:
+                yield _text(data, text + name), value, size, info, section
+
+
+def _symbols(data: bytes, headers: list[dict], thumb: bool) -> list[Symbol]:
+    found = []
+    for name, value, size, info, section in _symbol_table(data, headers):
+        function = info & 15 == _FUNCTION
+        if section and info & 15 <= _FUNCTION:
+            found.append(Symbol(name, value & ~1 if function and thumb else value, size, function, info >> 4 != 0))
     return found
