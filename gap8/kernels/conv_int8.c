@@ -56,10 +56,10 @@ static void copyWords(const int8_t *from, int8_t *to, int32_t rows, int32_t span
   for (; rows > 0; rows--, from += rowStride - span) {
     int32_t left = span;
     for (; left >= PIECE; left -= PIECE, from += PIECE, to += PIECE) {
-      memcpy(__builtin_assume_aligned(to, 4), __builtin_assume_aligned(from, 4), PIECE);
+      memcpy(ALIGNED_4(to), ALIGNED_4(from), PIECE);
     }
     for (; left > 0; left -= 4, from += 4, to += 4) {
-      memcpy(__builtin_assume_aligned(to, 4), __builtin_assume_aligned(from, 4), 4);
+      memcpy(ALIGNED_4(to), ALIGNED_4(from), 4);
     }
   }
 }

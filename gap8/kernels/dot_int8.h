@@ -6,9 +6,8 @@
 
 #include <stdint.h>
 
+#include "extensions.h"
 #include "xpulp.h"
-
-#define ALWAYS_INLINE static inline __attribute__((always_inline))
 
 #if AIRTOUCH_XPULP
 
@@ -22,7 +21,7 @@ ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
   return xpulpDot4(x, w, sum);
 }
 
-#elif defined(__ARM_FEATURE_DSP)
+#elif defined(__ARM_FEATURE_DSP) && AIRTOUCH_GNU
 
 #include <string.h>
 

@@ -8,6 +8,7 @@
 
 #include <stdint.h>
 
+#include "extensions.h"
 #include "layer_int8.h"
 #include "xpulp.h"
 
@@ -58,7 +59,7 @@ static inline requantiser_t requantiser(const layerInt8_t *layer, int32_t channe
 // falls with a rising accumulator, so that the largest of several may be taken before it.
 static inline int8_t requantise(requantiser_t r, int32_t accumulator) {
   int32_t value;
-  if (__builtin_expect(r.right > 0, 1)) {
+  if (LIKELY(r.right > 0)) {
     value = roundingShiftRight(roundingDoublingHighMultiply(accumulator, r.multiplier), r.right);
   } else {
     value = roundingDoublingHighMultiply((int32_t)((uint32_t)accumulator << -r.right), r.multiplier);

@@ -1,6 +1,6 @@
 // The few instructions of GAP8's XPULP extension that the kernels use, under names of their own.
 //
-// On the chip (`__pulp__`) they are its compiler's builtins, one instruction each. With
+// On the chip (AIRTOUCH_PULP_BUILTINS) they are its compiler's builtins, one instruction each. With
 // `__riscv_xcvsimd` they are CORE-V's instructions, which are XPULP's under another
 // encoding: upstream compilers have those, so that the path can be compiled, run and
 // counted on a desktop. With AIRTOUCH_XPULP_EMULATION they are plain C, for every machine.
@@ -10,7 +10,9 @@
 
 #include <stdint.h>
 
-#if defined(__pulp__)
+#include "extensions.h"
+
+#if AIRTOUCH_PULP_BUILTINS
 #define AIRTOUCH_XPULP 1
 
 typedef signed char xpulpVector_t __attribute__((vector_size(4)));
@@ -49,7 +51,7 @@ static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
   return __builtin_pulp_addRN_r(a, b, shift);
 }
 
-#elif defined(__riscv_xcvsimd)
+#elif defined(__riscv_xcvsimd) && AIRTOUCH_GNU
 #define AIRTOUCH_XPULP 1
 
 static inline int32_t xpulpLoad4(const int8_t *p) {
