@@ -27,6 +27,7 @@
 typedef enum {
   EDGE_LINK_BEST = 1,   ///< 12 int8: motion_channels.h, quantised; outputs: over, entry, exit
   EDGE_LINK_PAPER = 2,  ///< 3 float32: fused features; outputs: off, over, unused
+  EDGE_LINK_PAPER_STREAM = 3,  ///< the same samples and outputs, another network
 } edgeLinkAlgorithm_t;
 
 typedef enum {

@@ -13,14 +13,16 @@ static int32_t isConv(const layerInt8_t *layer) {
   return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV;
 }
 
-// The layer for one row of output: as many rows of input as it reads for that.
-static layerInt8_t oneRow(const layerInt8_t *layer) {
-  layerInt8_t row = *layer;
+// A step of one layer, for one row of output: as many rows of input as it reads for that.
+static void beginStep(rollingStep_t *step, const layerInt8_t *layer) {
+  step->layer = *layer;
   if (isConv(layer) || layer->kind == LAYER_MAX_POOL) {
-    row.inRows = layer->kernelRows;
-    row.outRows = 1;
+    step->layer.inRows = layer->kernelRows;
+    step->layer.outRows = 1;
   }
-  return row;
+  step->taps = 1;
+  step->dilation = 1;
+  step->period = 1;
 }
 
 // Rows of a layer's input are `period` samples apart; in the window neighbouring rows are
@@ -30,7 +32,9 @@ int32_t rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32
   if (networkInt8Check(network) >= 0 || network->layerCount < 1 || stride < 1 || stride > ROLLING_MAX_STRIDE) {
     return 0;
   }
-  *self = (rollingInt8_t){.stride = stride, .receptive = 1};
+  memset(self, 0, sizeof(*self));
+  self->stride = stride;
+  self->receptive = 1;
   for (int32_t i = 0; i < network->layerCount; i++) {
     const layerInt8_t *layer = &network->layers[i];
     const layerInt8_t *pool = i + 1 < network->layerCount ? &network->layers[i + 1] : NULL;
@@ -38,7 +42,7 @@ int32_t rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32
       return 0;
     }
     rollingStep_t *step = &self->steps[self->stepCount++];
-    *step = (rollingStep_t){.layer = oneRow(layer), .taps = 1, .dilation = 1, .period = 1};
+    beginStep(step, layer);
     if (isConv(layer) || layer->kind == LAYER_MAX_POOL) {
       step->dilation = apart / period;
       step->taps = layer->kernelRows;
@@ -82,25 +86,23 @@ static int32_t ringBytes(const rollingStep_t *step) {
   return aligned(2 * step->taps * step->rowBytes) * step->dilation;
 }
 
-static int32_t arenaBytes(const rollingInt8_t *self) {
-  int32_t bytes = aligned(self->steps[self->stepCount - 1].layer.outChannels);
-  for (int32_t i = 0; i < self->stepCount; i++) {
-    bytes += ringBytes(&self->steps[i]);
+int32_t rollingInt8PlanBytes(const rollingInt8_t *planned) {
+  int32_t bytes = aligned(planned->steps[planned->stepCount - 1].layer.outChannels);
+  for (int32_t i = 0; i < planned->stepCount; i++) {
+    bytes += ringBytes(&planned->steps[i]);
   }
   return bytes;
 }
 
 int32_t rollingInt8ArenaBytes(const networkInt8_t *network, int32_t stride) {
   rollingInt8_t planned;
-  return rollingInt8Plan(&planned, network, stride) ? arenaBytes(&planned) : 0;
+  return rollingInt8Plan(&planned, network, stride) ? rollingInt8PlanBytes(&planned) : 0;
 }
 
 int32_t rollingInt8Init(rollingInt8_t *self, const networkInt8_t *network, int32_t stride, int8_t *arena) {
-  rollingInt8_t planned;
-  if (!rollingInt8Plan(&planned, network, stride)) {
+  if (!rollingInt8Plan(self, network, stride)) {
     return 0;
   }
-  *self = planned;
   for (int32_t i = 0; i < self->stepCount; i++) {
     self->steps[i].ring = arena;
     arena += ringBytes(&self->steps[i]);

@@ -40,7 +40,8 @@ typedef struct {
   bool known[MAX_STEPS];
 } world_t;
 
-static world_t best, paper;
+static world_t best, paper, paperStream;
+static const gap8Models_t models = {&airtouchStream, &airtouchNetwork, &airtouchRolling, &airtouchRollingScale};
 static gap8Core_t gap8;
 static linkSender_t sender;
 static pipe_t up, down;
@@ -74,8 +75,11 @@ static void findTruth(void) {
   static float rows[MAX_STEPS][3];
   static int8_t quantised[GAP8_VALUES];
   static float window[GAP8_VALUES];
+  static int8_t rings[AIRTOUCH_ROLLING_ARENA_BYTES] __attribute__((aligned(4)));
+  static rollingInt8_t rolling;
   streamState_t state;
   streamInt8Reset(&airtouchStream, &state, arena);
+  check(rollingInt8Init(&rolling, &airtouchRolling, AIRTOUCH_ROLLING_STRIDE, rings), "the network rolls");
   for (int i = 0; i < MAX_STEPS; i++) {
     for (int c = 0; c < EDGE_LINK_SAMPLE_BYTES; c++) {
       best.samples[i][c] = (uint8_t)(random8() >> (i % 5));
@@ -94,6 +98,14 @@ static void findTruth(void) {
       zScoreWindow(rows[i - AIRTOUCH_MODEL_ROWS + 1], AIRTOUCH_MODEL_ROWS, 3, window);
       networkInt8Quantise(&airtouchNetwork, window, GAP8_VALUES, quantised);
       memcpy(paper.truth[i], networkInt8Run(&airtouchNetwork, quantised, network), AIRTOUCH_MODEL_OUTPUTS);
+    }
+    memcpy(paperStream.samples[i], rows[i], EDGE_LINK_SAMPLE_BYTES);
+    fixedScaleApply(&airtouchRollingScale, rows[i], window);
+    networkInt8Quantise(&airtouchRolling, window, AIRTOUCH_ROLLING_COLUMNS, quantised);
+    logits = rollingInt8Step(&rolling, quantised);
+    paperStream.known[i] = logits != NULL;
+    if (logits != NULL) {
+      memcpy(paperStream.truth[i], logits, AIRTOUCH_ROLLING_OUTPUTS);
     }
   }
 }
@@ -233,7 +245,7 @@ static int stepLink(const world_t *world, int step, script_t *script, int *packe
       continue;
     }
     if (fate % 64 == 62) {
-      gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
+      gap8CoreInit(&gap8, &models, NULL);
       *wasReset = true;
     }
     linkSenderSent(&sender, true);
@@ -251,16 +263,24 @@ static int stepLink(const world_t *world, int step, script_t *script, int *packe
 static void runScript(const uint8_t *data, size_t length, int *slowest) {
   script_t script = {data, length}, none = {data, 0};
   const uint8_t kind = next(&script);
-  const bool isPaper = kind % 2;
-  swift = kind / 2 % 2;
-  const world_t *world = isPaper ? &paper : &best;
-  const char *sha = isPaper ? AIRTOUCH_MODEL_SHA256 : AIRTOUCH_STREAM_SHA256;
+  const struct {
+    const world_t *world;
+    const char *sha256;
+    uint16_t window, stride;
+    uint8_t algorithm;
+  } detectors[] = {
+      {&best, AIRTOUCH_STREAM_SHA256, streamWindow(&airtouchStream), (uint16_t)airtouchStream.stride, EDGE_LINK_BEST},
+      {&paper, AIRTOUCH_MODEL_SHA256, AIRTOUCH_MODEL_ROWS, 1, EDGE_LINK_PAPER},
+      {&paperStream, AIRTOUCH_ROLLING_SHA256, AIRTOUCH_ROLLING_ROWS, AIRTOUCH_ROLLING_STRIDE, EDGE_LINK_PAPER_STREAM},
+  }, *detector = &detectors[kind % 3];
+  swift = kind / 3 % 2;
+  const world_t *world = detector->world;
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
-  edgeLinkDigest(sha, digest);
-  const uint16_t window = isPaper ? AIRTOUCH_MODEL_ROWS : streamWindow(&airtouchStream);
+  edgeLinkDigest(detector->sha256, digest);
+  const uint16_t window = detector->window;
   up.count = down.count = 0;
-  gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
-  linkSenderInit(&sender, isPaper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, (uint16_t)(window + 1), 7, 250);
+  gap8CoreInit(&gap8, &models, NULL);
+  linkSenderInit(&sender, detector->algorithm, digest, (uint16_t)(window + detector->stride - 1), 7, 250);
   int packets = 0, step = 0;
   bool wasReset = false;
   for (; step < CLEAN_STEPS; step++) {
@@ -296,7 +316,7 @@ static void runScript(const uint8_t *data, size_t length, int *slowest) {
 static void forge(void) {
   linkAnswer_t answers[EDGE_LINK_ANSWERS];
   uint8_t bytes[EDGE_LINK_MAX_BYTES], reply[EDGE_LINK_MAX_BYTES], digest[EDGE_LINK_DIGEST_BYTES];
-  gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
+  gap8CoreInit(&gap8, &models, NULL);
   edgeLinkDigest(AIRTOUCH_STREAM_SHA256, digest);
   linkSenderInit(&sender, EDGE_LINK_BEST, digest, 300, 7, 1);
   for (int i = 0; i < 60000; i++) {

@@ -13,7 +13,7 @@ INCLUDES = [f"-I{ROOT / folder}" for folder in ("firmware/kernels", "firmware/li
 #: both ends of the link and the networks behind it
 SOURCES = [*sorted((ROOT / "firmware" / "link").glob("*.c")), ROOT / "firmware/kernels/feature_window.c",
            *sorted((ROOT / "gap8" / "kernels").glob("*.c")), *sorted((ROOT / "gap8" / "app" / "src").glob("gap8_*.c")),
-           ROOT / "gap8/model/airtouch_model.c", ROOT / "gap8/model/airtouch_stream.c"]
+           *(ROOT / "gap8" / "model" / f"airtouch_{name}.c" for name in ("model", "rolling", "stream"))]
 SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 
 

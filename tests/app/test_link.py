@@ -38,7 +38,7 @@ def script(faults, reset):
 
 SCRIPTS = st.lists(
     st.builds(lambda algorithm, faults, reset: bytes([algorithm]) + script(faults, reset),
-              st.integers(0, 3),
+              st.integers(0, 5),
               st.lists(st.one_of(st.just(PASS), st.sampled_from([DROP, 8, 9, FLIP, 11, 12, 13]), st.integers(0, 255)),
                        max_size=900),
               st.booleans()),
@@ -51,7 +51,8 @@ def test_any_faults_give_no_wrong_answer_and_answers_come_back(driver, scripts):
     assert driver(scripts) <= 10
 
 
-@pytest.mark.parametrize("algorithm", [0, 1, 2, 3], ids=["best", "paper", "best-swift", "paper-swift"])
+@pytest.mark.parametrize("algorithm", range(6), ids=["best", "paper", "paper-stream", "best-swift", "paper-swift",
+                                                     "paper-stream-swift"])
 def test_a_burst_of_lost_packets_costs_nothing_but_time(driver, algorithm):
     # Two packets of each step may be on their way up, each answered: some 2 s in which nothing passes.
     assert driver([bytes([algorithm]) + bytes([DROP]) * n for n in (1, 7, 30, 100, 400)]) <= 10
@@ -61,7 +62,7 @@ def test_corrupted_lengths_and_lost_power_in_the_midst_of_flight(driver):
     longer = bytes([13, 7, 1]) * 200
     cut = bytes([9, 40]) * 200
     lost_power = bytes([PASS] * 40 + [RESET] + [PASS] * 80 + [RESET, DROP, DROP] + [PASS] * 5)
-    driver([bytes([a]) + s for a in range(4) for s in (longer, cut, lost_power)])
+    driver([bytes([a]) + s for a in range(6) for s in (longer, cut, lost_power)])
 
 
 def test_packets_that_look_right_and_say_anything_break_nothing(driver):

@@ -4,8 +4,11 @@
  */
 #pragma once
 
+#include "fixed_scale.h"
 #include "network_int8.h"
 #include "stream_int8.h"
 
 extern networkInt8_t gap8L1Network;
+extern networkInt8_t gap8L1Rolling;
+extern fixedScale_t gap8L1RollingScale;
 extern streamInt8_t gap8L1Stream;

@@ -1,5 +1,10 @@
 // The app on the GAP8: PMSIS with FreeRTOS, CPX from and to the STM32, networks on the cluster. All that it does with
 // a packet is in gap8_core.h; this gives it the cluster, a clock and the wire.
+//
+// It never stops: without a cluster it goes on to take packets off the wire, which others use as well, and tells the
+// STM32 that it has no network, so that the STM32 computes by itself. Tasks, semaphore and buffers are static.
+#include <stdbool.h>
+
 #include "bsp/bsp.h"
 #include "pmsis.h"
 
@@ -9,9 +14,10 @@
 
 #define CORES 8
 #define FC_HZ 50000000
-#define CLUSTER_HZ 175000000
+#define CLUSTER_HZ 175000000  // the most at 1.2 V, which GAP8 starts with
+#define SAFE_HZ 50000000      // what the cluster starts with
 #define HEARTBEAT_MS 500
-#define STACK_WORDS (4 * configMINIMAL_STACK_SIZE)
+#define STACK_WORDS 512
 #define FIRST_CORE_STACK 2048  // bytes
 #define OTHER_CORE_STACK 2048
 
@@ -25,14 +31,21 @@ typedef struct {
 
 static PI_CL_L1 gap8Core_t core;
 static PI_CL_L1 uint64_t stacks[(FIRST_CORE_STACK + (CORES - 1) * OTHER_CORE_STACK) / 8];
+static linkReceiver_t refusing;  // in place of the core where there is no cluster: it has no network
+static bool haveCluster;
+static unsigned clusterMHz;
+static int32_t networks;
 static struct pi_device cluster;
 static struct pi_cluster_task clusterTask;
 static request_t request;
 static CPXPacket_t received;
 static CPXPacket_t sent;
+static StaticSemaphore_t turnMemory;
 static SemaphoreHandle_t turn;  // one task at a time uses the core and sends: CPX packs into one buffer
+static StackType_t heartbeatStack[STACK_WORDS];
+static StaticTask_t heartbeatMemory;
 
-static void forkTeam(void (*work)(void *argument), void *argument) { pi_cl_team_fork(CORES, work, argument); }
+static void forkTeam(void (*work)(void *), void *argument) { pi_cl_team_fork(CORES, work, argument); }
 
 static int32_t coreNumber(void) { return (int32_t)pi_core_id(); }
 
@@ -45,7 +58,11 @@ static PI_CL_L1 gap8Team_t team = {forkTeam, coreNumber, teamBarrier, CORES};
 
 static void initOnCluster(void *unused) {
   (void)unused;
-  gap8CoreInit(&core, &gap8L1Stream, &gap8L1Network, &team);
+  const gap8Models_t models = {.best = &gap8L1Stream,
+                               .paper = &gap8L1Network,
+                               .paperStream = &gap8L1Rolling,
+                               .paperStreamScale = &gap8L1RollingScale};
+  networks = gap8CoreInit(&core, &models, &team);
 }
 
 static void takeOnCluster(void *unused) {
@@ -53,13 +70,16 @@ static void takeOnCluster(void *unused) {
   request.replyLength = gap8CoreTake(&core, request.bytes, request.length, request.reply);
 }
 
-/** Runs an entry on the cluster's first core and waits for it. */
+/** Runs an entry on the cluster's first core and waits for it. A cluster that takes no task is given up. */
 static void onCluster(void (*entry)(void *)) {
   pi_cluster_task(&clusterTask, entry, NULL);
   clusterTask.stacks = stacks;
   clusterTask.stack_size = FIRST_CORE_STACK;
   clusterTask.slave_stack_size = OTHER_CORE_STACK;
-  pi_cluster_send_task_to_cl(&cluster, &clusterTask);
+  if (pi_cluster_send_task_to_cl(&cluster, &clusterTask) != 0) {
+    haveCluster = false;
+    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: the cluster takes no task, the STM32 computes\n");
+  }
 }
 
 static void send(const uint8_t *bytes, uint16_t length) {
@@ -72,17 +92,26 @@ static void send(const uint8_t *bytes, uint16_t length) {
 }
 
 static void takePacket(void) {
-  request.length = received.dataLength;
-  if (received.dataLength > EDGE_LINK_MAX_BYTES) {
-    request.length = 0;  // counted as refused
-  }
+  // What cannot be the STM32's (CPX carries packets of WiFi hosts as well) is counted as refused.
+  const bool ours = received.route.source == CPX_T_STM32 && received.dataLength <= EDGE_LINK_MAX_BYTES;
+  request.length = ours ? received.dataLength : 0;
+  request.replyLength = 0;
   memcpy(request.bytes, received.data, request.length);
-  const uint8_t before = core.receiver.session;
-  onCluster(takeOnCluster);
+  if (haveCluster) {
+    onCluster(takeOnCluster);
+  } else {
+    request.replyLength = linkReceiverTake(&refusing, request.bytes, request.length, request.reply);
+  }
   send(request.reply, request.replyLength);
-  if (core.receiver.session != before) {
-    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: session %u, %s\n", core.receiver.session,
-                      core.receiver.mismatch ? "model refused" : "model known");
+}
+
+/** Says on the console which session it is, once for each. */
+static void tellSession(const linkReceiver_t *receiver) {
+  static uint8_t told;
+  if (receiver->session != told) {
+    told = receiver->session;
+    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: session %u, model %s, cluster %u MHz\n", told,
+                      receiver->mismatch ? "refused" : "known", haveCluster ? clusterMHz : 0);
   }
 }
 
@@ -92,36 +121,55 @@ static void heartbeatTask(void *unused) {
   while (1) {
     vTaskDelay(HEARTBEAT_MS / portTICK_PERIOD_MS);
     xSemaphoreTake(turn, portMAX_DELAY);
-    send(beat, gap8CoreHeartbeat(&core, xTaskGetTickCount() * portTICK_PERIOD_MS, beat));
+    const uint32_t uptime = xTaskGetTickCount() * portTICK_PERIOD_MS;
+    tellSession(haveCluster ? &core.receiver : &refusing);
+    send(beat, haveCluster ? gap8CoreHeartbeat(&core, uptime, beat) : linkReceiverHeartbeat(&refusing, uptime, beat));
     xSemaphoreGive(turn);
   }
 }
 
-static void openCluster(void) {
+/** Sets a clock; says where that fails. */
+static bool setClock(pi_freq_domain_e domain, const char *name, uint32_t hertz) {
+  if (pi_freq_set(domain, hertz) == 0) {
+    return true;
+  }
+  cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: %s does not run at %u MHz\n", name, (unsigned)(hertz / 1000000));
+  return false;
+}
+
+static bool openCluster(void) {
   static struct pi_cluster_conf conf;
   pi_cluster_conf_init(&conf);
   conf.id = 0;
   pi_open_from_conf(&cluster, &conf);
-  if (pi_cluster_open(&cluster)) {
-    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: the cluster does not open\n");
-    pmsis_exit(-1);
+  if (pi_cluster_open(&cluster) != 0) {
+    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: the cluster does not open, the STM32 computes\n");
+    return false;
   }
-  pi_freq_set(PI_FREQ_DOMAIN_CL, CLUSTER_HZ);
+  clusterMHz = CLUSTER_HZ / 1000000;
+  if (!setClock(PI_FREQ_DOMAIN_CL, "the cluster", CLUSTER_HZ)) {
+    setClock(PI_FREQ_DOMAIN_CL, "the cluster", SAFE_HZ);
+    clusterMHz = SAFE_HZ / 1000000;
+  }
+  return true;
 }
 
 static void start(void) {
   pi_bsp_init();
-  pi_freq_set(PI_FREQ_DOMAIN_FC, FC_HZ);
   cpxInit();
   cpxEnableFunction(CPX_F_APP);
-  openCluster();
-  onCluster(initOnCluster);
-  turn = xSemaphoreCreateBinary();
+  turn = xSemaphoreCreateBinaryStatic(&turnMemory);
   xSemaphoreGive(turn);
-  cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: best %.8s, paper %.8s\n", AIRTOUCH_STREAM_SHA256, AIRTOUCH_MODEL_SHA256);
-  if (xTaskCreate(heartbeatTask, "heartbeat", STACK_WORDS, NULL, tskIDLE_PRIORITY + 1, NULL) != pdPASS) {
-    pmsis_exit(-1);
+  linkReceiverInit(&refusing, NULL, 0);
+  setClock(PI_FREQ_DOMAIN_FC, "the controller", FC_HZ);
+  haveCluster = openCluster();
+  if (haveCluster) {
+    onCluster(initOnCluster);
   }
+  cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: %d networks, best %.8s, paper %.8s, paper-stream %.8s\n", (int)networks,
+                    AIRTOUCH_STREAM_SHA256, AIRTOUCH_MODEL_SHA256, AIRTOUCH_ROLLING_SHA256);
+  xTaskCreateStatic(heartbeatTask, "heartbeat", STACK_WORDS, NULL, tskIDLE_PRIORITY + 1, heartbeatStack,
+                    &heartbeatMemory);
   while (1) {
     cpxReceivePacketBlocking(CPX_F_APP, &received);
     xSemaphoreTake(turn, portMAX_DELAY);

@@ -37,7 +37,13 @@ void appHostTime(void *core, uint32_t microseconds, int late) { appCoreTime(core
 
 int appHostStalled(uint32_t now, uint32_t lastStep, uint32_t limit) { return appStalled(now, lastStep, limit); }
 
-void gap8HostInit(void *core) { gap8CoreInit(core, &airtouchStream, &airtouchNetwork, NULL); }
+void gap8HostInit(void *core) {
+  const gap8Models_t models = {.best = &airtouchStream,
+                               .paper = &airtouchNetwork,
+                               .paperStream = &airtouchRolling,
+                               .paperStreamScale = &airtouchRollingScale};
+  gap8CoreInit(core, &models, NULL);
+}
 
 uint16_t gap8HostTake(void *core, const uint8_t *bytes, uint16_t length, uint8_t *reply) {
   return gap8CoreTake(core, bytes, length, reply);

@@ -4,8 +4,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef enum { CPX_T_STM32 = 1, CPX_T_GAP8 = 4 } CPXTarget_t;
-typedef enum { CPX_F_APP = 5 } CPXFunction_t;
+typedef enum { CPX_T_STM32 = 1, CPX_T_ESP32 = 2, CPX_T_WIFI_HOST = 3, CPX_T_GAP8 = 4 } CPXTarget_t;
+typedef enum { CPX_F_CONSOLE = 2, CPX_F_APP = 5 } CPXFunction_t;
 typedef enum { LOG_TO_CRTP = CPX_T_STM32 } CPXConsoleTarget_t;
 typedef struct {
   CPXTarget_t destination;

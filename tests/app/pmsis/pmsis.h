@@ -1,21 +1,30 @@
-// As much of PMSIS (gap_sdk, FreeRTOS) as gap8/app/src/main.c uses: enough to compile it, not to run it.
+// As much of PMSIS (gap_sdk, FreeRTOS) as gap8/app/src/main.c uses: enough to compile it, and with runtime.c to run it.
 #pragma once
 
 #include <stdint.h>
 #include <stddef.h>
 #include <string.h>
 
+#ifdef __ELF__
 #define PI_CL_L1 __attribute__((section(".l1cluster_g")))
-#define PI_FREQ_DOMAIN_FC 0
-#define PI_FREQ_DOMAIN_CL 1
-#define configMINIMAL_STACK_SIZE 256
+#else
+#define PI_CL_L1
+#endif
 #define portMAX_DELAY 0xffffffffu
 #define portTICK_PERIOD_MS 1
 #define tskIDLE_PRIORITY 0
-#define pdPASS 1
 
+typedef enum { PI_FREQ_DOMAIN_FC = 0, PI_FREQ_DOMAIN_CL = 1 } pi_freq_domain_e;
 typedef uint32_t TickType_t;
+typedef uint32_t StackType_t;
 typedef void *SemaphoreHandle_t;
+typedef void *TaskHandle_t;
+typedef struct {
+  void *memory[40];
+} StaticTask_t;
+typedef struct {
+  void *memory[20];
+} StaticSemaphore_t;
 struct pi_device {
   void *config;
 };
@@ -38,12 +47,12 @@ int pi_cluster_send_task_to_cl(struct pi_device *device, struct pi_cluster_task 
 void pi_cluster_conf_init(struct pi_cluster_conf *conf);
 void pi_open_from_conf(struct pi_device *device, void *conf);
 int pi_cluster_open(struct pi_device *device);
-int pi_freq_set(int domain, uint32_t hertz);
-void pmsis_exit(int code);
+int32_t pi_freq_set(pi_freq_domain_e domain, uint32_t hertz);
 int pmsis_kickoff(void *entry);
 void vTaskDelay(TickType_t ticks);
 TickType_t xTaskGetTickCount(void);
-SemaphoreHandle_t xSemaphoreCreateBinary(void);
+SemaphoreHandle_t xSemaphoreCreateBinaryStatic(StaticSemaphore_t *memory);
 int xSemaphoreGive(SemaphoreHandle_t semaphore);
 int xSemaphoreTake(SemaphoreHandle_t semaphore, TickType_t ticks);
-int xTaskCreate(void (*task)(void *), const char *name, uint16_t words, void *argument, uint32_t priority, void **handle);
+TaskHandle_t xTaskCreateStatic(void (*task)(void *), const char *name, uint32_t words, void *argument,
+                               uint32_t priority, StackType_t *stack, StaticTask_t *memory);
