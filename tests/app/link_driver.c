@@ -41,7 +41,7 @@ typedef struct {
 } world_t;
 
 static world_t best, paper, paperStream;
-static const gap8Models_t models = {&airtouchStream, &airtouchNetwork, &airtouchRolling, &airtouchRollingScale};
+static const gap8Models_t models = GAP8_EXPORTED;
 static gap8Core_t gap8;
 static linkSender_t sender;
 static pipe_t up, down;

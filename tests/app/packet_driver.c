@@ -27,7 +27,8 @@ static void check(bool good, const char *what, const uint8_t *bytes, uint16_t le
 
 static void start(void) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
-  gap8CoreInit(&gap8, &airtouchStream, &airtouchNetwork, NULL);
+  static const gap8Models_t models = GAP8_EXPORTED;
+  gap8CoreInit(&gap8, &models, NULL);
   edgeLinkDigest(AIRTOUCH_STREAM_SHA256, digest);
   linkSenderInit(&sender, EDGE_LINK_BEST, digest, 300, 7, 1);
 }

@@ -30,7 +30,7 @@ TEAM = """
 #include <string.h>
 #include "gap8_core.h"
 
-static const gap8Models_t models = {&airtouchStream, &airtouchNetwork, &airtouchRolling, &airtouchRollingScale};
+static const gap8Models_t models = GAP8_EXPORTED;
 static gap8Core_t alone, shared;
 static pthread_barrier_t meeting;
 static __thread int32_t number;

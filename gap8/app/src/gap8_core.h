@@ -27,6 +27,9 @@ typedef struct {
   const fixedScale_t *paperStreamScale;
 } gap8Models_t;
 
+/** Those of gap8/model where they were compiled: an initialiser. */
+#define GAP8_EXPORTED {&airtouchStream, &airtouchNetwork, &airtouchRolling, &airtouchRollingScale}
+
 /** The cores that share the windowed network. */
 typedef struct {
   void (*fork)(void (*work)(void *argument), void *argument);  ///< runs work on all of them; returns when all have

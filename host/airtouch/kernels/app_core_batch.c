@@ -38,10 +38,7 @@ void appHostTime(void *core, uint32_t microseconds, int late) { appCoreTime(core
 int appHostStalled(uint32_t now, uint32_t lastStep, uint32_t limit) { return appStalled(now, lastStep, limit); }
 
 void gap8HostInit(void *core) {
-  const gap8Models_t models = {.best = &airtouchStream,
-                               .paper = &airtouchNetwork,
-                               .paperStream = &airtouchRolling,
-                               .paperStreamScale = &airtouchRollingScale};
+  const gap8Models_t models = GAP8_EXPORTED;
   gap8CoreInit(core, &models, NULL);
 }
 
