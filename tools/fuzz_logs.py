@@ -2,10 +2,12 @@
 
     python tools/fuzz_logs.py --seed 1 --count 1000
     python tools/fuzz_logs.py --seed 1 --format usd-2 --only 4711
+    python tools/fuzz_logs.py --shapes 100000
 
 Prints per format the number of inputs, logs, refusals and failures, and the worst time and memory.
 Exit code 1 when anything failed. One input is known by seed, format and number: the last line of a
-failure is the command that repeats it.
+failure is the command that repeats it. With --shapes, files made to cost time or memory, so many samples,
+lines or parts long, go the same way.
 """
 
 import argparse
@@ -15,11 +17,12 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
-from log_fuzzing import mutations, sound, usd_mutations, walk
+from log_fuzzing import hostile, mutations, sound, usd_mutations, walk
 
 MOST_S, MOST_S_PER_MB = 1.0, 10.0  #: processor time for one input
 MOST_MB, MOST_MB_PER_MB = 96.0, 400.0  #: memory above what the process held before
@@ -64,24 +67,28 @@ def files_of(name: str) -> list[bytes]:
 def one(name: str, seed: int, number: int, folder: Path, every: int = COMMAND_EVERY) -> tuple[str, float, float]:
     """Put one input through everything: outcome, seconds of processor time, MB of memory."""
     data, r = mutated(name, seed, number)
-    path = folder / "flight.log"
+
+    def act(path: Path) -> str:
+        outcome = walk.walk(data, str(path), r)
+        if name == "thrust-stand" or number % every == 0:
+            path.write_bytes(data)
+        if number % every == 0:
+            walk.command(["check", str(path), *(["--json"] if number % (2 * every) else [])], path)
+            convert = ["convert", str(path), "--out", str(folder / "out"), "--force", "--format", "csv"]
+            walk.command([*convert, "--rate", "100"], path)
+        return walk.stand(path) if name == "thrust-stand" else outcome
+
+    return measured(act, folder / "flight.log", len(data))
+
+
+def measured(act: Callable[[Path], str], path: Path, size: int) -> tuple[str, float, float]:
+    """What an act on a file of this size gives, its seconds of processor time and MB of memory, both within limits."""
     clear_peak()
     held, start = memory_mb("VmRSS"), time.process_time()
-    if name == "thrust-stand":
-        path.write_bytes(data)
-        outcome = walk.stand(path)
-        walk.walk(data, str(path), r)
-    else:
-        outcome = walk.walk(data, str(path), r)
-    if number % every == 0:
-        path.write_bytes(data)
-        walk.command(["check", str(path), *(["--json"] if number % (2 * every) else [])], path)
-        convert = ["convert", str(path), "--out", str(folder / "out"), "--force", "--format", "csv", "--rate", "100"]
-        walk.command(convert, path)
+    outcome = act(path)
     seconds, mb = time.process_time() - start, memory_mb("VmHWM") - held
-    size = len(data) / 1e6
-    assert seconds < MOST_S + MOST_S_PER_MB * size, f"{seconds:.2f} s for {len(data)} bytes"
-    assert mb < MOST_MB + MOST_MB_PER_MB * size, f"{mb:.0f} MB for {len(data)} bytes"
+    assert seconds < MOST_S + MOST_S_PER_MB * size / 1e6, f"{seconds:.2f} s for {size} bytes"
+    assert mb < MOST_MB + MOST_MB_PER_MB * size / 1e6, f"{mb:.0f} MB for {size} bytes"
     return outcome, seconds, mb
 
 
@@ -119,6 +126,17 @@ def fuzz(name: str, seed: int, first: int, count: int, folder: Path) -> Count:
     return result
 
 
+def shapes(length: int, folder: Path) -> int:
+    """Every hostile file of one length. Raises AssertionError for one that goes over the limits."""
+    print("shape                 bytes        s      MB  outcome")
+    for name, make in hostile.HOSTILE.items():
+        data = make(length)
+        outcome, seconds, mb = measured(lambda path, data=data: walk.walk(data, str(path), Random(0)), folder / "shape",
+                                        len(data))
+        print(f"{name:16}{len(data):11}{seconds:9.2f}{mb:8.0f}  {outcome}", flush=True)
+    return 0
+
+
 def main() -> int:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -126,6 +144,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000, help="inputs of each format (default 1000)")
     parser.add_argument("--first", type=int, default=0, help="number of the first input (default 0)")
     parser.add_argument("--format", choices=sound.FORMATS, action="append", help="only this format; may be repeated")
+    parser.add_argument("--shapes", type=int, help="hostile files of this length instead of mutated ones")
     parser.add_argument("--only", type=int, help="one input, with its traceback; its bytes go to out/fuzzed.log")
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
@@ -135,6 +154,8 @@ def main() -> int:
             Path("out/fuzzed.log").write_bytes(mutated(options.format[0], options.seed, options.only)[0])
             print(one(options.format[0], options.seed, options.only, Path(folder), 1))
             return 0
+        if options.shapes:
+            return shapes(options.shapes, Path(folder))
         failed = 0
         print("format          inputs     logs  refused  failed  worst s (input)  worst MB (input)", flush=True)
         for name in options.format or sound.FORMATS:

@@ -104,7 +104,8 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
             new[:, first:last] = v[:, np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
         else:
             t, v = _smoothed(t, v, period, *low_pass) if low_pass else (t, v)
-            new[:, first:last] = [np.interp(at, t, one) for one in v]
+            for row, one in zip(new, v, strict=True):
+                row[first:last] = np.interp(at, t, one)
     return new
 
 
