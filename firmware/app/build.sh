@@ -46,6 +46,7 @@ header=$vehicle
 [ -f "$header" ] || fail "no $header; VEHICLE is one of $(names "$headers/*.h"), or a header that
   airtouch export --vehicle mine.toml wrote"
 name=$(text_of AIRTOUCH_VEHICLE_NAME "$header")
+[ -n "$name" ] || fail "$header is no header that \`airtouch export --vehicle\` wrote; of a .toml file it makes one"
 flown=$(text_of AIRTOUCH_VEHICLE_PLATFORM "$header")
 [ "$flown" = "$platform" ] || fail "$header: $name is flown by platform ${flown:-(none)}, not by $platform"
 stream=gap8/model/airtouch_stream.h

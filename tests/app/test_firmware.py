@@ -195,6 +195,7 @@ def test_make_firmware_says_what_is_missing(missing, words, checkout):
     (["PLATFORM=cf21bl", "VEHICLE=crazyflie-2.1-flow"], "crazyflie-2.1-flow is flown by platform cf2, not by cf21bl"),
     (["VEHICLE=crazyflie-2.1-brushless"], "crazyflie-2.1-brushless is flown by platform cf21bl, not by cf2"),
     (["PLATFORM=bolt"], "no vehicle of AirTouch flies bolt"),
+    (["VEHICLE=host/airtouch/vehicles/crazyflie-2.1.toml"], "is no header that `airtouch export --vehicle` wrote"),
     (["VEHICLE=mine"], "no firmware/app/vehicles/mine.h; VEHICLE is one of crazyflie-2.1"),
 ])
 def test_make_firmware_refuses_what_does_not_fit(arguments, words, checkout):
