@@ -13,7 +13,8 @@
 #define AIRTOUCH_MODEL_OUTPUTS 2
 #define AIRTOUCH_MODEL_ARENA_BYTES 4560  // what networkInt8ArenaBytes says
 
-// How its probability becomes edges, as chosen with it; samples of 10 ms.
+// How its logits become edges, as chosen with it; samples of 10 ms.
+#define AIRTOUCH_MODEL_OUTPUT_SCALE 2.972554229e-02f  // P is the softmax of the logits
 #define AIRTOUCH_MODEL_PROBABILITY_ENTRY 0.9f
 #define AIRTOUCH_MODEL_PROBABILITY_EXIT 0.2f
 #define AIRTOUCH_MODEL_DWELL_SAMPLES 150

@@ -16,5 +16,12 @@
 #define AIRTOUCH_ROLLING_STRIDE 4
 #define AIRTOUCH_ROLLING_ARENA_BYTES 4860  // what rollingInt8ArenaBytes says
 
+// How its logits become edges, as chosen with it; samples of 10 ms.
+#define AIRTOUCH_ROLLING_OUTPUT_SCALE 5.169591680e-02f  // P is the softmax of the logits
+#define AIRTOUCH_ROLLING_PROBABILITY_ENTRY 0.7f
+#define AIRTOUCH_ROLLING_PROBABILITY_EXIT 0.4f
+#define AIRTOUCH_ROLLING_DWELL_SAMPLES 50
+#define AIRTOUCH_ROLLING_ALERT_HOLD 100
+
 extern const networkInt8_t airtouchRolling;
 extern const fixedScale_t airtouchRollingScale;

@@ -149,6 +149,7 @@ def _rolling_header(model: Model) -> str:
 #define AIRTOUCH_ROLLING_STRIDE {step}
 #define AIRTOUCH_ROLLING_ARENA_BYTES {size.arena_bytes}  // what rollingInt8ArenaBytes says
 
+{_decoding(model, "AIRTOUCH_ROLLING")}
 extern const networkInt8_t airtouchRolling;
 extern const fixedScale_t airtouchRollingScale;
 """
@@ -156,7 +157,6 @@ extern const fixedScale_t airtouchRollingScale;
 
 def _model_header(model: Model) -> str:
     network = model.int8
-    settings = decoding(model)[0] if "parameters" in model.metadata else DEFAULT
     rows, columns, channels = network.input_shape
     return f"""// The trained network: {parameter_bytes(network)} bytes of constants.
 // Input: {rows} x {columns * channels} fused features, normalised ({model.normalisation}), then quantised:
@@ -171,13 +171,20 @@ def _model_header(model: Model) -> str:
 #define AIRTOUCH_MODEL_OUTPUTS {network.outputs}
 #define AIRTOUCH_MODEL_ARENA_BYTES {arena_bytes(network)}  // what networkInt8ArenaBytes says
 
-// How its probability becomes edges, as chosen with it; samples of 10 ms.
-#define AIRTOUCH_MODEL_PROBABILITY_ENTRY {settings.probability_entry!r}f
-#define AIRTOUCH_MODEL_PROBABILITY_EXIT {settings.probability_exit!r}f
-#define AIRTOUCH_MODEL_DWELL_SAMPLES {settings.dwell_samples}
-#define AIRTOUCH_MODEL_ALERT_HOLD {settings.alert_hold}
-
+{_decoding(model, "AIRTOUCH_MODEL")}
 extern const networkInt8_t airtouchNetwork;
+"""
+
+
+def _decoding(model: Model, prefix: str) -> str:
+    """What whoever gets the network's outputs, and not the network, needs to make edges of them."""
+    settings = decoding(model)[0] if "parameters" in model.metadata else DEFAULT
+    return f"""// How its logits become edges, as chosen with it; samples of 10 ms.
+#define {prefix}_OUTPUT_SCALE {float_literal(model.int8.layers[-1].output_scale)}  // P is the softmax of the logits
+#define {prefix}_PROBABILITY_ENTRY {settings.probability_entry!r}f
+#define {prefix}_PROBABILITY_EXIT {settings.probability_exit!r}f
+#define {prefix}_DWELL_SAMPLES {settings.dwell_samples}
+#define {prefix}_ALERT_HOLD {settings.alert_hold}
 """
 
 
