@@ -5,7 +5,7 @@ import pytest
 from app.drone import Drone
 from scipy.spatial.transform import Rotation
 
-from airtouch.detector import paper
+from airtouch.detector import paper, paper_stream
 from airtouch.detector.features import pipeline
 from airtouch.kernels.app_core import DETECTORS, HEALTH, LINK, AppCore, Gap8Core
 from airtouch.kernels.library import call
@@ -47,9 +47,10 @@ def test_a_third_of_the_packets_lost_delays_edges_and_changes_none(flight, best_
     assert drone.app.log.lost == 0
 
 
-def test_paper_over_the_link_is_the_paper_pipeline(flight):
+@pytest.mark.parametrize("module", [paper, paper_stream], ids=["paper", "paper-stream"])
+def test_a_network_of_features_over_the_link_is_its_pipeline(flight, module):
     log, *_ = flight
-    drone = Drone("paper-gap8")
+    drone = Drone("paper-gap8" if module is paper else "paper-stream-gap8")
     _, acc, gyro, pwm = flight
     probability = np.full(len(acc), np.nan)
     edges = []
@@ -57,11 +58,11 @@ def test_paper_over_the_link_is_the_paper_pipeline(flight):
         kind = drone.step(acc[i], gyro[i], pwm[i])
         probability[i] = drone.app.log.probability
         edges += [(i, kind)] if kind != "none" else []
-    expected = paper.run(log).probability
+    expected = module.run(log).probability
     known = np.flatnonzero(np.isfinite(probability))
     assert len(known) > 100
     np.testing.assert_allclose(probability[known], expected[known - 1], rtol=1e-6)  # known one sample later
-    settings, physical = paper.decoding(paper.load(None))
+    settings, physical = paper.decoding(module.load(None))
     later = pipeline(log, settings, np.append(np.nan, expected[:-1]), physical_filter=physical)
     assert edges == [(int(i), ("entry", "exit")[k - 1]) for i, k in enumerate(later.edge) if k]
 
@@ -78,9 +79,10 @@ def test_without_an_ai_deck_the_same_detector_runs_on_the_stm32(flight, best_edg
     drone = Drone("best-gap8", have_gap8=False)
     assert drone.fly(flight) == best_edges
     assert drone.sent == 0 and drone.health == {"no GAP8"} and DETECTORS[drone.app.log.detector] == "best"
-    drone = Drone("paper-gap8", have_gap8=False)
-    drone.fly(flight, stop=1)
-    assert DETECTORS[drone.app.log.detector] == "cfar"
+    for detector in ("paper-gap8", "paper-stream-gap8"):
+        drone = Drone(detector, have_gap8=False)
+        drone.fly(flight, stop=1)
+        assert DETECTORS[drone.app.log.detector] == "cfar"
 
 
 @pytest.mark.parametrize("horizontal", [0.0, 0.25], ids=["none", "frozen"])

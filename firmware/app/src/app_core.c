@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "airtouch_model.h"
 #include "app_level.h"
 #include "app_log.h"
+#include "app_paper.h"
 #include "stream_window.h"
 
 enum { EDGE_UNKNOWN = 3 };
@@ -22,15 +22,12 @@ static uint8_t detectorInForce(const appCore_t *core) {
 
 static bool filters(const appCore_t *core) {
   return core->params.filter == APP_FILTER_ON ||
-         (core->params.filter == APP_FILTER_AS_TRAINED && core->detector == APP_PAPER_GAP8);
+         (core->params.filter == APP_FILTER_AS_TRAINED && appPaperOf(core->detector) != NULL);
 }
 
 /** Settings that the kernels read as they run. */
 static void setThresholds(appCore_t *core) {
-  core->pipeline.config.probabilityEntry = core->params.probabilityIn;
-  core->pipeline.config.probabilityExit = core->params.probabilityOut;
-  core->pipeline.config.dwellSamples = core->params.probabilityDwell;
-  core->pipeline.config.alertHold = core->params.alertHold;
+  appPaperDecoding(appPaperOf(core->detector), &core->params, &core->pipeline.config);
   core->pipeline.config.physicalFilter = filters(core);
   core->best.decoder.config.entryScore = core->params.scoreIn;
   core->best.decoder.config.exitScore = core->params.scoreOut;
@@ -54,13 +51,13 @@ static void beginPipeline(appCore_t *core) {
 /** A new stream: its samples count from 0 anew, so a run of the network over the old one's ends with it. */
 static void beginLink(appCore_t *core) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
-  const bool paper = core->detector == APP_PAPER_GAP8;
-  edgeLinkDigest(paper ? AIRTOUCH_MODEL_SHA256 : AIRTOUCH_STREAM_SHA256, digest);
+  const appPaper_t *paper = appPaperOf(core->detector);
+  edgeLinkDigest(paper ? paper->sha256 : AIRTOUCH_STREAM_SHA256, digest);
   const uint16_t refill =
-      paper ? AIRTOUCH_MODEL_ROWS : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
+      paper ? paper->refill : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
   const uint8_t session = (uint8_t)(core->link.session == 255 ? 1 : core->link.session + 1);
   const linkCounters_t counters = core->link.counters;
-  linkSenderInit(&core->link, paper ? EDGE_LINK_PAPER : EDGE_LINK_BEST, digest, refill, core->nonce, session);
+  linkSenderInit(&core->link, paper ? paper->algorithm : EDGE_LINK_BEST, digest, refill, core->nonce, session);
   core->link.counters = counters;
   core->local = (appLocal_t){0};
 }
@@ -112,10 +109,10 @@ void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float 
   begin(core);
 }
 
-/** The network of `paper` sees the band's features: with another band its stream begins anew. `best` uses no band. */
+/** Networks of the band's features begin a new stream with another band. `best` uses no band. */
 static void changeBand(appCore_t *core) {
   edgePipelineSetBand(&core->pipeline, bandLow(&core->params), bandHigh(&core->params));
-  if (core->detector == APP_PAPER_GAP8) {
+  if (appPaperOf(core->detector) != NULL) {
     core->probability = NAN;
     core->log.probability = NAN;
     beginLink(core);
@@ -190,9 +187,10 @@ static void stepBest(appCore_t *core) {
 static void takeAnswer(appCore_t *core, const linkAnswer_t *answer) {
   const uint32_t lag = core->link.samples - 1 - answer->sequence;
   core->log.lag = (uint16_t)(lag < UINT16_MAX ? lag : UINT16_MAX);
-  if (core->detector == APP_PAPER_GAP8) {
+  const appPaper_t *paper = appPaperOf(core->detector);
+  if (paper != NULL) {
     const float difference = (float)(answer->output[0] - answer->output[1]);
-    core->probability = sigmoid(-airtouchNetwork.outputScale * difference);
+    core->probability = sigmoid(-paper->outputScale * difference);
     core->log.probability = core->probability;
     core->log.answers++;
     return;
@@ -270,6 +268,7 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
       runLocal(core);
       break;
     case APP_PAPER_GAP8:
+    case APP_PAPER_STREAM_GAP8:
       if (event->ready) {
         sendFeatures(core, event);
       }

@@ -30,13 +30,14 @@ typedef enum {
   APP_BEST = 1,        ///< the streaming network, on the STM32
   APP_BEST_GAP8 = 2,   ///< the same network on the GAP8; on the STM32 while that is silent
   APP_PAPER_GAP8 = 3,  ///< the paper's network on the GAP8
+  APP_PAPER_STREAM_GAP8 = 4,  ///< the same as a stream, on the GAP8
 } appDetector_t;
 
 /** appParams_t.filter: whether edges without a recent FR-CFAR alert are dropped. */
 typedef enum {
   APP_FILTER_OFF = 0,
   APP_FILTER_ON = 1,
-  APP_FILTER_AS_TRAINED = 2,  ///< for `paper`, not for `best`
+  APP_FILTER_AS_TRAINED = 2,  ///< for `paper` and `paper-stream`, not for `best`
 } appFilter_t;
 
 /** appLog_t.health; 0 is good. */

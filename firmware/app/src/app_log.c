@@ -4,7 +4,7 @@
 #include <string.h>
 
 bool appUsesGap8(const appCore_t *core) {
-  return core->detector == APP_BEST_GAP8 || core->detector == APP_PAPER_GAP8;
+  return core->detector >= APP_BEST_GAP8;
 }
 
 void appHappened(appCore_t *core, appEvent_t event) { core->since[event] = 0; }

@@ -33,7 +33,7 @@ uint16_t appParamsClamp(appParams_t *params) {
   appParams_t usual;
   appParamsDefaults(&usual);
   uint16_t changed = clampByte(&params->enable, 1);
-  changed = (uint16_t)(changed + clampByte(&params->detector, APP_PAPER_GAP8));
+  changed = (uint16_t)(changed + clampByte(&params->detector, APP_PAPER_STREAM_GAP8));
   changed = (uint16_t)(changed + clampByte(&params->filter, APP_FILTER_AS_TRAINED));
   // 5 bins of 0.5 Hz are all that the band's storage has room for, at least one must lie within.
   changed = (uint16_t)(changed + clampSetting(&params->bandWidth, 0.6f, 2.0f, usual.bandWidth));

@@ -12,7 +12,8 @@ WANTED = Block("airtouch", 50, tuple((f"{GROUP}.{name}", kind) for name, kind in
     ("steps", "uint32_t"), ("health", "uint16_t"), ("load", "uint16_t"), ("timeouts", "uint16_t"),
     ("lost", "uint16_t"), ("dropped", "uint16_t"), ("detector", "uint8_t"), ("link", "uint8_t"))))
 KINDS = {1: "entry", 2: "exit"}
-DETECTORS = {0: "FR-CFAR on the STM32", 1: "best on the STM32", 2: "best on the GAP8", 3: "paper on the GAP8"}
+DETECTORS = {0: "FR-CFAR on the STM32", 1: "best on the STM32", 2: "best on the GAP8", 3: "paper on the GAP8",
+             4: "paper-stream on the GAP8"}
 #: appHealth_t of firmware/app
 HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GAP8 fills its window",
           8: "the GAP8 has another model", 16: "a setting was out of range",

@@ -20,7 +20,7 @@ from airtouch.kernels.arrays import vehicle_struct
 from airtouch.kernels.library import call, ffi
 from airtouch.vehicle import Vehicle
 
-DETECTORS = ("cfar", "best", "best-gap8", "paper-gap8")  #: values of the parameter `detector`
+DETECTORS = ("cfar", "best", "best-gap8", "paper-gap8", "paper-stream-gap8")  #: values of the parameter `detector`
 EDGES = ("none", "entry", "exit", "edge")  #: values of the log variable `edge`
 LINK = ("starting", "filling", "up", "down", "refused")  #: values of the log variable `link`
 HEALTH = {  #: bits of the log variable `health`
