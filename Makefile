@@ -36,8 +36,8 @@ firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [PLATFORM=cf21bl] [VEHICLE
 gap8:  ## build the GAP8 app: GAP_SDK_HOME=... AIDECK=...
 	@sh gap8/app/build.sh "$(GAP_SDK_HOME)" "$(AIDECK)"
 
-flash: setup  ## check and flash the image last built, or [PLATFORM=...] or [IMAGE=...]: [URI=radio://...] [CHECK=1]
-	@image="$(or $(IMAGE),$(if $(PLATFORM),build/firmware/$(PLATFORM).bin))"; \
+flash: setup  ## check and flash the image last built, or that of [PLATFORM=...] [CONFIG=...], or [IMAGE=...]: [URI=...] [CHECK=1]
+	@image="$(or $(IMAGE),$(if $(PLATFORM)$(CONFIG),build/firmware/$(or $(PLATFORM),cf2)$(CONFIG:app-config%=%).bin))"; \
 	image=$${image:-$$(cat build/firmware/image 2> /dev/null)}; \
 	[ -n "$$image" ] || { echo "make flash: no image: make firmware CRAZYFLIE_BASE=..., or give IMAGE=..." >&2; exit 1; }; \
 	$(BIN)/airtouch flash "$$image" $(if $(URI),--uri "$(URI)") $(if $(CHECK),--check)

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Builds the STM32 app against a checkout of bitcraze/crazyflie-firmware, in build/firmware, so that no object
-# file lands in the sources; the image comes to lie at build/firmware/PLATFORM.bin. Called by `make firmware`.
+# file lands in the sources; the image comes to lie at build/firmware/PLATFORM.bin, or PLATFORM-gap8.bin and the like
+# for another configuration. Called by `make firmware`.
 # Arguments: the checkout; a configuration of firmware/app; the platform (cf2, cf21bl, bolt: a *_defconfig of the
 # firmware); the vehicle (a header of firmware/app/vehicles by name, or by path); NETWORKS, which is "no" where FR-CFAR
 # alone will do.
@@ -60,8 +61,9 @@ command -v arm-none-eabi-gcc > /dev/null ||
   fail "no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi, or docker run bitcraze/builder"
 base=$(cd "$base" && pwd)
 
+image=$out/$platform${config#app-config}.bin
 mkdir -p "$out"
-rm -rf "$out/firmware" "$out/gap8" "$out/image" "$out/$platform.bin"
+rm -rf "$out/firmware" "$out/gap8" "$out/image" "$image"
 cp -R firmware "$out/"
 cp "$header" "$out/firmware/app/src/airtouch_vehicle.h"
 mkdir "$out/gap8"
@@ -71,6 +73,6 @@ cd "$out/firmware/app"
 make PWD="$(pwd)" CRAZYFLIE_BASE="$base" CONFIG="$config" "${platform}_defconfig"
 make PWD="$(pwd)" CRAZYFLIE_BASE="$base" CONFIG="$config"
 cd - > /dev/null
-cp "$out/firmware/app/build/$platform.bin" "$out/$platform.bin"
-echo "$out/$platform.bin" > "$out/image"
-echo "$out/$platform.bin: $platform, $name, $config; \`make flash\` takes it"
+cp "$out/firmware/app/build/$platform.bin" "$image"
+echo "$image" > "$out/image"
+echo "$image: $platform, $name, $config; \`make flash\` takes it"

@@ -217,7 +217,8 @@ def test_what_fits_comes_as_far_as_the_compiler(config, platform, vehicle, netwo
 
 @pytest.mark.parametrize("arguments, flashed", [
     ([], "build/firmware/cf21bl.bin"), (["PLATFORM=cf2"], "build/firmware/cf2.bin"), (["IMAGE=x y.bin"], "x y.bin"),
-    (["CHECK=1"], "build/firmware/cf21bl.bin --check"),
+    (["CHECK=1"], "build/firmware/cf21bl.bin --check"), (["CONFIG=app-config-tap"], "build/firmware/cf2-tap.bin"),
+    (["PLATFORM=cf2", "CONFIG=app-config"], "build/firmware/cf2.bin"),
     (["URI=radio://0/80/2M/E7E7E7E7E7"], "build/firmware/cf21bl.bin --uri radio://0/80/2M/E7E7E7E7E7")])
 def test_make_flash_takes_the_image_last_built(arguments, flashed, tmp_path):
     (tmp_path / "build/firmware").mkdir(parents=True)
@@ -243,6 +244,9 @@ def test_the_image_links_with_the_firmware(config, platform):
     run = make("firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}", f"PLATFORM={platform}",
                "NETWORKS=" + ("no" if platform == "cf21bl" else ""))
     assert run.returncode == 0 and "warning:" not in run.stderr, run.stderr[-3000:]
+    built = Path((ROOT / "build/firmware/image").read_text().strip())
+    assert built.name == platform + config.removeprefix("app-config") + ".bin" and run.stdout.rstrip().endswith("takes it")
+    assert flash.inspect(ROOT / built).target == "stm32"
     image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
     assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")
     assert firmwares_default(image, "wanted") == defaults()
