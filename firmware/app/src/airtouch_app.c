@@ -58,7 +58,8 @@ static void step(bool late) {
 }
 
 static void start(void) {
-  static const char *const names[] = {"FR-CFAR", "best", "best on the GAP8", "paper on the GAP8"};
+  static const char *const names[] = {"FR-CFAR", "best", "best on the GAP8", "paper on the GAP8",
+                                      "paper-stream on the GAP8"};
   const bool gap8 = gap8PortPresent();
   appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());  // the first step takes what is wanted
   appCoreSetVehicle(&core, &airtouchVehicle, AIRTOUCH_VEHICLE_ARM_PWM);
