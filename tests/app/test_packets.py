@@ -68,8 +68,12 @@ def test_every_type_length_and_count_is_read_within_its_bytes(driver):
 def bodies(kind):
     """Any body; mostly one whose count byte is near what its length has room for."""
     at, each = (2, 12) if kind == FEATURES else (5, 4)
-    fitting = st.builds(lambda count, off, fill: (fill * 20)[:at] + bytes([count]) + (fill * 20)[:max(0, each * count + off)],
-                        st.integers(0, 9), st.sampled_from([0, 0, 0, -1, 1, -4, 4, -12, 12]), st.binary(min_size=9, max_size=9))
+
+    def body(count, off, fill):
+        return (fill * 20)[:at] + bytes([count]) + (fill * 20)[:max(0, each * count + off)]
+
+    fitting = st.builds(body, st.integers(0, 9), st.sampled_from([0, 0, 0, -1, 1, -4, 4, -12, 12]),
+                        st.binary(min_size=9, max_size=9))
     return st.one_of(st.binary(max_size=120), fitting)
 
 

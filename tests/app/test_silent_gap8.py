@@ -94,7 +94,7 @@ def test_a_gap8_that_is_not_there_is_asked_ever_less_often():
     np.testing.assert_allclose(sent, expected, atol=2)
 
 
-@pytest.mark.parametrize("detector", ["best-gap8", "paper-gap8"])
+@pytest.mark.parametrize("detector", ["best-gap8", "paper-gap8", "paper-stream-gap8"])
 def test_a_gap8_that_dies_in_flight_is_asked_ever_less_often(detector):
     drone = Drone(detector, beats=True)
     hover(drone, 700)
@@ -107,7 +107,7 @@ def test_a_gap8_that_dies_in_flight_is_asked_ever_less_often(detector):
 
 @pytest.mark.parametrize("beats", [True, False], ids=["heartbeats", "no-heartbeat"])
 @pytest.mark.parametrize("reset", [True, False], ids=["reset", "same-gap8"])
-@pytest.mark.parametrize("detector", ["best-gap8", "paper-gap8"])
+@pytest.mark.parametrize("detector", ["best-gap8", "paper-gap8", "paper-stream-gap8"])
 def test_a_gap8_that_returns_is_found_in_a_bounded_time(detector, reset, beats):
     rng = np.random.default_rng(0)
     drone = Drone(detector, beats=beats)

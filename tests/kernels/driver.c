@@ -126,7 +126,8 @@ static void change(bytes_t *bytes, edgePipeline_t *pipeline) {
   const edgePipelineConfig_t before = pipeline->config;
   if (!edgePipelineSetBand(pipeline, to[0], to[1])) {
     check(memcmp(&before.lowHz, &pipeline->config.lowHz, sizeof(float)) == 0 &&
-              memcmp(&before.highHz, &pipeline->config.highHz, sizeof(float)) == 0, "a band that is refused changes nothing");
+              memcmp(&before.highHz, &pipeline->config.highHz, sizeof(float)) == 0,
+          "a band that is refused changes nothing");
   }
   if (!edgePipelineSetFalseAlarm(pipeline, to[2])) {
     check(memcmp(&before.pFa, &pipeline->config.pFa, sizeof(float)) == 0, "nor does a false-alarm probability");

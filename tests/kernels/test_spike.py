@@ -1,4 +1,4 @@
-"""How long one absurd sample is remembered: what no sensor can say counts as its full scale, and that is over in seconds."""
+"""How long one absurd sample is remembered: it counts as full scale, and that is over in seconds."""
 
 import numpy as np
 import pytest
@@ -55,8 +55,8 @@ def test_a_spike_of_full_scale_is_forgotten_in_seconds(name, threshold_s):
     features = seconds(np.any(np.abs(dirty.features - clean.features) > 0.01 * clean.features, axis=1))
     threshold = seconds(np.abs(dirty.threshold - clean.threshold) > 0.01 * clean.threshold)
     blind = seconds(dirty.threshold > 2 * clean.threshold)
-    print(f"\n{name} {value:g}: features as without it after {features:.1f} s, FR-CFAR's threshold after {threshold:.1f} s, "
-          f"less than twice that after {blind:.1f} s")
+    print(f"\n{name} {value:g}: features as without it after {features:.1f} s, FR-CFAR's threshold after "
+          f"{threshold:.1f} s, less than twice that after {blind:.1f} s")
     assert features <= 2.0 and threshold <= threshold_s
 
 

@@ -93,7 +93,7 @@ void appParamsDefaults(appParams_t *params);
  */
 uint16_t appParamsClamp(appParams_t *params);
 
-/** Whether every setting is the same, to the bit: a NaN is the same as itself, and bytes between fields do not count. */
+/** Whether every setting is the same, to the bit: a NaN is the same as itself; bytes between fields do not count. */
 bool appParamsSame(const appParams_t *one, const appParams_t *other);
 
 /**

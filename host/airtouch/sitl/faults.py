@@ -10,7 +10,7 @@
     low-battery=T    the battery is nearly empty
 
 T is in seconds after take-off (`3` or `3s`), or `start` for at once. The GAP8 is used, and missed, where the parameter
-`airtouch.detector` is 2 or 3.
+`airtouch.detector` is 2, 3 or 4.
 """
 
 import heapq
