@@ -34,7 +34,7 @@ typedef enum {
   EDGE_LINK_RESET = 1,      ///< STM32 to GAP8: a new session begins
   EDGE_LINK_FEATURES = 2,   ///< STM32 to GAP8: 1 to 7 samples in a row
   EDGE_LINK_RESULT = 3,     ///< GAP8 to STM32: the answer to each of the two above
-  EDGE_LINK_HEARTBEAT = 4,  ///< GAP8 to STM32, unasked, about twice a second
+  EDGE_LINK_HEARTBEAT = 4,  ///< GAP8 to STM32, about twice a second while the STM32 speaks
 } edgeLinkType_t;
 
 /** Flags of a result. */

@@ -130,6 +130,7 @@ uint16_t linkReceiverTake(linkReceiver_t *receiver, const uint8_t *bytes, uint16
     receiver->refused++;
     return 0;
   }
+  receiver->beats = LINK_BEATS;
   if (packet.session == 0 || packet.session != receiver->session) {
     answer.result.flags = EDGE_LINK_UNKNOWN;
     return edgeLinkPack(&answer, reply);
@@ -142,6 +143,10 @@ uint16_t linkReceiverTake(linkReceiver_t *receiver, const uint8_t *bytes, uint16
 }
 
 uint16_t linkReceiverHeartbeat(linkReceiver_t *receiver, uint32_t uptimeMs, uint8_t *bytes) {
+  if (receiver->beats == 0) {
+    return 0;
+  }
+  receiver->beats--;
   edgeLinkPacket_t packet = {.type = EDGE_LINK_HEARTBEAT, .session = receiver->session,
                              .sequence = receiver->heartbeats++};
   edgeLinkHeartbeat_t *beat = &packet.heartbeat;

@@ -9,6 +9,8 @@
 
 #include "edge_link.h"
 
+#define LINK_BEATS 20  ///< heartbeats after the last packet: ten seconds of them
+
 /** A network as the receiver sees it. */
 typedef struct {
   void *context;
@@ -44,6 +46,7 @@ typedef struct {
   uint32_t refused;
   uint32_t repeated;             ///< samples that had been used before
   uint32_t heartbeats;
+  uint8_t beats;                 ///< heartbeats left until another packet comes
 } linkReceiver_t;
 
 /** Sets the receiver up, without a session. */
@@ -57,5 +60,9 @@ void linkReceiverInit(linkReceiver_t *receiver, const linkNetwork_t *networks, u
  */
 uint16_t linkReceiverTake(linkReceiver_t *receiver, const uint8_t *bytes, uint16_t length, uint8_t *reply);
 
-/** A heartbeat; @return its length. */
+/**
+ * A heartbeat.
+ * @return its length; 0 for none: the STM32 has never spoken, or not for LINK_BEATS heartbeats. What nobody asked for
+ * stays off the wire, where a damaged byte costs the flight (host/docs/flash.md).
+ */
 uint16_t linkReceiverHeartbeat(linkReceiver_t *receiver, uint32_t uptimeMs, uint8_t *bytes);

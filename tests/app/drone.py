@@ -25,8 +25,10 @@ class Drone:
     def step(self, acc, gyro, pwm):
         edge = self.app.step(acc, gyro, pwm)
         self.steps += 1
-        if self.beats and self.steps % 50 == 0:
-            self.app.receive(self.gap8.heartbeat(10 * self.steps))
+        if self.steps % 50 == 0:
+            beat = self.gap8.heartbeat(10 * self.steps)
+            if self.beats and beat:
+                self.app.receive(beat)
         for packet in self.app.packets():
             self.sent += 1
             if not self.answers or self.rng.random() < self.loss:

@@ -194,7 +194,10 @@ static void gap8Step(int step, script_t *script) {
     }
   }
   if (step % 50 == 0) {
-    transmit(&down, reply, gap8CoreHeartbeat(&gap8, (uint32_t)step * 10u, reply), step, script);
+    const uint16_t length = gap8CoreHeartbeat(&gap8, (uint32_t)step * 10u, reply);
+    if (length > 0) {
+      transmit(&down, reply, length, step, script);
+    }
   }
 }
 

@@ -40,18 +40,19 @@ class Chip:
         self.lines: list[str] = []  #: on the console
 
     def exchange(self, records: list[bytes]) -> list[bytes]:
-        """What the app sends in answer to records, and its heartbeat half a second later."""
+        """What the app sends in answer to records, and half a second later its heartbeat where it has one."""
         self._process.stdin.write(b"".join([*records, HALF_SECOND]))
         self._process.stdin.flush()
         packets: list[bytes] = []
-        while not packets or packets[-1][1] != HEARTBEAT:
+        function = -1
+        while function != 0:
             head = self._process.stdout.read(3)
             assert len(head) == 3, f"the app has ended: {self.close()}"
             function, length = struct.unpack("<BH", head)
             body = self._process.stdout.read(length)
             if function == APP_FUNCTION:
                 packets.append(body)
-            else:
+            elif function == CONSOLE:
                 self.lines.append(body.decode().rstrip())
         return packets
 
@@ -159,9 +160,20 @@ def test_a_clock_that_is_refused_is_said_and_the_safe_one_stays(start):
     sent, replies = conversation("best-gap8", 300)
     chip = start("clock", "controller")
     assert chip.exchange([packet(one) for one in sent])[:-1] == replies
-    assert chip.lines[:2] == ["AirTouch: the controller does not run at 50 MHz",
-                              "AirTouch: the cluster does not run at 175 MHz"]
+    assert chip.lines[:2] == ["AirTouch: the controller's clock is refused",
+                              "AirTouch: the cluster's clock is refused, it stays at 50 MHz"]
     assert chip.lines[-1] == "AirTouch: session 1, model known, cluster 50 MHz"
+
+
+def test_not_a_byte_before_the_stm32_has_spoken(start):
+    sent, replies = conversation("best-gap8", 300)
+    chip = start("open", "clock")
+    foreign = [packet(b"noise"), packet(sent[0], source=WIFI_HOST), packet(b"", length=65_535)]
+    assert [chip.exchange(records) for records in ([], [], foreign, [])] == [[]] * 4 and chip.lines == []
+    reply, heartbeat = chip.exchange([packet(sent[0])])
+    assert (reply[1], heartbeat[1]) == (RESULT, HEARTBEAT) and len(chip.lines) == 3
+    later = [len(chip.exchange([])) for _ in range(25)]
+    assert later == [1] * 19 + [0] * 6 and len(chip.lines) == 3, "ten seconds, then silence"
 
 
 def test_sessions_do_not_flood_the_console(start):

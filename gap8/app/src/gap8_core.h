@@ -93,5 +93,5 @@ int32_t gap8CoreInit(gap8Core_t *core, const gap8Models_t *models, const gap8Tea
  */
 uint16_t gap8CoreTake(gap8Core_t *core, const uint8_t *bytes, uint16_t length, uint8_t *reply);
 
-/** A heartbeat to send, about twice a second; @return its length. */
+/** A heartbeat to send, about twice a second; @return its length, 0 for none: see linkReceiverHeartbeat. */
 uint16_t gap8CoreHeartbeat(gap8Core_t *core, uint32_t uptimeMs, uint8_t *bytes);

@@ -3,6 +3,8 @@
 //
 // It never stops: without a cluster it goes on to take packets off the wire, which others use as well, and tells the
 // STM32 that it has no network, so that the STM32 computes by itself. Tasks, semaphore and buffers are static.
+// It speaks when spoken to: not a byte before the STM32's first packet, since each one has its risk
+// (host/docs/flash.md). What there is to say until then is noted.
 #include <stdbool.h>
 
 #include "bsp/bsp.h"
@@ -29,12 +31,16 @@ typedef struct {
   uint8_t reply[EDGE_LINK_MAX_BYTES];
 } request_t;
 
+/** What can go wrong, and the STM32's console is told once. */
+typedef enum { NOTE_CONTROLLER_CLOCK, NOTE_CLUSTER_CLOCK, NOTE_CLUSTER_CLOSED, NOTE_CLUSTER_TASK, NOTES } note_t;
+
 static PI_CL_L1 gap8Core_t core;
 static PI_CL_L1 uint64_t stacks[(FIRST_CORE_STACK + (CORES - 1) * OTHER_CORE_STACK) / 8];
 static linkReceiver_t refusing;  // in place of the core where there is no cluster: it has no network
 static bool haveCluster;
 static unsigned clusterMHz;
 static int32_t networks;
+static bool noted[NOTES];
 static struct pi_device cluster;
 static struct pi_cluster_task clusterTask;
 static request_t request;
@@ -78,7 +84,7 @@ static void onCluster(void (*entry)(void *)) {
   clusterTask.slave_stack_size = OTHER_CORE_STACK;
   if (pi_cluster_send_task_to_cl(&cluster, &clusterTask) != 0) {
     haveCluster = false;
-    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: the cluster takes no task, the STM32 computes\n");
+    noted[NOTE_CLUSTER_TASK] = true;
   }
 }
 
@@ -105,9 +111,31 @@ static void takePacket(void) {
   send(request.reply, request.replyLength);
 }
 
-/** Says on the console which session it is, once for each. */
+/** Says on the console what was noted, each once. */
+static void tellNotes(void) {
+  static const char *const words[NOTES] = {
+      [NOTE_CONTROLLER_CLOCK] = "the controller's clock is refused",
+      [NOTE_CLUSTER_CLOCK] = "the cluster's clock is refused, it stays at 50 MHz",
+      [NOTE_CLUSTER_CLOSED] = "the cluster does not open, the STM32 computes",
+      [NOTE_CLUSTER_TASK] = "the cluster takes no task, the STM32 computes",
+  };
+  for (int i = 0; i < NOTES; i++) {
+    if (noted[i]) {
+      noted[i] = false;
+      cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: %s\n", words[i]);
+    }
+  }
+}
+
+/** Says on the console which networks there are, and which session it is, once for each. */
 static void tellSession(const linkReceiver_t *receiver) {
+  static bool greeted;
   static uint8_t told;
+  if (!greeted) {
+    greeted = true;
+    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: %d networks, best %.8s, paper %.8s, paper-stream %.8s\n", (int)networks,
+                      AIRTOUCH_STREAM_SHA256, AIRTOUCH_MODEL_SHA256, AIRTOUCH_ROLLING_SHA256);
+  }
   if (receiver->session != told) {
     told = receiver->session;
     cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: session %u, model %s, cluster %u MHz\n", told,
@@ -122,19 +150,15 @@ static void heartbeatTask(void *unused) {
     vTaskDelay(HEARTBEAT_MS / portTICK_PERIOD_MS);
     xSemaphoreTake(turn, portMAX_DELAY);
     const uint32_t uptime = xTaskGetTickCount() * portTICK_PERIOD_MS;
-    tellSession(haveCluster ? &core.receiver : &refusing);
-    send(beat, haveCluster ? gap8CoreHeartbeat(&core, uptime, beat) : linkReceiverHeartbeat(&refusing, uptime, beat));
+    const uint16_t length =
+        haveCluster ? gap8CoreHeartbeat(&core, uptime, beat) : linkReceiverHeartbeat(&refusing, uptime, beat);
+    if (length > 0) {  // the STM32 is there
+      tellNotes();
+      tellSession(haveCluster ? &core.receiver : &refusing);
+      send(beat, length);
+    }
     xSemaphoreGive(turn);
   }
-}
-
-/** Sets a clock; says where that fails. */
-static bool setClock(pi_freq_domain_e domain, const char *name, uint32_t hertz) {
-  if (pi_freq_set(domain, hertz) == 0) {
-    return true;
-  }
-  cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: %s does not run at %u MHz\n", name, (unsigned)(hertz / 1000000));
-  return false;
 }
 
 static bool openCluster(void) {
@@ -143,13 +167,14 @@ static bool openCluster(void) {
   conf.id = 0;
   pi_open_from_conf(&cluster, &conf);
   if (pi_cluster_open(&cluster) != 0) {
-    cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: the cluster does not open, the STM32 computes\n");
+    noted[NOTE_CLUSTER_CLOSED] = true;
     return false;
   }
   clusterMHz = CLUSTER_HZ / 1000000;
-  if (!setClock(PI_FREQ_DOMAIN_CL, "the cluster", CLUSTER_HZ)) {
-    setClock(PI_FREQ_DOMAIN_CL, "the cluster", SAFE_HZ);
+  if (pi_freq_set(PI_FREQ_DOMAIN_CL, CLUSTER_HZ) != 0) {
+    pi_freq_set(PI_FREQ_DOMAIN_CL, SAFE_HZ);  // as the cluster started; nothing is left to do if that fails
     clusterMHz = SAFE_HZ / 1000000;
+    noted[NOTE_CLUSTER_CLOCK] = true;
   }
   return true;
 }
@@ -161,13 +186,11 @@ static void start(void) {
   turn = xSemaphoreCreateBinaryStatic(&turnMemory);
   xSemaphoreGive(turn);
   linkReceiverInit(&refusing, NULL, 0);
-  setClock(PI_FREQ_DOMAIN_FC, "the controller", FC_HZ);
+  noted[NOTE_CONTROLLER_CLOCK] = pi_freq_set(PI_FREQ_DOMAIN_FC, FC_HZ) != 0;
   haveCluster = openCluster();
   if (haveCluster) {
     onCluster(initOnCluster);
   }
-  cpxPrintToConsole(LOG_TO_CRTP, "AirTouch: %d networks, best %.8s, paper %.8s, paper-stream %.8s\n", (int)networks,
-                    AIRTOUCH_STREAM_SHA256, AIRTOUCH_MODEL_SHA256, AIRTOUCH_ROLLING_SHA256);
   xTaskCreateStatic(heartbeatTask, "heartbeat", STACK_WORDS, NULL, tskIDLE_PRIORITY + 1, heartbeatStack,
                     &heartbeatMemory);
   while (1) {

@@ -118,7 +118,7 @@ class Gap8Core:
         return bytes(ffi.buffer(self._packet, length))
 
     def heartbeat(self, uptime_ms: int) -> bytes:
-        """A heartbeat."""
+        """A heartbeat; empty where nobody has spoken to it for 20 of them."""
         length = call("gap8HostHeartbeat")(self._memory, uptime_ms, self._packet)
         return bytes(ffi.buffer(self._packet, length))
 

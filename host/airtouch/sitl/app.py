@@ -92,5 +92,7 @@ class App:
                 self._core.receive(reply)
         if answering and now_s >= self._beat_s:
             self._beat_s = now_s + HEARTBEAT_S
-            self._core.receive(self._gap8.heartbeat(int(1000 * (now_s - self._booted_s))))
+            beat = self._gap8.heartbeat(int(1000 * (now_s - self._booted_s)))
+            if beat:
+                self._core.receive(beat)
         return edge

@@ -1,8 +1,8 @@
 // PMSIS, FreeRTOS and CPX on a desktop, as far as gap8/app/src/main.c goes: for tests/app/test_gap8_main.py.
 // Usage: app [FAULT...]; faults: clock (the cluster's above 50 MHz), controller (its clock), open, task, later (tasks
 // after the first). Reads records of 1 byte source, 2 bytes length and the bytes: a packet, or with source 0 half a
-// second. Writes a record of 1 byte function, 2 bytes length and the bytes for each packet that the app sends. Ends
-// with the input. The cluster's eight cores are threads; a task that is told to wait waits for its record.
+// second. Writes a record of 1 byte function, 2 bytes length and the bytes for each packet that the app sends, and an
+// empty one of function 0 after each half second. Ends with the input. The cluster's eight cores are threads; a task that is told to wait waits for its record.
 #include "pmsis.h"
 
 #include <pthread.h>
@@ -167,6 +167,7 @@ void cpxReceivePacketBlocking(CPXFunction_t function, CPXPacket_t *packet) {
     if (head[0] == 0) {
       sem_post(&wake);
       sem_wait(&asleep);  // until it waits again
+      record(0, head, 0);
       continue;
     }
     packet->route.source = (CPXTarget_t)head[0];
