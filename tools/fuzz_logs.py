@@ -28,7 +28,7 @@ MOST_S, MOST_S_PER_MB = 1.0, 10.0  #: processor time for one input
 MOST_MB, MOST_MB_PER_MB = 96.0, 400.0  #: memory above what the process held before
 ADDRESS_SPACE = 6 << 30  #: a hard limit for the whole process
 MEASURED = os.access("/proc/self/clear_refs", os.W_OK)  #: Linux tells a process its memory
-COMMAND_EVERY = 20  #: inputs that also go through `airtouch logs check` and `convert`
+COMMAND_EVERY = 50  #: inputs that also go through `airtouch logs check` and `convert`
 
 
 @dataclass

@@ -40,9 +40,9 @@ def walk(data: bytes, source: str, r: Random) -> str:
         if resampled is not None:
             _sound(resampled)
             assert len(resampled) <= max(100 * len(log), 10_000), (len(resampled), len(log))
-            if r.random() < 0.3:
+            if r.random() < 0.1:
                 _use(resampled)
-        if r.random() < 0.05:
+        if r.random() < 0.03:
             _same(parse(canonical.to_bytes(log), source), log)
     return "log"
 
