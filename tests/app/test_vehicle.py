@@ -147,7 +147,7 @@ def test_networks_run_on_the_vehicle_that_they_were_trained_for():
         assert DETECTORS[log.detector] == "best" and log.health == 0 and log.answers > 0
 
 
-@pytest.mark.parametrize("detector", range(4), ids=DETECTORS)
+@pytest.mark.parametrize("detector", range(len(DETECTORS)), ids=DETECTORS)
 @pytest.mark.parametrize("change", [{"thrust_of_pwm_n": (8e-3, 5.6e-7, 5.6e-11)}, {"gravity_mps2": 3.7},
                                     {"arm_pwm": 12000.0}], ids=lambda c: next(iter(c)))
 def test_on_another_vehicle_fr_cfar_runs_alone_and_health_says_so(detector, change):
