@@ -267,11 +267,14 @@ static void badParameter(int step) {
 
 static void parameters(void) {
   const float usual = wanted.pFa;
+  appParams_t most = APP_PARAMS_DEFAULTS;
+  most.detector = 200;
+  check(appParamsClamp(&most) == 1 && most.detector >= APP_PAPER_GAP8, "no detector has that number");
   wanted.scoreIn = 4.5f;  // before the app starts
   between = badParameter;
   fly(200);
   check(wanted.scoreIn == 4.5f && core.params.scoreIn == 4.5f, "a parameter set before the start is kept");
-  check(wanted.pFa == usual && wanted.detector == APP_PAPER_GAP8, "what is out of range is put right");
+  check(wanted.pFa == usual && wanted.detector == most.detector, "what is out of range is put right");
   check(core.log.paramErrors == 2, "and counted once");
 }
 

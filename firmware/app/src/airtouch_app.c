@@ -58,8 +58,6 @@ static void step(bool late) {
 }
 
 static void start(void) {
-  static const char *const names[] = {"FR-CFAR", "best", "best on the GAP8", "paper on the GAP8",
-                                      "paper-stream on the GAP8"};
   const bool gap8 = gap8PortPresent();
   appCoreInit(&core, NULL, gap8, (uint32_t)usecTimestamp());  // the first step takes what is wanted
   appCoreSetVehicle(&core, &airtouchVehicle, AIRTOUCH_VEHICLE_ARM_PWM);
@@ -67,7 +65,7 @@ static void start(void) {
     appCoreNoSensor(&core);
     DEBUG_PRINT("A log variable is missing: it reads as NaN\n");
   }
-  DEBUG_PRINT(AIRTOUCH_VEHICLE_NAME ", %s GAP8; detector: %s\n", gap8 ? "with a" : "no", names[core.log.detector]);
+  DEBUG_PRINT(AIRTOUCH_VEHICLE_NAME ", %s GAP8, detector %u\n", gap8 ? "with a" : "no", core.log.detector);
 }
 
 void appMain(void) {
@@ -138,7 +136,7 @@ LOG_ADD(LOG_UINT16, load, &core.log.load)
 LOG_ADD(LOG_UINT16, loadMax, &core.log.loadMax)
 /** @brief Steps that began late */
 LOG_ADD(LOG_UINT16, late, &core.log.late)
-/** @brief The detector in force: 0 FR-CFAR, 1 best, 2 best on the GAP8, 3 paper on the GAP8 */
+/** @brief The detector in force: 0 FR-CFAR, 1 best; on the GAP8: 2 best, 3 paper, 4 paper-stream */
 LOG_ADD(LOG_UINT8, detector, &core.log.detector)
 /** @brief Link to the GAP8: 0 starting, 1 filling, 2 up, 3 down, 4 refused */
 LOG_ADD(LOG_UINT8, link, &core.log.link)
@@ -168,7 +166,7 @@ LOG_GROUP_STOP(airtouch)
 PARAM_GROUP_START(airtouch)
 /** @brief 0: nothing is computed, nothing is sent */
 PARAM_ADD(PARAM_UINT8, enable, &wanted.enable)
-/** @brief 0 FR-CFAR, 1 best, 2 best on the GAP8, 3 paper on the GAP8 */
+/** @brief 0 FR-CFAR, 1 best; on the GAP8: 2 best, 3 paper, 4 paper-stream */
 PARAM_ADD(PARAM_UINT8, detector, &wanted.detector)
 /** @brief Edges need an FR-CFAR alert: 0 never, 1 always, 2 as the detector was trained */
 PARAM_ADD(PARAM_UINT8, filter, &wanted.filter)
