@@ -3,17 +3,19 @@
 // only grow, what is sent is a packet, and in the quiet flight the chosen detector works again, GAP8 or none.
 #include "app_core.h"
 #include "airtouch_model.h"
+#include "airtouch_rolling.h"
 #include "forge.h"
 #include "packet_table.h"
 #include "stream_window.h"
 #include "toy_network.h"
 
 #define STEPS 700      // of an input before the quiet flight, at most
-#define QUIET 330      // steps of the quiet flight, at most: a window of new samples and what goes before it
+// Steps of the quiet flight, at most: the longest wait for a try, a window of new samples, and a few more.
+#define QUIET (LINK_RETRY_MOST + 330)
 
 static appCore_t *core;
-static toyNetwork_t toys[2];
-static linkNetwork_t networks[2];
+static toyNetwork_t toys[3];
+static linkNetwork_t networks[3];
 static linkReceiver_t gap8;  // with the shipped models' names, and networks that cost nothing
 static bool gap8Lives, transportTakes;
 static uint32_t seed, steps;
@@ -26,7 +28,10 @@ static void makeGap8(void) {
   networks[0] = toyAsNetwork(&toys[0], EDGE_LINK_BEST, digest);
   edgeLinkDigest(AIRTOUCH_MODEL_SHA256, digest);
   networks[1] = toyAsNetwork(&toys[1], EDGE_LINK_PAPER, digest);
-  linkReceiverInit(&gap8, networks, 2);
+  toys[2] = toyMake(AIRTOUCH_ROLLING_ROWS, AIRTOUCH_ROLLING_STRIDE);
+  edgeLinkDigest(AIRTOUCH_ROLLING_SHA256, digest);
+  networks[2] = toyAsNetwork(&toys[2], EDGE_LINK_PAPER_STREAM, digest);
+  linkReceiverInit(&gap8, networks, 3);
 }
 
 static void hover(appSample_t *sample) {
@@ -65,9 +70,9 @@ static void checkLog(void) {
   CHECK(isfinite(log->cfarPower) && log->cfarPower >= 0.0f, "the cell under test is a number from 0 up");
   CHECK(numberOrNan(log->threshold) && !(log->threshold < 0.0f), "a threshold is a number from 0 up, or NaN");
   CHECK(isnan(log->probability) || (log->probability >= 0.0f && log->probability <= 1.0f), "a probability is one, or NaN");
-  CHECK(log->edge <= 3 && log->alert <= 1 && log->over <= 1 && log->detector <= APP_PAPER_GAP8 && log->link <= LINK_REFUSED,
+  CHECK(log->edge <= 3 && log->alert <= 1 && log->over <= 1 && log->detector <= APP_PAPER_STREAM_GAP8 && log->link <= LINK_REFUSED,
         "codes are those that there are");
-  CHECK(log->health < 2 * APP_NO_SENSOR && log->edgeSample <= log->samples && log->load <= log->loadMax, "health and times fit");
+  CHECK(log->health < 2 * APP_OTHER_VEHICLE && log->edgeSample <= log->samples && log->load <= log->loadMax, "health and times fit");
 }
 
 static void checkGrowth(const appLog_t *before) {
@@ -179,7 +184,7 @@ static void doOne(bytes_t *bytes) {
       gap8Lives = what & 8;
       transportTakes = what & 16 || what & 32;
       if (what >= 224) {
-        linkReceiverInit(&gap8, networks, 2);
+        linkReceiverInit(&gap8, networks, 3);
       } else if (what >= 208) {
         start(takeByte(bytes));
       }
@@ -238,7 +243,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   }
   if (end & 1) {
     core->noSensor = false;
-    flyQuietly(end / 2 % 4, end & 8);
+    flyQuietly(end / 4 % 5, end & 2);
   }
   free(core);
   return 0;

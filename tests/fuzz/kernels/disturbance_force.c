@@ -20,7 +20,8 @@ static void checkVoltage(const airtouchVehicle_t *vehicle, float vbat) {
     CHECK(factor == 1.0f, "an unknown voltage changes nothing");
   } else if (vehicle->nominalVoltage >= 0.1f) {
     const double ratio = (double)vbat / vehicle->nominalVoltage;
-    CHECK(fabs(factor - ratio * ratio) <= 4.0 * FLT_EPSILON * ratio * ratio + 1e-37, "the factor is the voltage's square");
+    const double right = fmax(0.25, fmin(ratio * ratio, 4.0));
+    CHECK(fabs(factor - right) <= 4.0 * FLT_EPSILON * right, "the factor is the voltage's square, clamped");
   }
 }
 

@@ -65,8 +65,10 @@ static void checkChannels(const truth_t *truth, const motionConfig_t *config, co
 static void step(motionChannels_t *motion, truth_t *truth, const motionConfig_t *config, const float *sample) {
   float channels[MOTION_CHANNELS];
   for (int i = 0; i < 10; i++) {
-    guardSample(sample[i], &truth->held[i]);
-    truth->held[i] = i < 6 ? truth->held[i] : fminf(fmaxf(truth->held[i], 0.0f), 65535.0f);
+    const float most = i < 3 ? ACC_LIMIT : (i < 6 ? RATE_LIMIT : PWM_LIMIT);
+    if (isfinite(sample[i])) {
+      truth->held[i] = fminf(fmaxf(sample[i], i < 6 ? -most : 0.0f), most);
+    }
   }
   const float *m = truth->held + 6;
   const double motors[4] = {(double)m[2] + m[3] - m[0] - m[1], (double)m[0] + m[3] - m[1] - m[2],

@@ -9,7 +9,8 @@
 #define STEPS 1500        // of an input, at most
 #define STORM 600         // of them with faults
 #define PIPE 24
-#define HOSTILE_STEPS (LINK_REFUSED_STEPS + 4 * LINK_RETRY_STEPS)  // after forged packets, whatever they said
+// After forged packets, whatever they said, the longest wait for the next try and a few more.
+#define HOSTILE_STEPS (LINK_RETRY_MOST + LINK_REFUSED_STEPS + 4 * LINK_RETRY_STEPS)
 
 typedef struct {
   uint8_t bytes[EDGE_LINK_MAX_BYTES + 16];
@@ -109,7 +110,10 @@ static void receive(bytes_t *bytes) {
     }
   }
   if (step % 50 == 0) {
-    transmit(&down, reply, linkReceiverHeartbeat(&receiver, (uint32_t)step * 10u, reply), bytes);
+    const uint16_t size = linkReceiverHeartbeat(&receiver, (uint32_t)step * 10u, reply);
+    if (size > 0) {
+      transmit(&down, reply, size, bytes);
+    }
   }
 }
 

@@ -114,6 +114,7 @@ static void doOne(bytes_t *bytes) {
   const uint8_t what = takeByte(bytes);
   const uint32_t near = receiver->expected;
   uint16_t length;
+  bool spoken;
   switch (what % 8) {
     case 0:
       length = (uint16_t)takeBelow(bytes, sizeof packed);
@@ -124,8 +125,10 @@ static void doOne(bytes_t *bytes) {
       deliver(packed, forge(bytes, EDGE_LINK_RESET - 1, receiver->session, near, digests[what / 8 % 2], packed));
       break;
     case 2:
+      spoken = receiver->beats > 0;
       length = linkReceiverHeartbeat(receiver, what, packed);
-      CHECK(inTable(packed, length) && packed[1] == EDGE_LINK_HEARTBEAT, "a heartbeat is a packet");
+      CHECK((length > 0) == spoken, "a heartbeat comes while the STM32 speaks");
+      CHECK(length == 0 || (inTable(packed, length) && packed[1] == EDGE_LINK_HEARTBEAT), "a heartbeat is a packet");
       break;
     case 3:
       length = forge(bytes, (uint8_t)(what / 8), receiver->session, near, digests[0], packed);

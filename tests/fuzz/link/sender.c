@@ -7,7 +7,7 @@
 #include "toy_network.h"
 
 #define STEPS 1200
-#define SETTLE (LINK_REFUSED_STEPS + 2 * LINK_DOWN_STEPS)  // steps until the link is up with a GAP8 that just started
+#define SETTLE (LINK_RETRY_MOST + LINK_REFUSED_STEPS + 2 * LINK_DOWN_STEPS)  // steps until a GAP8 that starts is taken up
 
 static const uint8_t digest[EDGE_LINK_DIGEST_BYTES] = {9, 8, 7, 6, 5, 4, 3, 2};
 static linkSender_t *sender;

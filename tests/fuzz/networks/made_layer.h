@@ -59,7 +59,7 @@ static inline void takeConstants(bytes_t *bytes, layerInt8_t *layer) {
 }
 
 static inline int8_t takeWeight(bytes_t *bytes, uint32_t *seed) {
-  const uint8_t byte = bytes->left > 0 ? takeByte(bytes) : (uint8_t)(127.9f * noise(seed));
+  const uint8_t byte = bytes->left > 0 ? takeByte(bytes) : (uint8_t)(int8_t)(127.0f * noise(seed));
   return (int8_t)byte == -128 ? -127 : (int8_t)byte;
 }
 

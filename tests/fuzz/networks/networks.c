@@ -39,7 +39,7 @@ static void runAll(bytes_t *bytes, const networkInt8_t *network, uint32_t *seed)
   int8_t in[MADE_VALUES], out[MADE_VALUES];
   const int32_t size = sizeIn(&layers[0]);
   for (int32_t i = 0; i < size; i++) {
-    in[i] = bytes->left > 0 ? (int8_t)takeByte(bytes) : (int8_t)(127.9f * noise(seed));
+    in[i] = bytes->left > 0 ? (int8_t)takeByte(bytes) : (int8_t)(127.0f * noise(seed));
   }
   const int32_t room = networkInt8ArenaBytes(network);
   int8_t *input = exactCopy(in, (size_t)size), *arena = rubbish((size_t)room, 0x33);

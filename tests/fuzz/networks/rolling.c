@@ -31,7 +31,7 @@ static void run(bytes_t *bytes, const networkInt8_t *network, rollingInt8_t *rol
   const int32_t values = first->inColumns * first->inChannels;
   for (int32_t i = 0; i < SAMPLES; i++) {
     for (int32_t c = 0; c < values; c++) {
-      samples[i][c] = bytes->left > 0 ? (int8_t)takeByte(bytes) : (int8_t)(127.9f * noise(seed));
+      samples[i][c] = bytes->left > 0 ? (int8_t)takeByte(bytes) : (int8_t)(127.0f * noise(seed));
     }
   }
   for (int32_t i = 0; i < SAMPLES; i++) {

@@ -83,7 +83,7 @@ static void run(bytes_t *bytes, const streamInt8_t *network, uint32_t *seed) {
   for (int32_t i = 0; i < SAMPLES && (i < 20 || bytes->left > 0); i++) {
     int8_t right[MADE_OUTPUTS];
     for (int32_t c = 0; c < channels; c++) {
-      rows[0][i][c] = bytes->left > 0 ? (int8_t)takeByte(bytes) : (int8_t)(127.9f * noise(seed));
+      rows[0][i][c] = bytes->left > 0 ? (int8_t)takeByte(bytes) : (int8_t)(127.0f * noise(seed));
     }
     int8_t *exact = exactCopy(rows[0][i], (size_t)channels);
     const int8_t *said = streamInt8Step(network, &state, exact);
