@@ -79,6 +79,8 @@ static void checkReply(const edgeLinkPacket_t *asked, const uint8_t *reply, uint
   CHECK(result->expected == receiver->expected, "it says what is expected");
   CHECK(!(result->flags & EDGE_LINK_GAP) || receiver->expected == expected || edgeLinkAfter(asked->sequence, result->expected) > 0,
         "nothing is taken behind a gap");
+  const bool behind = asked->type == EDGE_LINK_FEATURES && edgeLinkAfter(asked->sequence, result->expected) > 0;
+  CHECK(((result->flags & EDGE_LINK_GAP) != 0) == behind, "samples behind a gap are asked for");
   CHECK(!(result->flags & EDGE_LINK_FILLING) || result->count == 0, "no answers before a whole window");
   checkAnswers(result);
 }
