@@ -39,8 +39,9 @@ int32_t networkInt8ArenaBytes(const networkInt8_t *network) {
 }
 
 static int layerFits(const layerInt8_t *layer) {
-  if (layer->inRows < 1 || layer->inColumns < 1 || layer->inChannels < 1 || layer->outChannels < 1 ||
-      layer->kernelRows < 1 || layer->kernelColumns < 1) {
+  if (!shapeFits(layer->inRows, layer->inColumns, layer->inChannels) ||
+      !shapeFits(layer->outRows, layer->outColumns, layer->outChannels) ||
+      !shapeFits(layer->kernelRows, layer->kernelColumns, layer->inChannels)) {
     return 0;
   }
   switch (layer->kind) {

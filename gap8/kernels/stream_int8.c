@@ -48,10 +48,12 @@ int32_t streamInt8ArenaBytes(const streamInt8_t *network) {
 }
 
 static int layerFits(const layerInt8_t *layer) {
+  if (!shapeFits(layer->inRows, 1, layer->inChannels) || !shapeFits(1, 1, layer->outChannels)) {
+    return 0;
+  }
   const int dense = layer->kind == LAYER_DENSE ||
                     (layer->kind == LAYER_SPARSE_DENSE && layer->inRows * layer->inChannels % 4 == 0);
-  return dense && layer->inRows >= 1 && layer->inColumns == 1 && layer->inChannels >= 1 &&
-         layer->outRows == 1 && layer->outColumns == 1 && layer->outChannels >= 1;
+  return dense && layer->inColumns == 1 && layer->outRows == 1 && layer->outColumns == 1;
 }
 
 int32_t streamInt8Check(const streamInt8_t *network) {
@@ -62,14 +64,15 @@ int32_t streamInt8Check(const streamInt8_t *network) {
   for (int32_t i = 0; i < network->convCount; i++) {
     const streamConv_t *conv = &network->convs[i];
     const int follows = i == 0 || conv->layer.inChannels == network->convs[i - 1].layer.outChannels;
-    if (!layerFits(&conv->layer) || !follows || conv->dilation < 1 || (i == 0 && conv->dilation != 1)) {
+    if (!layerFits(&conv->layer) || !follows || conv->dilation < 1 || (i == 0 && conv->dilation != 1) ||
+        !shapeFits(conv->layer.inRows, conv->dilation, conv->layer.inChannels)) {
       return i;
     }
     skipped += i >= network->firstSkip ? conv->layer.outChannels : 0;
   }
-  const int reads = network->head->inRows * network->head->inChannels == skipped;
   const int from = network->firstSkip >= 0 && network->firstSkip < network->convCount;
-  return layerFits(network->head) && reads && from ? -1 : network->convCount;
+  const int fits = layerFits(network->head) && network->head->inRows * network->head->inChannels == skipped;
+  return fits && from ? -1 : network->convCount;
 }
 
 void streamInt8Reset(const streamInt8_t *network, streamState_t *state, int8_t *arena) {

@@ -1,0 +1,82 @@
+"""Every fuzz target over its kept seeds and some thousand mutations, and proof that the targets find what they must.
+
+With clang the engine is libFuzzer; without it a driver of our own runs the same targets under the C compiler's
+sanitizers. `make fuzz` runs them for longer: host/docs/fuzzing.md.
+"""
+
+import subprocess
+
+import pytest
+from tools import fuzz
+
+MUTATIONS = 300
+#: Findings that are not mended yet, by target; a target that finds nothing any more fails here until its line is gone.
+KNOWN = {
+    "sender": "a forged answer half of all numbers away is accepted, and no later one counts as newer",
+    "link": "a forged RESET of the running session with another model is never answered by one that the GAP8 takes",
+}
+#: Defects by target: a source, what stands there and what is put in its place.
+PLANTED = {
+    "parser": ("firmware/link/edge_link.c", "get(&crc, 2) != edgeLinkCrc(bytes, end) || ", ""),
+    "receiver": ("firmware/link/link_receiver.c", "if (edgeLinkAfter(first, receiver->expected) > 0) {", "if (false) {"),
+    "fr_cfar": ("firmware/kernels/fr_cfar.c", "self->oldest + 1u == self->lag ?", "self->oldest + 1u > self->lag ?"),
+    "edge_decoder": ("firmware/kernels/edge_decoder.c", "decoder->slow = SLOW_AT_START;\n", "\n"),
+    "networks": ("gap8/kernels/max_pool_int8.c", "value > most ? value : most", "value"),
+}
+
+
+@pytest.fixture(scope="module")
+def engine():
+    found = fuzz.engine()
+    if found is None:
+        pytest.skip("no C compiler with sanitizers on this machine")
+    return found
+
+
+#: Without the chip's path of the int8 kernels, which tests/gap8 holds equal to the other one.
+NAMES = [name for name in fuzz.targets() if name not in fuzz.VARIANTS]
+
+
+@pytest.fixture(scope="module")
+def programs(engine):
+    return fuzz.build(NAMES, engine)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_found(programs, name, tmp_path, request):
+    if name in KNOWN:
+        request.applymarker(pytest.mark.xfail(reason=KNOWN[name], strict=True))
+    seeds = len(list(fuzz.corpus(name, tmp_path).iterdir()))
+    mutations = 10 * MUTATIONS if name in KNOWN else MUTATIONS
+    result = fuzz.run(name, programs[name], seeds + mutations, folder=tmp_path)
+    assert result.finding is None, result.log.read_text(errors="replace")[-3000:]
+    assert result.inputs >= mutations
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_defect_is_found(engine, name, tmp_path):
+    path, right, wrong = PLANTED[name]
+    source = fuzz.ROOT / path
+    text = source.read_text()
+    assert text.count(right) == 1, f"{path} has changed: plant another defect"
+    planted = tmp_path / source.name
+    planted.write_text(text.replace(right, wrong))
+    program = fuzz.build([name], engine, {source: planted}, tmp_path)[name]
+    assert fuzz.run(name, program, 20_000, folder=tmp_path).finding is not None
+
+
+def test_the_driver_of_our_own_finds_a_planted_defect(tmp_path):
+    engine = fuzz.engine("standalone")
+    if engine is None:
+        pytest.skip("no C compiler with sanitizers on this machine")
+    path, right, wrong = PLANTED["parser"]
+    planted = tmp_path / "edge_link.c"
+    planted.write_text((fuzz.ROOT / path).read_text().replace(right, wrong))
+    program = fuzz.build(["parser"], engine, {fuzz.ROOT / path: planted}, tmp_path, only=[fuzz.ROOT / path])["parser"]
+    result = fuzz.run("parser", program, 20_000, folder=tmp_path)
+    assert result.finding is not None
+    assert subprocess.run([program, result.finding], capture_output=True).returncode != 0
+
+
+def test_the_kept_seeds_are_small():
+    assert sum(path.stat().st_size for path in fuzz.SEEDS.glob("*.zip")) < 200_000

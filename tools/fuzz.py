@@ -1,0 +1,273 @@
+"""Fuzzes the C that flies: builds the targets of tests/fuzz with sanitizers, runs them, and keeps what they find.
+
+    make fuzz [TARGET="parser app"] [RUNS=1000000]        # or: python tools/fuzz.py parser app --runs 1000000
+    python tools/fuzz.py app --replay build/fuzz/findings/app/crash-...
+    python tools/fuzz.py --coverage                       # lines that the corpus reaches, source by source
+    python tools/fuzz.py --keep                           # the corpus, made small, becomes the seeds of tests/fuzz
+
+With clang the engine is libFuzzer, which follows coverage; else a small driver of our own under the C compiler's
+sanitizers, which only mutates the seeds. Everything is under build/fuzz: a corpus that grows from run to run, the
+findings, the logs. host/docs/fuzzing.md says what the targets promise.
+"""
+
+import argparse
+import hashlib
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+FUZZ = ROOT / "tests" / "fuzz"
+SEEDS = FUZZ / "seeds"
+BUILD = ROOT / "build" / "fuzz"
+SANITIZERS = "address,undefined,float-cast-overflow,float-divide-by-zero"
+FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-fno-sanitize-recover=all"]
+INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link", "firmware/app/src",
+            "gap8/kernels", "gap8/model", "gap8/app/src"]
+VARIANTS = {"networks_xpulp": ("networks", ["-DAIRTOUCH_XPULP_EMULATION"])}  # the chip's path of the int8 kernels
+LONGEST = 2048  # bytes of an input
+TIMEOUT = 20  # seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
+SEED_BYTES = 9_000  # kept of a target, at most, with what the archive needs for each input
+ENTRY_BYTES = 110  # of the archive
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A compiler and the flags that make a target."""
+
+    name: str
+    compiler: str
+    product: tuple[str, ...]  # the sources that fly: their edges are counted, the harness's are not
+    link: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one run of a target came to; edges and features are 0 without libFuzzer."""
+
+    target: str
+    inputs: int
+    edges: int
+    features: int
+    cpu: float  # seconds
+    finding: Path | None
+    log: Path
+
+
+def targets() -> dict[str, Path]:
+    """The targets by name, each with its source."""
+    found = {path.stem: path for path in sorted(FUZZ.glob("*/*.c"))}
+    return found | {name: found[base] for name, (base, _) in VARIANTS.items() if base in found}
+
+
+def _works(compiler: str, *flags: str) -> bool:
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "probe.c"
+        source.write_text("#include <stddef.h>\nint LLVMFuzzerTestOneInput(const char *d, size_t n);\n"
+                          "int LLVMFuzzerTestOneInput(const char *d, size_t n) { return d == NULL && n > 0; }\n"
+                          "#ifdef MAIN\nint main(void) { return 0; }\n#endif\n")
+        done = subprocess.run([compiler, *flags, source, "-o", Path(folder) / "probe"], capture_output=True)
+        return done.returncode == 0
+
+
+@cache
+def engine(wanted: str = "") -> Engine | None:
+    """The best engine of this machine, or the wanted one; None without one."""
+    clang = shutil.which(os.environ.get("CLANG", "clang"))
+    if wanted in ("", "libfuzzer") and clang and _works(clang, f"-fsanitize=fuzzer,{SANITIZERS}"):
+        # Without tracing comparisons, which costs half of the time: the harnesses draw what parsers compare with.
+        return Engine("libfuzzer", clang, ("-fsanitize-coverage=inline-8bit-counters,indirect-calls,pc-table",),
+                      (f"-fsanitize=fuzzer,{SANITIZERS}",))
+    cc = shutil.which(os.environ.get("CC", "cc"))
+    if wanted in ("", "standalone") and cc and _works(cc, f"-fsanitize={SANITIZERS}", "-DMAIN"):
+        return Engine("standalone", cc, (), (f"-fsanitize={SANITIZERS}",))
+    return None
+
+
+def product_sources() -> list[Path]:
+    """The C that flies, as pyproject.toml lists it for the host's library."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    listed = project["tool"]["setuptools"]["ext-modules"][0]["sources"]
+    return [ROOT / name for name in listed if not name.startswith("host/")]
+
+
+@cache
+def _headers() -> bytes:
+    folders = [FUZZ, *(ROOT / name for name in INCLUDES)]
+    paths = sorted({path for folder in folders for path in folder.glob("*.h")})
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).digest()
+
+
+def _compile(made_by: Engine, source: Path, flags: tuple[str, ...]) -> Path:
+    """The object of a source; made once for each content of source and headers."""
+    # The harness needs address alone: redzones around what it gives to the product.
+    checks = "address" if FUZZ in source.parents else SANITIZERS
+    command = [made_by.compiler, *FLAGS, f"-fsanitize={checks}", *flags, *(f"-I{ROOT / name}" for name in INCLUDES)]
+    content = source.read_bytes() + _headers() + "\0".join(command).encode()
+    target = BUILD / "objects" / f"{source.stem}-{hashlib.sha256(content).hexdigest()[:16]}.o"
+    if not target.exists():
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part = target.with_suffix(f".{os.getpid()}")
+        done = subprocess.run([*command, "-c", source, "-o", part], capture_output=True, text=True)
+        if done.returncode:
+            raise SystemExit(f"{source}:\n{done.stderr}")
+        part.rename(target)
+    return target
+
+
+def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None = None, folder: Path | None = None,
+          flags: tuple[str, ...] = (), only: list[Path] | None = None) -> dict[str, Path]:
+    """The programs of the named targets. replaced: other sources in the place of the product's; only: of these alone."""
+    folder = folder or BUILD / "bin" / made_by.name
+    folder.mkdir(parents=True, exist_ok=True)
+    sources = [(replaced or {}).get(path, path) for path in only or product_sources()]
+    counted = made_by.product + flags
+    driver = [FUZZ / "standalone.c"] if made_by.name == "standalone" else []
+
+    def program(name: str) -> tuple[str, Path]:
+        more = tuple(VARIANTS.get(name, ("", []))[1])
+        objects = [_compile(made_by, path, flags + more) for path in (targets()[name], *driver)]
+        # From an archive only what the target needs is linked in, and counted.
+        library = folder / f"lib{name}.a"
+        library.unlink(missing_ok=True)
+        members = [_compile(made_by, path, counted + (more if "gap8" in path.parts else ())) for path in sources]
+        subprocess.run(["ar", "rcs", library, *members], check=True)
+        made = folder / name
+        subprocess.run([made_by.compiler, *made_by.link, *flags, *objects, library, "-lm", "-o", made], check=True)
+        library.unlink()
+        return name, made
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda path: _compile(made_by, path, counted), sources))
+        return dict(pool.map(program, names))
+
+
+def corpus(name: str, folder: Path | None = None) -> Path:
+    """The folder of a target's corpus, with the kept seeds in it."""
+    folder = (folder or BUILD) / "corpus" / name
+    folder.mkdir(parents=True, exist_ok=True)
+    seeds = SEEDS / f"{name}.zip"
+    if seeds.exists():
+        with zipfile.ZipFile(seeds) as archive:
+            archive.extractall(folder)
+    return folder
+
+
+def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None = None) -> Result:
+    """Runs a target over its corpus and `runs` inputs in all; stops at the first finding."""
+    folder = folder or BUILD
+    findings = folder / "findings" / name
+    findings.mkdir(parents=True, exist_ok=True)
+    before = set(findings.iterdir())
+    log = folder / "logs" / f"{name}.txt"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    command = [program, f"-runs={runs}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
+               "-rss_limit_mb=1024", "-print_final_stats=1", f"-artifact_prefix={findings}/", corpus(name, folder)]
+    used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    with log.open("w") as to:
+        done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | {"UBSAN_OPTIONS": "print_stacktrace=1"})
+    cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
+    text = log.read_text(errors="replace")
+    new = [path for path in findings.iterdir() if path not in before]
+    if done.returncode and not new:
+        raise SystemExit(f"{name} failed without a finding; see {log}\n{text[-2000:]}")
+    executed = re.findall(r"stat::number_of_executed_units:\s*(\d+)", text)
+    reached = re.findall(r"cov: (\d+) ft: (\d+)", text) or [("0", "0")]
+    return Result(name, int(executed[-1]) if executed else 0, int(reached[-1][0]), int(reached[-1][1]), cpu,
+                  new[0] if done.returncode else None, log)
+
+
+def keep(name: str, program: Path) -> tuple[int, int]:
+    """Makes the corpus small and its smallest inputs the kept seeds; returns their number and bytes.
+
+    What was found stays a seed for good: the findings, and those that the seeds hold already.
+    """
+    grown = corpus(name)
+    found = {path.name: path.read_bytes() for path in grown.glob("found-*")}
+    findings = BUILD / "findings" / name
+    for path in sorted(findings.iterdir()) if findings.is_dir() else []:
+        found[f"found-{hashlib.sha256(path.read_bytes()).hexdigest()[:12]}"] = path.read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([program, "-merge=1", f"-max_len={LONGEST}", folder, grown], check=True, capture_output=True)
+        SEEDS.mkdir(exist_ok=True)
+        kept, total = len(found), sum(len(content) + ENTRY_BYTES for content in found.values())
+        with zipfile.ZipFile(SEEDS / f"{name}.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+            for path_name, content in sorted(found.items()):
+                archive.writestr(zipfile.ZipInfo(path_name), content, zipfile.ZIP_DEFLATED)
+            for path in sorted(Path(folder).iterdir(), key=lambda path: (path.stat().st_size, path.name)):
+                total += path.stat().st_size + ENTRY_BYTES
+                if total > SEED_BYTES:
+                    break
+                archive.writestr(zipfile.ZipInfo(path.name[:10]), path.read_bytes(), zipfile.ZIP_DEFLATED)
+                kept += 1
+    return kept, (SEEDS / f"{name}.zip").stat().st_size
+
+
+def cover(names: list[str]) -> None:
+    """Prints the share of lines of each source that the corpora reach, and the functions that none does."""
+    made_by = engine("libfuzzer")
+    tools = [shutil.which(name) for name in ("llvm-profdata", "llvm-cov")]
+    if made_by is None or None in tools:
+        raise SystemExit("coverage needs clang with libFuzzer, llvm-profdata and llvm-cov: apt-get install clang llvm")
+    folder = BUILD / "coverage"
+    programs = build(names, made_by, folder=folder, flags=("-fprofile-instr-generate", "-fcoverage-mapping"))
+    for name, program in programs.items():
+        subprocess.run([program, "-runs=0", f"-max_len={LONGEST}", corpus(name)], check=True, capture_output=True,
+                       env=os.environ | {"LLVM_PROFILE_FILE": str(folder / f"{name}.raw")})
+    merged = folder / "all.profile"
+    subprocess.run([tools[0], "merge", *folder.glob("*.raw"), "-o", merged], check=True)
+    objects = [word for name in names for word in ("-object", programs[name])]
+    subprocess.run([tools[1], "report", f"-instr-profile={merged}", *objects[1:], *product_sources()], check=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("targets", nargs="*", help=f"of {', '.join(targets())}; all by default")
+    parser.add_argument("--runs", type=int, default=1_000_000, help="inputs of each target (1000000)")
+    parser.add_argument("--seed", type=int, default=int(time.time()), help="of the mutations; the clock by default")
+    parser.add_argument("--engine", choices=["libfuzzer", "standalone"], default="")
+    parser.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
+    parser.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
+    parser.add_argument("--coverage", action="store_true", help="print which lines the corpus reaches")
+    wanted = parser.parse_args()
+    names = wanted.targets or list(targets())
+    if unknown := set(names) - set(targets()):
+        parser.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(targets())}")
+    if wanted.coverage:
+        return cover(names)
+    made_by = engine(wanted.engine)
+    if made_by is None:
+        raise SystemExit("no compiler with sanitizers here: apt-get install clang")
+    programs = build(names, made_by)
+    if wanted.replay:
+        sys.exit(max(subprocess.run([programs[name], *wanted.replay]).returncode for name in names))
+    if wanted.keep:
+        for name in names:
+            print("{}: {} seeds, {} bytes".format(name, *keep(name, programs[name])))
+        return None
+    print(f"{made_by.name}, {made_by.compiler}, mutations of seed {wanted.seed}\n"
+          f"{'target':16} {'inputs':>9} {'edges':>6} {'features':>8} {'CPU s':>6}  result", flush=True)
+    failed = False
+    for name in names:
+        result = run(name, programs[name], wanted.runs, wanted.seed)
+        failed |= result.finding is not None
+        verdict = "nothing found" if result.finding is None else (
+            f"FOUND, see {result.log.relative_to(ROOT)}; replay: "
+            f"python tools/fuzz.py {name} --replay {result.finding.relative_to(ROOT)}")
+        print(f"{name:16} {result.inputs:9} {result.edges:6} {result.features:8} {result.cpu:6.0f}  {verdict}", flush=True)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()
