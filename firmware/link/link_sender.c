@@ -19,9 +19,11 @@ static void restart(linkSender_t *sender, uint8_t session) {
   sender->holdOff = 0;
 }
 
-static void restartAnew(linkSender_t *sender) {
-  restart(sender, (uint8_t)(sender->session == 255 ? 1 : sender->session + 1));
+static uint8_t nextSession(const linkSender_t *sender) {
+  return (uint8_t)(sender->session == 255 ? 1 : sender->session + 1);
 }
+
+static void restartAnew(linkSender_t *sender) { restart(sender, nextSession(sender)); }
 
 /** The next try is due. */
 static void endWait(linkSender_t *sender) { sender->waited = UINT16_MAX; }
@@ -124,6 +126,10 @@ uint16_t linkSenderPoll(linkSender_t *sender, uint8_t *bytes) {
       return 0;
     }
     beginWait(sender);
+    if (refused) {  // as another session: a RESET of the one that the GAP8 refused changes nothing there
+      sender->session = nextSession(sender);
+      packet.session = sender->session;
+    }
     packReset(sender, &packet);
   } else {
     if (sender->next == sender->samples && sender->silent < LINK_RETRY_STEPS) {
@@ -163,7 +169,8 @@ static int newAnswers(linkSender_t *sender, const edgeLinkResult_t *result, link
   for (int i = 0; i < result->count; i++) {
     const edgeLinkAnswer_t *answer = &result->answer[i];
     const uint32_t sequence = result->expected - answer->back;
-    if (answer->back == 0 || !linkSenderAccept(sender, sequence)) {
+    const bool recent = answer->back > 0 && sender->samples - sequence <= LINK_HISTORY;
+    if (!recent || !linkSenderAccept(sender, sequence)) {
       continue;
     }
     answers[found].sequence = sequence;

@@ -10,11 +10,6 @@ import pytest
 from tools import fuzz
 
 MUTATIONS = 300
-#: Findings that are not mended yet, by target; a target that finds nothing any more fails here until its line is gone.
-KNOWN = {
-    "sender": "a forged answer half of all numbers away is accepted, and no later one counts as newer",
-    "link": "a forged RESET of the running session with another model is never answered by one that the GAP8 takes",
-}
 #: Defects by target: a source, what stands there and what is put in its place.
 PLANTED = {
     "parser": ("firmware/link/edge_link.c", "get(&crc, 2) != edgeLinkCrc(bytes, end) || ", ""),
@@ -43,14 +38,11 @@ def programs(engine):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_found(programs, name, tmp_path, request):
-    if name in KNOWN:
-        request.applymarker(pytest.mark.xfail(reason=KNOWN[name], strict=True))
+def test_nothing_is_found(programs, name, tmp_path):
     seeds = len(list(fuzz.corpus(name, tmp_path).iterdir()))
-    mutations = 10 * MUTATIONS if name in KNOWN else MUTATIONS
-    result = fuzz.run(name, programs[name], seeds + mutations, folder=tmp_path)
+    result = fuzz.run(name, programs[name], seeds + MUTATIONS, folder=tmp_path)
     assert result.finding is None, result.log.read_text(errors="replace")[-3000:]
-    assert result.inputs >= mutations
+    assert result.inputs >= MUTATIONS
 
 
 @pytest.mark.parametrize("name", PLANTED)
