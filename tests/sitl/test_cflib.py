@@ -39,7 +39,7 @@ def test_connect_tables_parameters_and_ten_seconds_at_100_hz(monkeypatch, tmp_pa
         cf.param.set_value("airtouch.detector", 200)
         wait_for(lambda: cf.param.get_value("airtouch.detector") == "200")
         cf.param.request_param_update("airtouch.detector")
-        wait_for(lambda: int(cf.param.get_value("airtouch.detector")) <= 3)
+        wait_for(lambda: int(cf.param.get_value("airtouch.detector")) <= 4)
         assert cf.param.toc.get_element_by_complete_name("pm.lowVoltage").is_persistent()
         states = []
         cf.param.persistent_store("pm.lowVoltage", lambda name, ok: states.append(ok))
