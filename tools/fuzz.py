@@ -173,10 +173,10 @@ def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None 
     log = folder / "logs" / f"{name}.txt"
     log.parent.mkdir(parents=True, exist_ok=True)
     command = [program, f"-runs={runs}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
-               "-rss_limit_mb=1024", "-print_final_stats=1", f"-artifact_prefix={findings}/", corpus(name, folder)]
+               "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", corpus(name, folder)]
     used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     with log.open("w") as to:
-        done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | {"UBSAN_OPTIONS": "print_stacktrace=1"})
+        done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | {"UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "quarantine_size_mb=32"})
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
     text = log.read_text(errors="replace")
     new = [path for path in findings.iterdir() if path not in before]
