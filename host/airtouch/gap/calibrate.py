@@ -20,9 +20,11 @@ from airtouch.gap.fit import fit
 from airtouch.gap.flight import Flight
 from airtouch.gap.generic import usual_of
 from airtouch.gap.loop_model import sensitivity
+from airtouch.gap.nominal_scatter import scatter_of
 from airtouch.gap.problem import whole_of
 from airtouch.gap.result import Quantity
 from airtouch.gap.response import Response, response_of
+from airtouch.gap.select import apparent
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
@@ -38,6 +40,7 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
 )
 ODD = 6.0  #: usual deviations from the others' mean by which a nominal flight is left out, and at least
 FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])  #: this, m/s^2 and rad/s^2
+SCATTER_FLIGHTS = 6  #: nominal flights to which every effect is fitted; more adds time, the table knows the rest
 SENSITIVE = 3.0  #: baseline flights whose offsets differ by more than this many deviations are named
 
 
@@ -55,8 +58,10 @@ def declared(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
     return _study(vehicle, (), flights)
 
 
-def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Calibration]:
-    """Fit the vehicle to nominal flights, then measure the floor that is left.
+def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = True) -> tuple[Study, Calibration]:
+    """Fit the vehicle to nominal flights, then measure the floor that is left and, with `scatter`, how strong
+
+    every effect seems to be in them (seconds a flight; naming effects needs it, a map does not).
 
     Flights that cannot be nominal like the others (a touch of the ground, a swapped
     propeller) are left out and named, as long as most agree.
@@ -70,8 +75,16 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, Cali
         found = fit(data, whole_of(data), chosen, start, prior)
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
     study = replace(study, usual=usual_of(Data(study, flights)))
+    if scatter:
+        study = replace(study, scatter=scatter_of([apparent(Data(study, [f])) for f in _some(flights)]))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))
+
+
+def _some(flights: Sequence[Flight]) -> list[Flight]:
+    """At most SCATTER_FLIGHTS of the flights, evenly chosen; none where there is only one."""
+    chosen = np.unique(np.linspace(0, len(flights) - 1, SCATTER_FLIGHTS).astype(int))
+    return [flights[i] for i in chosen] if len(flights) > 1 else []
 
 
 def sensor_noise(vehicle: Vehicle) -> np.ndarray:

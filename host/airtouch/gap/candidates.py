@@ -24,12 +24,12 @@ _FREE = {
     "imu_bias": ("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z"), "imu_noise": ("factor",),
     "vibration": ("amplitude",), "sensor_latency": ("delay",), "actuator_delay": ("delay",),
     "time_jitter": ("rms",), "packet_loss": ("share",), "range_step": ("residual", "kick"),
-    "flow_scale": ("share", "transient"), "controller_gain": ("rate", "attitude", "position", "height"),
+    "flow_scale": ("share", "transient"), "downwash": ("strength",), "controller_gain": ("rate", "attitude", "position", "height"),
 }
 _KIND = {"gust": SPECTRUM, "motor_noise": SPECTRUM, "imu_noise": SPECTRUM, "vibration": SPECTRUM,
          "time_jitter": CLOCK, "packet_loss": CLOCK}
 _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
-    "ground_effect": tuple({"fade": x} for x in (0.0, 0.06)),
+    "ground_effect": tuple({"fade": x} for x in (0.0, 0.06, 0.0875, 0.129)),
     "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
     "slung_load": tuple({"length": x} for x in (0.1, 0.2, 0.4)),
     "wind": ({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
@@ -40,7 +40,10 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
 #: parameters that are freed once a fit of the others is close
 _LATER = {"battery_sag": ("charge", "capacity"), "slung_load": ("length",)}
 _ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are also tried alone
-_FIXED = {"ground_effect": {"turbulence": 0.0}}
+_FIXED = {"ground_effect": {"turbulence": 0.0}, "downwash": {"turbulence": 0.0, "width": 0.0}}
+GATED = ("wind", "gust", "downwash")  #: effects that may come and go within a flight
+ONLY_GATED = frozenset({"downwash"})  #: what acts all the time is a wake of nothing that is known
+UNSTEADY = ("ground_effect", "downwash")  #: effects with a random part, where and when their mean part acts
 COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
 #: names for one thing in the logs at hand, with what would tell them apart
 TWINS = (
@@ -63,6 +66,7 @@ class Term:
     free: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
     companion: bool = False  #: in the model because another effect implies it; not reported itself
+    gate: tuple[tuple[str, float, float], ...] = ()  #: (flight, from_s, to_s): when it acts; none: always
 
     @property
     def name(self) -> str:
@@ -70,7 +74,7 @@ class Term:
 
     def active(self, x: np.ndarray | None = None) -> Active:
         """The effect at scaled parameters x (0: neutral, 1: its default), clipped to its bounds."""
-        return Active(self.effect, dict(self.values) if x is None else self.at(x))
+        return Active(self.effect, dict(self.values) if x is None else self.at(x), self.gate)
 
     def at(self, x: np.ndarray) -> dict[str, float]:
         values = dict(self.values)
@@ -148,9 +152,9 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
     """
     without = set(without)
-    out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without and name not in ONLY_GATED}
     if "ground_effect" in out:  # its air is unsteady as well
-        out["ground_effect"] += [(*v, _unsteady()) for v in out["ground_effect"]]
+        out["ground_effect"] += [(*v, _unsteady("ground_effect")) for v in out["ground_effect"]]
     for name in COMPANIONS:
         if name in out and COMPANIONS[name] not in without:
             drag = [replace(t, companion=True) for t in terms(COMPANIONS[name])]
@@ -158,10 +162,18 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     return out
 
 
-def _unsteady() -> Term:
-    """The random part of the ground effect, where and when its mean part acts."""
-    effect = get("ground_effect")
-    return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, "turbulence": 0.0}), True)
+def gated(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
+    """Effects that may come and go, with their variants; the gate is set by who looks for it."""
+    without = set(without)
+    out = {name: [(t,) for t in terms(name)] for name in GATED if name in EFFECTS and name not in without}
+    return {n: [(*t, _unsteady(n)) for t in v] if n in UNSTEADY else v for n, v in out.items()}
+
+
+def _unsteady(name: str) -> Term:
+    """The random part of an effect, where and when its mean part acts."""
+    effect = get(name)
+    neutral = {"turbulence": 0.0, **({"width": 0.0} if name == "downwash" else {})}
+    return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, **neutral}), True)
 
 
 def term_of(effect: Found) -> Term:
@@ -169,7 +181,7 @@ def term_of(effect: Found) -> Term:
     given = {k: q.value for k, q in effect.parameters.items()}
     right = min(terms(effect.name), key=lambda t: sum(abs(given.get(k, v) - v) for k, v in t.values.items()
                                                       if k not in t.free))
-    return replace(right, values={**right.values, **given})
+    return replace(right, values={**right.values, **given}, gate=effect.seconds)
 
 
 def twins_of(name: str) -> tuple[frozenset[str], str] | None:

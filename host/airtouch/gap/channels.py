@@ -6,7 +6,7 @@ the effects in the model are all that changed it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,6 +43,15 @@ FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 1
 COUNT = len(CHANNELS)
 
 
+def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
+    """Samples (n,) of a flight within the stretches (flight, from_s, to_s) of a gate."""
+    t = np.arange(len(flight)) * PERIOD_S
+    out = np.zeros(len(flight), bool)
+    for name, begin, end in gate:
+        out |= (name == flight.name) & (t >= begin) & (t < end)
+    return out
+
+
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
              controller: Twin | None = None, seed: int = 0) -> np.ndarray:
     """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
@@ -52,6 +61,16 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     at low frequency (the floor says how low).
     """
     out = np.full((len(flight), COUNT), np.nan)
+    gated = [a for a in active if a.gate]
+    if gated:
+        always = [a for a in active if not a.gate]
+        out = residual(flight, vehicle, always, controller, seed)
+        for a in gated:
+            acts = inside(a.gate, flight)
+            if acts.any():
+                out[acts] += (residual(flight, vehicle, [*always, replace(a, gate=())], controller, seed)
+                              - residual(flight, vehicle, always, controller, seed))[acts]
+        return out
     plant = prepare(vehicle, active)[0]
     row = plant[0]
     seen = flight.signals.copy()

@@ -9,6 +9,7 @@ import numpy as np
 from airtouch.gap.channels import TORQUE, angular_acceleration, residual
 from airtouch.gap.flight import Flight
 from airtouch.gap.motion import held
+from airtouch.gap.nominal_scatter import Scatter
 from airtouch.gap.response import Response
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, frequencies, starts
 from airtouch.gap.twin import COMMAND_ONLY, Twin
@@ -30,6 +31,7 @@ class Study:
     response: Response | None = None
     usual: Any = None  #: generic.Usual of the nominal flights
     nominal: int = 0  #: how many there were
+    scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
 
 
 @dataclass
@@ -94,7 +96,7 @@ def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray
     """Spectra of what was measured minus what the model makes of the logged commands."""
     study, out = data.study, []
     kept = data.__dict__.setdefault("_spectra", {})
-    key = tuple((a.effect.name, *a.values.values()) for a in active)
+    key = tuple((a.effect.name, *a.values.values(), a.gate) for a in active)
     if key in kept:
         return kept[key]
     for flight, first in zip(data.flights, data.first, strict=True):

@@ -19,6 +19,7 @@ from airtouch.gap.select import FIRST_GAIN, Judged, Selection, halves, probabili
 from airtouch.gap.shrink import Shrink, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.gap.twin import Twin
+from airtouch.gap.unexplained import unexplained
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -51,7 +52,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = _data(study, some)
-    found = select(data, candidates.every(without), say)
+    found = select(data, candidates.every(without), say, tuple(without))
     say("how far")
     ranking, overall = _ranking(data, found)
     effects = _effects(data, found)
@@ -72,7 +73,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         overall.share if verdict == "effect" else None, control,
         advices.advice(verdict, [e.name for e in effects], alike, cells, seen, bool(nominal)),
         _arms(vehicle, nominal, some, found, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
-        measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen), (study, fitted))
+        measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen),
+        tuple(unexplained(study, some, found, cells)) if verdict == "unknown" else (), (study, fitted))
 
 
 def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
@@ -81,7 +83,7 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    found = select(data, candidates.every(without))
+    found = select(data, candidates.every(without), without=tuple(without))
     verdict = _verdict(found)
     ranking, overall = _ranking(data, found)
     named = verdict == "effect"
@@ -118,21 +120,24 @@ def _effects(data: Data, found: Selection) -> list[Found]:
     """The effects chosen, fitted anew on all the data, with 90 % intervals."""
     if found.chosen is None:
         return []
-    others = [t for t in found.chosen.terms if t.kind != CLOCK]
+    others = [t for t in found.whole.terms if t.kind != CLOCK]
     whole = whole_of(data)
-    fitted = fit(data, whole, others, _middle(found.chosen)) if others else None
+    fitted = fit(data, whole, others, _middle(found.whole)) if others else None
+    chosen = {t.name for t in found.chosen.terms}
     out, place = [], 0
     for t in fitted.terms if fitted else ():
         part = slice(place, place + len(t.free)) if t.kind == candidates.MEAN else None
         if part is not None:
             place += len(t.free)
+        if t.name not in chosen:
+            continue
         if t.companion:
             out = [_with_random_part(e, t) for e in out]
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
         known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
-        spread = _spread(data.study.controller, found.chosen, t, known)
-        out.append(Found(t.name, t.quantities(x, spread)))
+        spread = _spread(data.study.controller, found.whole, t, known)
+        out.append(Found(t.name, t.quantities(x, spread), t.gate))
     for t in (t for t in found.chosen.terms if t.kind == CLOCK):
         x = t.scaled(t.values)
         n = sum(len(f) for f in data.flights)
@@ -154,7 +159,14 @@ def _with_random_part(effect: Found, part: Term) -> Found:
     strength = max(given.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
     raised = replace(given, value=strength, high=max(given.high, strength))
     scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
-    return Found(effect.name, {**effect.parameters, "strength": raised, **scaled})
+    return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
+
+
+def _start(terms: Sequence[Term], chosen: Judged) -> np.ndarray | None:
+    """Scaled parameters of mean effects as they were fitted."""
+    if not chosen.fits:
+        return None
+    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in chosen.fits[0].terms if t.kind == candidates.MEAN)])
 
 
 def _middle(chosen: Judged) -> np.ndarray | None:
@@ -193,14 +205,14 @@ def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:
 
 def _alike(found: Selection) -> tuple[tuple[str, ...], ...]:
     """Sets that these logs cannot tell apart: named twins, and candidates as good as the best."""
-    if not found.steps:
+    if not found.named:
         return ()
     groups = []
-    best = found.steps[0]
+    best = found.named[0]
     same = [n for n, j in found.singles.items() if j.full and best.gain - j.gain < CLOSE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
-    for step in found.steps:
+    for step in found.named:
         twins = candidates.twins_of(step.name)
         if twins and not any(step.name in g for g in groups):
             groups.append(tuple(sorted(twins[0])))
@@ -209,7 +221,7 @@ def _alike(found: Selection) -> tuple[tuple[str, ...], ...]:
 
 def _control(data: Data, found: Selection) -> dict[str, object]:
     """The gap with a deliberately wrong effect in the model."""
-    taken = {n for g in _alike(found) for n in g} | {s.name for s in found.steps}
+    taken = {n for g in _alike(found) for n in g} | {s.name for s in found.named}
     every = candidates.every()
     for name in WRONG:
         if name in every and name not in taken:
@@ -227,7 +239,7 @@ def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], f
     data = Data(calibrate.declared(vehicle, nominal), some)
     parts = halves(data)
     terms = tuple(t for t in found.chosen.terms if t.kind != CLOCK)
-    fits = tuple(fit(data, p, terms, _middle(found.chosen)) for p in parts)
+    fits = tuple(fit(data, p, terms, _start(terms, found.chosen)) for p in parts)
     one = shrink_of(data, parts, Judged(found.chosen.name, terms, 0.0, fits))
     return {"declared": _plain(one), "calibrated": _plain(overall)}
 

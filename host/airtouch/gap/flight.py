@@ -85,7 +85,9 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         clock = np.zeros_like(clock)
         cannot.append("logged times are those of arrival at the host: the drone's own clock cannot be judged")
     if not log.has("zrange_m"):
-        cannot.append("no down range: ground effect, range steps and flow scale cannot be seen")
+        cannot.append("no down range: range steps and flow scale cannot be seen; the floor is taken as flat, and the "
+                      "height over it comes from z_m" if log.has("z_m") else
+                      "no down range and no z_m: ground effect, range steps and flow scale cannot be seen")
     elif not true_edges(log, PLATFORM_STEP_M):
         cannot.append("no edge crossed: range steps and flow scale cannot be seen")
     if not log.has("vx_mps", "vy_mps"):
@@ -108,7 +110,8 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     signals = replay.signals_of(FlightLog({k: motion.held(v) for k, v in known.columns.items()}, known.meta),
                                 vehicle, (), PERIOD_S)
     row = prepare(vehicle, ())[0][0]
-    heights = motion.rotor_heights(log, turn, row["rotor_x"], row["rotor_y"], row["range_below_rotors"], PERIOD_S)
+    heights = motion.rotor_heights(log, turn, row["rotor_x"], row["rotor_y"], row["range_below_rotors"],
+                                   row["range_below_rotors"] + row["leg_below_range"], phase == GROUND, PERIOD_S)
     if heights is not None:
         signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
         signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights

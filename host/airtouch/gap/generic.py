@@ -15,14 +15,11 @@ import numpy as np
 
 from airtouch.gap.basis import BASIS, basis
 from airtouch.gap.candidates import Term
-from airtouch.gap.channels import COUNT
 from airtouch.gap.data import Data
-from airtouch.gap.problem import Part, Problem, problem_of, whole_of
-from airtouch.gap.spectra import OVERLAP_WEIGHT, REST, blocks, frequencies
+from airtouch.gap.problem import GROUPS, Part, Problem, problem_of, whole_of
+from airtouch.gap.spectra import OVERLAP_WEIGHT, blocks
 
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 CHANNELS = 9  #: that are regressed: force, torque, rate
-GROUPS = 3000  #: numbers that `bands_of` gives are below it
 NOTHING = 1e-9  #: variance of a coefficient that has no scatter
 ROUNDS = 3
 MOST_COLUMNS = 4  #: of one channel
@@ -61,19 +58,6 @@ def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray
     return np.concatenate(made) if made else np.zeros((0, len(BASIS)), complex)
 
 
-def bands_of(problem: Problem) -> np.ndarray:
-    """A group number for each flattened value: view, regime, channel and band."""
-    groups = []
-    for _, regime, chosen in problem.part.pieces:
-        f = frequencies(regime)
-        band = np.digitize(f, BANDS_HZ) - 1
-        table = band[:, None] * COUNT + np.arange(COUNT) + (1000 if regime == REST else 0)
-        groups.append(np.tile(table[problem.keep[regime]], int(chosen.sum())))
-    twin = np.digitize(problem.twin.frequency, BANDS_HZ) * COUNT + problem.twin.channel + 2000 \
-        if len(problem.twin) else np.zeros(0)
-    return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
-
-
 @dataclass(frozen=True)
 class _Cell:
     """One channel of one flight: elements own, columns (elements, basis and offsets), spread of the offsets."""
@@ -99,7 +83,7 @@ class _Half:
         self.problem = problem = problem_of(data, part)
         self.values, added, _ = problem.modelled(terms)
         self.power = problem.power + added
-        self.groups = bands_of(problem)
+        self.groups = problem.groups
         kept = problem.__dict__.setdefault("_cells", [])
         if not kept:
             kept += _cells(data, part, problem)

@@ -97,7 +97,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     notes = differences(studies[0], nominal)
     if nominal and calibrated:
         progress("calibration")
-        study, fitted = calibrate.calibrated(vehicle, nominal)
+        study, fitted = calibrate.calibrated(vehicle, nominal, scatter=False)
         studies.append(study)
         notes += [n for n in fitted.notes if n not in notes]
     found: list[Held] = []

@@ -8,6 +8,7 @@ from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, POSITION, V
 
 CROSSOVER_HZ = 0.4  #: below it the tilt comes from the acceleration over ground, above it from the gyro
 GRAVITY = 9.81
+MARKER_M = 0.05  #: height over the floor of a motion-capture marker on a Crazyflie that stands
 
 
 def held(values: np.ndarray) -> np.ndarray:
@@ -69,14 +70,21 @@ def _tilt(log: FlightLog, period_s: float) -> np.ndarray:
 
 
 def rotor_heights(log: FlightLog, turn: np.ndarray, rotor_x: np.ndarray, rotor_y: np.ndarray,
-                  below_rotors_m: float, period_s: float) -> np.ndarray | None:
+                  below_rotors_m: float, standing_m: float, on_ground: np.ndarray,
+                  period_s: float) -> np.ndarray | None:
     """Height (n, 4) of each rotor over what is under it, m, from the down range under the middle.
 
     The edge passes under a rotor earlier or later than under the sensor, by the rotor's
-    distance along the path over the speed. None without a down range.
+    distance along the path over the speed. Without a down range the floor is taken as flat
+    and the height is that above standing, plus `standing_m`, the rotors' height then. None
+    without position as well.
     """
+    rise = turn[:, 2, :1] * rotor_x + turn[:, 2, 1:2] * rotor_y
     if not log.has("zrange_m"):
-        return None
+        if not log.has(POSITION[2]):
+            return None
+        z = held(log[POSITION[2]])
+        return np.maximum((z - standing_z(z, on_ground) + standing_m)[:, None] + rise, 0.0)
     n, height = len(log), held(log["zrange_m"]) + below_rotors_m
     index = np.arange(n, dtype=np.float64)
     step = np.zeros((n, 4))
@@ -87,11 +95,18 @@ def rotor_heights(log: FlightLog, turn: np.ndarray, rotor_x: np.ndarray, rotor_y
         along = np.einsum("nij,nj->ni", turn[:, :2, :2].transpose(0, 2, 1), speed)
         ahead = along[:, :1] * rotor_x + along[:, 1:] * rotor_y
         step[moving] = ahead[moving] / size[moving, None] ** 2 / period_s
-    rise = turn[:, 2, :1] * rotor_x + turn[:, 2, 1:2] * rotor_y
     here = _altitude(log, height)
     top = here - height
     shifted = np.column_stack([np.interp(index + np.clip(step[:, i], -100, 100), index, top) for i in range(4)])
     return np.maximum(here[:, None] - shifted + rise, 0.0)
+
+
+def standing_z(z: np.ndarray, on_ground: np.ndarray) -> float:
+    """What z_m (n,) reads when the vehicle stands: its median on the ground where the log holds that.
+
+    Else the lowest value, at most MARKER_M: a log cut out of a flight may never come down.
+    """
+    return float(np.median(z[on_ground])) if on_ground.any() else float(min(z.min(), MARKER_M))
 
 
 def _altitude(log: FlightLog, height: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.data import Data, spectra
 from airtouch.gap.response import FIRST_BIN
-from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, judged
+from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged
 from airtouch.gap.twin import COMMAND_ONLY
 from airtouch.gap.twin_view import TwinView
 from airtouch.simulation.effects import Active
@@ -27,6 +27,8 @@ from airtouch.simulation.effects import Active
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
+GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
 FREEDOM = 12.0  #: of the Student-like tail at most
 
 
@@ -64,6 +66,8 @@ class Problem:
         self.freedom = np.concatenate(nu) if nu else np.zeros(0)
         self.own = len(self.base)  #: elements of the replay view; those of the twin view follow
         self.torque = (self.channel >= TORQUE.start) & (self.channel < TORQUE.stop)
+        #: number of the block in the air of each element, -1 for the others; begin, piece: of each such block the first
+        self.block = self._blocks()  #: sample and the flight
         twin = self.twin
         self.power = np.concatenate([self.power, twin.floor])
         self.base = np.concatenate([self.base, twin.values])
@@ -72,6 +76,31 @@ class Problem:
         self.flight = np.concatenate([self.flight, twin.flight]).astype(int)
         self.tail = np.concatenate([tail(self.freedom), twin.freedom])  #: the twin's floor has its tails in it
         self.freedom = np.concatenate([self.freedom, twin.freedom])
+
+    def _blocks(self) -> np.ndarray:
+        out, begin, flights = [], [], []
+        for i, regime, chosen in self.part.pieces:
+            size = int(self.keep[regime].sum())
+            numbers = np.full(int(chosen.sum()), -1)
+            if regime == AIR:
+                numbers = len(begin) + np.arange(len(numbers))
+                begin += list(self.data.first[i][AIR][chosen])
+                flights += [i] * len(numbers)
+            out.append(np.repeat(numbers, size))
+        self.begin, self.piece = np.array(begin, int), np.array(flights, int)
+        return np.concatenate([*out, np.full(len(self.twin), -1)]).astype(int)
+
+    @functools.cached_property
+    def groups(self) -> np.ndarray:
+        """A number below GROUPS for each flattened value: view, regime, channel and band."""
+        groups = []
+        for _, regime, chosen in self.part.pieces:
+            band = np.digitize(frequencies(regime), BANDS_HZ) - 1
+            table = band[:, None] * COUNT + np.arange(COUNT) + (1000 if regime == REST else 0)
+            groups.append(np.tile(table[self.keep[regime]], int(chosen.sum())))
+        twin = np.digitize(self.twin.frequency, BANDS_HZ) * COUNT + self.twin.channel + 2000 \
+            if len(self.twin) else np.zeros(0)
+        return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
 
     def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
         return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
@@ -84,14 +113,14 @@ class Problem:
         """Spectra with effects in the model, flattened."""
         seen = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
         own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
-        return np.where(self.known, self._with_twin(own, self.twin.moved(active)), 0.0)
+        return np.where(self.known, self._with_twin(own, self.twin.moved([a for a in active if not a.gate])), 0.0)
 
     def _with_twin(self, own: np.ndarray, twin: np.ndarray | float = 0.0) -> np.ndarray:
         return np.concatenate([own, np.broadcast_to(twin, len(self.twin))])
 
     def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
-        power, cost = self.twin.power(active, wide)
+        power, cost = self.twin.power([a for a in active if not a.gate], wide)
         return np.concatenate([self._doubt(active), power - self.twin.floor]), cost
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:

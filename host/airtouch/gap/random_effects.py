@@ -4,15 +4,17 @@ White noise of the IMU and the rotors' lines in closed form; random forces by ru
 effect itself on the flight's signals with several seeds.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.signal import freqz
 
-from airtouch.gap.channels import COUNT, FORCE, RATE, TORQUE, residual
+from airtouch.gap.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop_model import AXES, spectra
-from airtouch.gap.spectra import AIR, blocks, frequencies
+from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies
 from airtouch.gap.vibration_lines import lines
 from airtouch.simulation import rigid_body, sensors
 from airtouch.simulation.flight import prepare
@@ -32,7 +34,7 @@ def growth(term: Any, x: float) -> float:
 def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
     """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
     cache = data.__dict__.setdefault("_random", {})
-    unit = term.fitted(np.ones(len(term.free)))
+    unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
     key = (term.name, tuple(sorted(unit.values.items())))
     if key not in cache:
         cache[key] = [_unit_power(data, i, unit) for i in range(len(data.flights))]
@@ -40,7 +42,18 @@ def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
     neutral = p.neutral or 0.0
     step = unit.values[term.free[0]] - neutral
     scale = growth(term, (term.values[term.free[0]] - neutral) / step)
+    if term.gate:
+        return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()} for i, f in enumerate(cache[key])]
     return [{r: scale * v for r, v in f.items()} for f in cache[key]]
+
+
+def _covered(data: Any, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:
+    """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
+    acts = inside(gate, data.flights[i]).astype(float)
+    length, first = LENGTH[regime], data.first[i][regime]
+    weight = np.hanning(length + 1)[:-1] ** 2
+    cut = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
+    return (cut @ weight / weight.sum())[:, None, None]
 
 
 def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:

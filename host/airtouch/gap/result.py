@@ -22,10 +22,14 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Found:
-    """An effect that the diagnosis names, with its fitted parameters."""
+    """An effect that the diagnosis names, with its fitted parameters.
+
+    seconds: stretches (flight, from_s, to_s) in which it acts; empty where it always does.
+    """
 
     name: str
     parameters: Mapping[str, Quantity]
+    seconds: tuple[tuple[str, float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,14 +86,16 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     flights: tuple[str, ...] = ()
+    unexplained: tuple[Mapping[str, Any], ...] = ()  #: what no named effect explains, largest first
     held: Any = field(default=None, repr=False, compare=False)  #: study and calibration, for the report alone
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, GAP.md's fields and more; floats rounded to six digits."""
         made = {
             "verdict": self.verdict,
-            "effects": [{"name": e.name, "parameters": {k: q.plain() for k, q in e.parameters.items()}}
-                        for e in self.effects],
+            "effects": [{"name": e.name, "parameters": {k: q.plain() for k, q in e.parameters.items()},
+                         **({"seconds": [{"flight": f, "from_s": a, "to_s": b} for f, a, b in e.seconds]}
+                            if e.seconds else {})} for e in self.effects],
             "ranking": [{"name": r.name, "probability": r.probability, "shrink": r.shrink.plain()}
                         for r in self.ranking],
             "indistinguishable": [list(g) for g in self.indistinguishable],
@@ -97,6 +103,7 @@ class Diagnosis:
             "gap": dict(self.gap), "shrink": self.shrink.plain() if self.shrink else None,
             "control": dict(self.control), "advice": self.advice, "arms": dict(self.arms),
             "notes": list(self.notes), "cannot": list(self.cannot), "flights": list(self.flights),
+            "unexplained": [dict(u) for u in self.unexplained],
         }
         return rounded(made)
 

@@ -45,15 +45,15 @@ class Screen:
 
 def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray],
                 added: Sequence[np.ndarray], terms: Sequence[Term],
-                beside: Sequence[Term] = ()) -> tuple[float, list[np.ndarray]]:
-    """Held-out gain of mean effects to first order, and their scaled parameters on each half.
+                beside: Sequence[Term] = ()) -> tuple[float, list[np.ndarray], list[np.ndarray]]:
+    """Held-out gain of mean effects to first order, their scaled parameters on each half, and the variances of these.
 
     left, added: for each part what the effects chosen before leave, and the power that
     random ones add. beside: those effects, free to give way a little.
     """
     mean = [t for t in terms if t.kind == MEAN and t.name not in COMMAND_ONLY]
     other = [t for t in beside if t.kind == MEAN and t.name not in COMMAND_ONLY]
-    gain, found = 0.0, []
+    gain, found, variances = 0.0, [], []
     tables = []
     for part in parts:
         problem = problem_of(screen.data, part)
@@ -71,7 +71,7 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
         values = left[train]
         for _ in range(ROUNDS):
-            change, _ = bounded_step(columns, prior, values, weights_of(problem, values, added[train]),
+            change, covariance = bounded_step(columns, prior, values, weights_of(problem, values, added[train]),
                                       x, offsets, low, high, nothing)
             x = np.clip(x + change[:len(x)], low, high)
             offsets = offsets + change[len(x):]
@@ -82,7 +82,8 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         before, paid = without_offsets(problem, left[test], added[test])
         gain += problem.likelihood(after, added[test]) - cost - problem.likelihood(before, added[test]) + paid
         found.append(x[:n])
-    return gain, found
+        variances.append(np.diag(covariance)[:n])
+    return gain, found, variances
 
 
 def _changes(term: Term) -> bool:

@@ -7,16 +7,18 @@ much on top of the named effects, something is left that they do not explain.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, twins_of
+from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, every, twins_of
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
-from airtouch.gap.fit import Fit, fit, judge, left_over
+from airtouch.gap.fit import Fit, fit, judge, left_over, strength_variance
+from airtouch.gap.flight import PERIOD_S
 from airtouch.gap.generic import generic_gain
-from airtouch.gap.problem import Part
+from airtouch.gap.nominal_scatter import Apparent
+from airtouch.gap.problem import Part, whole_of
 from airtouch.gap.screen import Screen, first_order
 from airtouch.gap.spectra import AIR, REST
 from airtouch.gap.twin import COMMAND_ONLY
@@ -33,6 +35,9 @@ UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectrum is assumed, not measured
 MOST_EFFECTS = 3
+MOST_STEPS = 4  #: effects named, and deviations that nominal flights have as well
+NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
+GATED_SHARE = 0.5  #: of what a model without names gains, that an effect must gain by coming and going
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
@@ -42,7 +47,13 @@ Hypothesis = tuple[Term, ...]
 
 @dataclass(frozen=True)
 class Judged:
-    """A hypothesis with its gain in held-out log likelihood over no effect, and its fits of both halves."""
+    """A hypothesis with its gain in held-out log likelihood over no effect, and its fits of both halves.
+
+    strength: scaled parameters (k,) of its newest effect, the mean of both halves; variance: (k,) of those of a mean
+    effect, by chance. evidence: what that effect gains over the hypothesis before, and no more than its strength says
+    beyond the scatter of nominal flights. named: whether that is enough; if not, it is a deviation that nominal flights
+    have as well, and stands beside the effects that are named.
+    """
 
     name: str
     terms: Hypothesis
@@ -50,6 +61,10 @@ class Judged:
     fits: tuple[Fit, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
     choice: float = 0.0  #: of the gain, what the choice of the effects' variants has cost
+    strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    variance: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    evidence: float = 0.0
+    named: bool = True
 
 
 @dataclass(frozen=True)
@@ -69,11 +84,28 @@ class Selection:
     least: Mapping[str, float]  #: gain that each candidate needs as the first
     nominal: int
     assumed: bool
+    usual: float  #: log likelihood that a nameless model gains in nominal flights as long as these
+
+    @property
+    def whole(self) -> Judged | None:
+        """The effects named and the deviations that nominal flights have as well, as one hypothesis."""
+        return self.steps[-1] if self.steps else None
+
+    @property
+    def named(self) -> tuple[Judged, ...]:
+        """The steps whose effects are named."""
+        return tuple(s for s in self.steps if s.named)
 
     @property
     def chosen(self) -> Judged | None:
-        """The effects named, as one hypothesis; None where none is."""
-        return self.steps[-1] if self.steps else None
+        """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
+        names = {s.name for s in self.named}
+        if not names:
+            return None
+        names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
+        own = lambda terms: tuple(t for t in terms if t.name in names)
+        return replace(self.whole, terms=own(self.whole.terms),
+                       fits=tuple(replace(f, terms=own(f.terms)) for f in self.whole.fits))
 
     @property
     def allowed(self) -> float:
@@ -82,10 +114,10 @@ class Selection:
         The fewer nominal flights there are, the farther off may another one lie.
         """
         if self.nominal < 2:
-            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before)
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
-        gained = self.chosen.gain if self.chosen else 0.0
-        return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * gained)
+        gained = self.whole.gain if self.whole else 0.0
+        return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * gained, self.usual)
 
     @property
     def explained(self) -> bool:
@@ -111,26 +143,75 @@ def halves(data: Data) -> tuple[Part, Part]:
 
 
 def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
-           progress: Callable[[str], None] = lambda _: None) -> Selection:
-    """Judge every candidate, then add effects one by one while held-out data ask for them."""
+           progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
+    """Judge every candidate, then add effects one by one while held-out data ask for them.
+
+    Where much is left, effects that come and go are tried in their place (gap.gates), but those of `without`.
+    """
     parts = halves(data)
     base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]  # none, as sure of the commands' floor
     screen = Screen(data)
     singles = _round(data, parts, base, screen, candidates, None, progress)
     steps: list[Judged] = []
     least = {name: needed(data, j.terms) for name, j in singles.items()}
-    best = _best_of({name: j for name, j in singles.items() if j.gain >= least[name]})
-    while best is not None and len(steps) < MOST_EFFECTS:
-        steps.append(best)
-        best = None
-        if len(steps) < MOST_EFFECTS:
-            more = _round(data, parts, base, screen, candidates, steps[-1], progress)
-            enough = {n: j for n, j in more.items() if j.gain - steps[-1].gain >= _needed_beside(data, steps[-1], j)}
-            best = _best_of(enough)
+    tried, need = singles, least
+    while sum(s.named for s in steps) < MOST_EFFECTS and len(steps) < MOST_STEPS:
+        so_far = steps[-1].gain if steps else 0.0
+        best = _best_of({n: j for n, j in tried.items() if j.gain - so_far >= need[n]})
+        if best is None:
+            break
+        if not any(s.named for s in steps):  # what nominal flights have as well stands beside every candidate
+            singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
+        steps.append(replace(best, named=best.evidence >= need[best.name]))
+        if sum(s.named for s in steps) < MOST_EFFECTS and len(steps) < MOST_STEPS:
+            tried = _round(data, parts, base, screen, candidates, steps[-1], progress)
+            named = any(s.named for s in steps)
+            need = {n: _needed_beside(data, steps[-1], j) if named else needed(data, j.terms[len(steps[-1].terms):])
+                    for n, j in tried.items()}
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
+    if data.study.scatter is not None and after >= max(_usual(data), UNKNOWN_GAIN):
+        from airtouch.gap.gates import best_gated  # it judges by this module's means
+
+        gated = best_gated(data, without)
+        so_far = steps[-1].gain if steps else 0.0
+        if gated is not None and gated.gain > max(so_far, GATED_SHARE * before) + LEAST_GAIN:
+            steps, singles[gated.name] = [gated], gated
+            least[gated.name] = LEAST_GAIN
+            after = _nameless(data, parts, gated)
     last = steps[-1].terms if steps else ()
-    return Selection(singles, tuple(steps), before, after, parts, least, data.study.nominal, _assumes(data, last))
+    return Selection(singles, tuple(steps), before, after, parts, least, data.study.nominal, _assumes(data, last),
+                     _usual(data))
+
+
+def _usual(data: Data) -> float:
+    """Log likelihood that a model without names gains in nominal flights as long as these."""
+    scatter = data.study.scatter
+    return scatter.allowed(sum(len(f) for f in data.flights) * PERIOD_S, UNKNOWN_GAIN) if scatter else 0.0
+
+
+def apparent(data: Data) -> Apparent:
+    """How strong every effect seems to be in flights that have none."""
+    parts = halves(data)
+    base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]
+    singles = _round(data, parts, base, Screen(data), every(), None, lambda _: None)
+    seconds = sum(len(f) for f in data.flights) * PERIOD_S
+    known = {n: j for n, j in singles.items() if len(j.strength)}
+    return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
+                    _nameless(data, parts, None) / seconds)
+
+
+def _error(data: Data, judged: Judged) -> np.ndarray:
+    """Standard deviation (k,) by chance of a candidate's strength."""
+    term = judged.terms[0]
+    if term.kind == CLOCK:
+        return np.zeros(len(judged.strength))
+    if term.kind != SPECTRUM:  # at a bound nobody knows how far beyond it would lie
+        return np.where((judged.variance > 0.0) | (judged.strength == 0.0), np.sqrt(judged.variance), NOBODY_KNOWS)
+    fitted = judged.fits[0].terms
+    same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
+    variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
+    return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))
 
 
 def _assumes(data: Data, terms: Sequence[Term]) -> bool:
@@ -193,9 +274,11 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
                 continue
             choice = np.log(sum(len(v) == len(terms) for v in variants))  # among so many; else many would beat one
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
-                gain, _ = first_order(screen, parts, left, added, terms, held)
+                gain, fitted, variances = first_order(screen, parts, left, added, terms, held)
                 gain += before - _price(terms) - choice
-                looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice))
+                k = len(terms[0].free)
+                looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
+                                     strength=np.mean(fitted, axis=0)[:k], variance=_of_mean(variances)[:k]))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
                 hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
@@ -212,7 +295,14 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         both, alone = best.get(name), best.get(other)
         if both and alone and len(both.terms) > len(held) + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))  # it is the companion that gains
-    return best
+    return _with_evidence(data, best, before)
+
+
+def _with_evidence(data: Data, best: Mapping[str, Judged], before: float) -> dict[str, Judged]:
+    """Every candidate with its evidence: what it gains, and no more than its strength alone says."""
+    scatter = data.study.scatter
+    return {n: replace(j, evidence=min(j.gain - before, scatter.evidence(n, j.strength) if scatter else np.inf))
+            for n, j in best.items()}
 
 
 def _price(terms: Sequence[Term]) -> float:
@@ -238,14 +328,14 @@ def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
 def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], name: str, held: Hypothesis,
              terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
     """Fit on each half, judge on the other; choice: what the choice of this variant costs."""
-    every = (*held, *terms)
+    joint = (*held, *terms)
     timed = [t for t in terms if t.kind == CLOCK]
     paid = choice + (chosen.choice if chosen else 0.0)
     gain, fits = 0.0, []
     if chosen and not [t for t in terms if t.kind != CLOCK]:
         gain, fits = chosen.gain, list(chosen.fits)
     else:
-        others = [t for t in every if t.kind != CLOCK]
+        others = [t for t in joint if t.kind != CLOCK]
         gain += sum(clock_gain(data, t)[1] for t in held if t.kind == CLOCK)
         against = base[any(t.kind == SPECTRUM for t in others)]
         for train, test in ((0, 1), (1, 0)):
@@ -254,11 +344,33 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]],
             fits.append(found)
         gain -= _price(found.terms if others else ()) + paid
     fitted = list(fits[0].terms) if fits else []
-    for t in (t for t in every if t.kind == CLOCK):
+    for t in (t for t in joint if t.kind == CLOCK):
         made, more = clock_gain(data, t)
         fitted.append(made)
         gain += more if t in timed else 0.0
-    return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid)
+    strength, variance = _strength(terms[0], fitted, fits)
+    return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, variance=variance)
+
+
+def _strength(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled parameters (k,) of a term as fitted, the mean of both halves, and variances (k,), 0 but for mean effects."""
+    every = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
+    same = [next(t for t in terms if t.name == term.name and t.values.get("rotor") == term.values.get("rotor"))
+            for terms in every]
+    k = len(term.free)
+    strength = np.mean([t.scaled(t.values)[:k] for t in same], axis=0)
+    if term.kind != MEAN:
+        return strength, np.zeros(k)
+    variances = []
+    for f, t in zip(fits, same, strict=True):
+        place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
+        variances.append(np.diag(f.covariance)[place:place + k])
+    return strength, _of_mean(variances)
+
+
+def _of_mean(variances: Sequence[np.ndarray]) -> np.ndarray:
+    """Variance of the mean of independent values."""
+    return np.sum(variances, axis=0) / len(variances) ** 2
 
 
 def _refined(data: Data, part: Part, found: Fit) -> Fit:
@@ -279,10 +391,25 @@ def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarr
 
 
 def _against_none(gain: float, least: float, many: int = 1) -> float:
-    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little."""
+    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
+
+    gain: the evidence, over `none` and over what nominal flights show.
+    """
     if gain < least:
         return TEMPERATURE * (gain - least - np.log(many))
     return gain - least
+
+
+def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
+    """Score of every single candidate beside 0 for `none`; those that could be named keep the order of their gains."""
+    singles, least = selection.singles, selection.least
+    out = {n: _against_none(singles[n].evidence, least[n], len(names)) for n in names}
+    if selection.named:
+        first = selection.named[0]
+        for n in names:
+            if out[n] >= 0.0:
+                out[n] = max(out[first.name] + singles[n].gain - first.gain, -TEMPERATURE)
+    return [out[n] for n in names]
 
 
 def probabilities(selection: Selection) -> dict[str, float]:
@@ -292,12 +419,12 @@ def probabilities(selection: Selection) -> dict[str, float]:
     """
     names = list(selection.singles)
     singles = selection.singles
-    score = np.array([_against_none(singles[n].gain, selection.least[n], len(names)) for n in names] + [0.0])
+    score = np.array([*_scores(selection, names), 0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
     odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
     unknown = odds / (1.0 + odds)
     if selection.chosen is not None and selection.explained:  # not above the effect that is the answer
-        share = weight[names.index(selection.steps[0].name)] / weight.sum()
+        share = weight[names.index(selection.named[0].name)] / weight.sum()
         unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
     known = (1.0 - unknown) * weight / weight.sum()
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))

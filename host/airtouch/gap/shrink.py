@@ -12,7 +12,6 @@ import numpy as np
 from airtouch.gap.data import Data
 from airtouch.gap.fit import left_over
 from airtouch.gap.problem import Part
-from airtouch.gap.generic import bands_of
 from airtouch.gap.result import Quantity
 from airtouch.gap.select import Judged
 
@@ -38,13 +37,13 @@ def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, seed: in
     before, after = [], []
     for train, test in ((0, 1), (1, 0)):
         problem, values, power = left_over(data, parts[train], ())
-        groups = bands_of(problem)
+        groups = problem.groups
         e = np.minimum(np.abs(values) ** 2 / power, LARGEST)
         count = np.bincount(groups, problem.known)
         mean = np.bincount(groups, e * problem.known) / np.maximum(count, 1)
         large = (count >= FEWEST) & (mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2)
         problem, values, power = left_over(data, parts[test], ())
-        groups = np.minimum(bands_of(problem), len(large) - 1)
+        groups = np.minimum(problem.groups, len(large) - 1)
         use = problem.known & large[groups]
         first = np.minimum(np.abs(values) ** 2 / power, LARGEST)[use]
         terms = judged.fits[train].terms if judged and judged.fits else ()

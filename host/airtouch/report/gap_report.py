@@ -65,7 +65,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, flights: Sequence[FlightLo
     """
     left_out: list[str] = []
     nominal = list(measure.usable(baseline, vehicle, left_out))
-    study, fitted = diagnosis.held or (calibrate.calibrated(vehicle, nominal) if nominal else
+    study, fitted = diagnosis.held or (calibrate.calibrated(vehicle, nominal, scatter=False) if nominal else
                                        (calibrate.declared(vehicle, ()), None))
     seen = list(measure.usable(flights[:MOST_FLIGHTS], vehicle, left_out))
     effects = [term_of(e) for e in diagnosis.effects]

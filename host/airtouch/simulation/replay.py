@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import float64, from_dtype, int64, njit, types, uint64
 
-from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, VELOCITY, FlightLog
+from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
 from airtouch.simulation import battery, loop, motors, rigid_body, sensors
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
@@ -112,6 +112,8 @@ def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (),
     s[:, at.ROTATION:at.ROTATION + 9] = turn.reshape(n, 9)
     if log.has(*VELOCITY):
         s[:, at.VELOCITY:at.VELOCITY + 3] = np.einsum("nji,nj->ni", turn, log.stack(VELOCITY))
+    for i, name in enumerate(POSITION):
+        s[:, at.POSITION + i] = np.nan_to_num(log[name]) if log.has(name) else 0.0
     if log.has(*GYRO):
         s[:, at.RATES:at.RATES + 3] = log.stack(GYRO)
     if log.has(*ACC):

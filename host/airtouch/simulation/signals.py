@@ -29,4 +29,5 @@ LOWER_ROUGHNESS = 58  #: 4, unsteadiness of the air over the surface
 UPPER_ROUGHNESS = 62  #: 4
 ACCELERATION = 66  #: 3, m/s^2, of the centre of mass in world axes: dv/dt
 HEIGHT = 69  #: m, centre of mass over what is below it
-COUNT = 70  #: length of the vector
+POSITION = 70  #: 3, m, of the centre of mass in the world; 0 where a log holds none
+COUNT = 73  #: length of the vector

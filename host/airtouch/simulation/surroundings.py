@@ -20,6 +20,7 @@ def fill(plant, state, slope, speed, corners, first, surface, box, h, t, hover, 
     for i in range(3):
         s[at.RATES + i] = state[10 + i]
         s[at.ACCELERATION + i] = slope[3 + i]
+        s[at.POSITION + i] = state[i]
     r = at.ROTATION
     matrix(q, s, r)
     lowest = 1e9

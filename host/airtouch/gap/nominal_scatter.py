@@ -1,0 +1,162 @@
+"""How strong every effect seems to be in flights that have none: the yardstick of the diagnosis.
+
+Two nominal flights of one vehicle differ in trim, battery, air and wear. Fitted to such a
+flight, an effect gets some apparent strength, and may gain many nats of likelihood. It is
+news only as far as its strength exceeds what nominal flights show of the same effect.
+
+The variance of a parameter's apparent strength has a scaled inverse chi-square prior
+(Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6) from the table
+`nominal_scatter.toml`, of one class of vehicles, and is updated by the baseline flights;
+which class it is they tell by themselves. `tools/nominal_scatter.py` makes the table.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+MOST_SURE = 3.0  #: standard deviations of the rate that are no news, at most
+LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
+WORTH = 4.0  #: flights that a class of the table counts as at most, beside the baseline's own
+NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
+GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the likeliest is taken
+
+
+@dataclass(frozen=True)
+class Apparent:
+    """One nominal flight held against others.
+
+    strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
+    chance; rate: nats a second that a model without names gains.
+    """
+
+    strengths: Mapping[str, np.ndarray]
+    errors: Mapping[str, np.ndarray]
+    rate: float
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
+
+    rate: mean and standard deviation of the square root of the rate of the model without names.
+    """
+
+    rms: Mapping[str, np.ndarray]
+    freedom: float
+    rate: tuple[float, float]
+
+    def evidence(self, name: str, strength: np.ndarray) -> float:
+        """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
+
+        Student's density with `freedom`, of what remains after each further parameter has paid for itself.
+        """
+        rms = self.rms.get(name)
+        if rms is None or not len(strength):
+            return math.inf
+        far = float(np.sum((strength[:len(rms)] / rms[:len(strength)]) ** 2)) - (len(strength) - 1)
+        return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
+
+    def allowed(self, seconds: float, least: float) -> float:
+        """Log likelihood that a model without names may gain in a flight of so many seconds.
+
+        least: what would be news in a flight of a nominal rate, 0 nats; log rates scatter as Student's.
+        """
+        middle, spread = self.rate
+        sure = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
+        return least + seconds * (middle + min(sure, MOST_SURE) * spread) ** 2
+
+
+def scatter_of(baseline: Sequence[Apparent]) -> Scatter:
+    """What the table knows of the class that the baseline flights fit best, updated by them.
+
+    baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
+    by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
+    """
+    classes = table()
+    n = len(baseline)
+    wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
+    known = baseline if n > 1 else ()
+    weight = np.array([_fit(c, known, wide) for c in classes.values()])
+    own = list(classes.values())[int(np.argmax(weight))] if n > 1 else _widest(classes.values())
+    worth = min(own.freedom, WORTH)
+    rms = {}
+    for name, prior in own.rms.items():
+        rows = [f for f in known if name in f.strengths]
+        rms[name] = np.array([_likeliest(math.sqrt(wide) * _column(rows, name, "strengths", k),
+                                         math.sqrt(wide) * _column(rows, name, "errors", k), p, worth)
+                              for k, p in enumerate(prior)])
+    return Scatter(rms, worth + len(known), _rate(own, known, worth))
+
+
+def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
+    """Parameter k of an effect, strength or error, in every flight (n,)."""
+    return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
+
+
+def _likeliest(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> float:
+    """Standard deviation of highest posterior for values (n,) that chance alone scatters by `error` (n,).
+
+    The variance's prior is scaled inverse chi-square of `worth` degrees of freedom; none where worth is 0.
+    """
+    variance = GRID[:, None] ** 2 + error ** 2
+    level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
+    level -= 0.5 * worth * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) if worth else 0.0
+    return float(GRID[int(np.argmax(level))])
+
+
+def _rate(own: Scatter, known: Sequence[Apparent], worth: float) -> tuple[float, float]:
+    middle, spread = own.rate
+    roots = np.minimum(np.sqrt([f.rate for f in known]) if known else np.zeros(0), middle + MOST_SURE * spread)
+    total = worth + len(roots)
+    mean = (worth * middle + roots.sum()) / total
+    return float(max(mean, middle)), float(np.sqrt((worth * spread ** 2 + ((roots - mean) ** 2).sum()) / total))
+
+
+def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
+    """Log likelihood of the baseline's strengths in a class."""
+    total, nu = 0.0, own.freedom
+    for flight in baseline:
+        for name, rms in own.rms.items():
+            if name in flight.strengths:
+                n = min(len(rms), len(flight.strengths[name]))
+                variance = np.maximum(rms[:n], NEVER_BELOW) ** 2 + wide * flight.errors[name][:n] ** 2
+                far = wide * flight.strengths[name][:n] ** 2 / variance
+                total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
+    return total
+
+
+def _widest(classes: Sequence[Scatter]) -> Scatter:
+    """Of every effect the widest scatter of any class: for vehicles of which no nominal flight is known."""
+    classes = list(classes)
+    names = {n for c in classes for n in c.rms}
+    rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
+    return Scatter(rms, min(c.freedom for c in classes), max((c.rate for c in classes), key=lambda r: r[0] + r[1]))
+
+
+@cache
+def table() -> dict[str, Scatter]:
+    """The shipped classes of vehicles by name."""
+    text = (resources.files("airtouch") / "gap" / "nominal_scatter.toml").read_text(encoding="utf-8")
+    return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
+                          (entry["root_rate_mean"], entry["root_rate_sd"]))
+            for name, entry in tomllib.loads(text).items()}
+
+
+def measured(flights: Sequence[Apparent]) -> Scatter:
+    """The scatter of flights each of which was held against others than itself."""
+    names = sorted({n for f in flights for n in f.strengths})
+    rms = {}
+    for name in names:
+        rows = [f for f in flights if name in f.strengths]
+        size = max(len(f.strengths[name]) for f in rows)
+        found = [_likeliest(_column(rows, name, "strengths", k), _column(rows, name, "errors", k), 0.0, 0.0)
+                 for k in range(size)]
+        rms[name] = np.array(found)
+    roots = np.sqrt([f.rate for f in flights])
+    middle = float(np.median(roots))
+    return Scatter(rms, float(len(flights)), (middle, 1.4826 * float(np.median(np.abs(roots - middle)))))

@@ -1,0 +1,134 @@
+"""What a diagnosis leaves open: where and when it is left, what it follows, and why the nearest effects fail."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from airtouch.gap.candidates import MEAN
+from airtouch.gap.channels import CHANNELS, residual
+from airtouch.gap.data import Study
+from airtouch.gap.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.motion import held
+from airtouch.gap.result import Cell
+from airtouch.gap.select import Selection
+from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.simulation import signals as at
+
+MOST_CELLS = 5
+NEAREST = 3
+FEWEST = 8  #: blocks in which a relation can be seen
+CHANCE = 0.01  #: of any relation that is not there, all signals together
+PLACE = {c.name: i for i, c in enumerate(CHANNELS)}
+
+
+def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
+                ) -> list[dict[str, Any]]:
+    """The largest cells of the map that the named effects leave, JSON-ready (GAP.md, `unexplained`).
+
+    cells: largest first. Each entry has the stretch of time in which most of it is (of the flight in which it is
+    largest), how far it is over the floor there, signals that the cell's power follows from block to block, and
+    the effects that gain most with the reason why they were not named.
+    """
+    terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
+    active = tuple(t.active() for t in terms if t.kind == MEAN)
+    near = nearest(selection)
+    out = []
+    for cell in [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]:
+        over = [_over(study, f, active, cell) for f in flights]
+        over = [(f, o) for f, o in zip(flights, over, strict=True) if len(o)]
+        if not over:
+            continue
+        flight, ratio = max(over, key=lambda x: float(x[1].max()))
+        first, last = _stretch(ratio)
+        begin = starts(flight, AIR)
+        out.append({"channel": cell.channel, "band_hz": list(cell.band_hz), "phase": cell.phase, "flight": flight.name,
+                    "from_s": float(begin[first] * PERIOD_S), "to_s": float((begin[last] + LENGTH[AIR]) * PERIOD_S),
+                    "over_floor": float(ratio[first:last + 1].max()), "follows": _follows(study, over), "nearest": near})
+    return out
+
+
+def nearest(selection: Selection) -> list[dict[str, str]]:
+    """The effects that gain most and were not named, each with what speaks against it."""
+    named = {t.name for t in selection.chosen.terms} if selection.chosen else set()
+    held_by = selection.chosen.gain if selection.chosen else 0.0
+    others = sorted((j for n, j in selection.singles.items() if n not in named and j.gain > 0.0), key=lambda j: -j.gain)
+    out = []
+    for j in others[:NEAREST]:
+        least = selection.least[j.name]
+        if j.gain < least:
+            why = f"held-out data gain {j.gain:.1f} nats by it, {least:.0f} are needed"
+        elif j.evidence < least:
+            why = (f"as strong as it often seems to be in nominal flights: {j.gain:.0f} nats, of which "
+                   f"{max(j.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+        elif selection.chosen:
+            why = f"gains {j.gain:.0f} nats, the effects named {held_by:.0f}"
+        else:
+            why = f"gains {j.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+        out.append({"name": j.name, "fails": why})
+    return out
+
+
+def _over(study: Study, flight: Flight, active: Sequence[Any], cell: Cell) -> np.ndarray:
+    """Root mean square of a cell's channel and band over its floor in every block (b,) in the air."""
+    begin, c = starts(flight, AIR), PLACE[cell.channel]
+    if not len(begin):
+        return np.zeros(0)
+    left = held(residual(flight, study.vehicle, (*study.calibration, *active), study.controller)[:, c:c + 1])
+    f = frequencies(AIR)
+    band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
+    power = (np.abs(blocks(left, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
+    return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), 1e-300))
+
+
+def _stretch(ratio: np.ndarray) -> tuple[int, int]:
+    """First and last block around the largest that stay above the middle between it and the median."""
+    peak = int(np.argmax(ratio))
+    limit = 0.5 * (ratio[peak] + float(np.median(ratio)))
+    first = last = peak
+    while first > 0 and ratio[first - 1] >= limit:
+        first -= 1
+    while last + 1 < len(ratio) and ratio[last + 1] >= limit:
+        last += 1
+    return first, last
+
+
+def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
+    """Signals (n,) of a flight that a gap may follow."""
+    s, log = flight.signals, flight.log
+    thrust = study.vehicle.thrust(flight.pwm).sum(axis=1)
+    out = {"thrust": thrust, "tilt": np.hypot(flight.turn[:, 2, 0], flight.turn[:, 2, 1]),
+           "time": np.arange(len(flight)) * PERIOD_S}
+    if log.has("zrange_m") or log.has("z_m"):
+        out["height"] = s[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1)
+    if log.has("vx_mps", "vy_mps"):
+        out["speed"] = np.hypot(s[:, at.VELOCITY], s[:, at.VELOCITY + 1])
+    if log.has("vbat_V"):
+        out["battery voltage"] = held(log["vbat_V"])
+    return out
+
+
+def _follows(study: Study, over: Sequence[tuple[Flight, np.ndarray]]) -> list[str]:
+    """Names of signals whose mean over a block ranks like the cell's power (Spearman, CHANCE over all signals)."""
+    table: dict[str, list[np.ndarray]] = {}
+    power = []
+    for flight, ratio in over:
+        begin = starts(flight, AIR)
+        power.append(np.log(np.maximum(ratio, 1e-9)))
+        air = np.where(flight.phase == GROUND, np.nan, 1.0)
+        for name, values in _signals(study, flight).items():
+            cut = (values * air)[begin[:, None] + np.arange(LENGTH[AIR])]
+            table.setdefault(name, []).append(np.nanmean(cut, axis=1))
+    level = np.concatenate(power)[::2]  # every other block: they overlap by half
+    if len(level) < FEWEST:
+        return []
+    found = []
+    for name, parts in table.items():
+        values = np.concatenate(parts)
+        if len(values) != sum(len(p) for p in power) or np.ptp(values) == 0.0:
+            continue
+        told = spearmanr(values[::2], level)
+        if told.pvalue < CHANCE / len(table):
+            found.append((abs(told.statistic), name))
+    return [name for _, name in sorted(found, reverse=True)]

@@ -1,0 +1,69 @@
+"""The yardstick of nominal flights against closed forms and drawn flights."""
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from airtouch.gap import nominal_scatter
+from airtouch.gap.nominal_scatter import Apparent, Scatter, measured, scatter_of, table
+from airtouch.simulation.effects import EFFECTS
+
+
+def drawn(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[Apparent]:
+    return [Apparent({k: rng.normal(size=len(v)) * v for k, v in rms.items()}, float(rng.lognormal(0.5, 0.4)))
+            for _ in range(n)]
+
+
+@pytest.mark.parametrize("freedom", [3.0, 12.0, 200.0])
+def test_evidence_of_one_parameter_is_that_of_students_density(freedom):
+    scatter = Scatter({"mass": np.array([0.4])}, freedom, (0.0, 0.5))
+    for x in (0.0, 0.3, 1.0, 4.0):
+        expected = student.logpdf(0.0, freedom) - student.logpdf(x / 0.4, freedom)
+        assert scatter.evidence("mass", np.array([x])) == pytest.approx(expected)
+
+
+def test_an_effect_without_scatter_is_judged_by_its_gain_alone():
+    assert Scatter({}, 5.0, (0.0, 0.5)).evidence("mass", np.array([0.1])) == np.inf
+
+
+def test_flights_of_a_class_are_taken_for_it():
+    rng = np.random.default_rng(3)
+    for name, known in table().items():
+        got = scatter_of(drawn(rng, dict(known.rms), 6))
+        assert min(abs(np.log(got.rms[k] / known.rms[k]).mean()) for k in known.rms) < 1.0
+        assert np.median([np.log(got.rms[k] / known.rms[k]).mean() for k in known.rms]) == pytest.approx(0.0, abs=0.5), name
+
+
+def test_many_baseline_flights_outweigh_the_table():
+    rng = np.random.default_rng(4)
+    own = {k: 5.0 * v for k, v in next(iter(table().values())).rms.items()}
+    got = scatter_of(drawn(rng, own, 400))
+    ratio = np.concatenate([got.rms[k] / own[k] for k in own])
+    np.testing.assert_allclose(ratio, 1.0, rtol=0.25)
+
+
+def test_without_baseline_flights_the_widest_class_holds():
+    got = scatter_of(())
+    for one in table().values():
+        for name, rms in one.rms.items():
+            assert (got.rms[name][:len(rms)] >= rms[:len(got.rms[name])] - 1e-12).all()
+
+
+def test_a_longer_flight_may_gain_more_without_a_name():
+    scatter = Scatter({}, 8.0, (0.3, 0.6))
+    assert 12.0 < scatter.allowed(10.0, 12.0) < scatter.allowed(40.0, 12.0)
+    quiet = Scatter({}, 8.0, (np.log(nominal_scatter.QUIET_RATE), 0.0))
+    assert quiet.allowed(40.0, 12.0) == pytest.approx(12.0)
+
+
+def test_what_is_measured_is_the_root_mean_square():
+    flights = [Apparent({"wind": np.array([1.0, 2.0])}, 1.0), Apparent({"wind": np.array([-1.0, 0.0])}, 2.0)]
+    got = measured(flights)
+    np.testing.assert_allclose(got.rms["wind"], [1.0, np.sqrt(2.0)])
+
+
+def test_the_table_knows_every_effect_of_the_registry():
+    for name, one in table().items():
+        assert set(one.rms) <= set(EFFECTS), name
+        missing = set(EFFECTS) - set(one.rms)
+        assert missing <= {"time_jitter", "packet_loss", "range_step", "flow_scale"}, (name, missing)
