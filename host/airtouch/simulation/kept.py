@@ -12,6 +12,7 @@ from numba import float64, from_dtype, int64, types
 from airtouch.simulation import contact, controller, estimator, rigid_body, sensors, world
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import MEMORY
+from airtouch.simulation import signals as at
 from airtouch.simulation.plant import DTYPE
 from airtouch.simulation.random_stream import STREAM, normal
 from airtouch.simulation.sensors import RING
@@ -20,7 +21,7 @@ SLOTS = 16  #: effects with a wrench that may be on at once
 #: scalars, at the start of the vector
 (STEP, GROUND, CHARGE, VOLTS, DOWN, TOP, NEXT_RANGE, NEXT_RANGES, FLYING, CHANGED) = range(10)
 _SIZES = (10, 13, 4, 6, 13, SLOTS * MEMORY, controller.SIZE, estimator.SIZE, 4, 8, 4, 4, RING * 6, RING * 4,
-          5, 5, 6, 6, 3, 3, 4, 130)
+          5, 5, 6, 6, 3, 3, 4, 60 + at.COUNT)
 (STATE, SPEED, FORCE, SLOPE, EFFECTS, PID, ESTIMATE, PWM, FLICKER, GAIN, PHASE, SENSED, COMMANDED,
  ACC_FILTER, GYRO_FILTER, ACC_MEMORY, GYRO_MEMORY, ACC_RMS, DRIFT, RANGES, SCRATCH, SIZE) = (
     sum(_SIZES[:i + 1]) for i in range(len(_SIZES)))
