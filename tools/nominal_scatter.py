@@ -76,8 +76,8 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     lines = ["# Root mean square of the apparent strength of every effect, in its natural steps (candidates.Term), in",
              "# nominal flights held against others; made by tools/nominal_scatter.py.", ""]
     for name, s in classes.items():
-        lines += [f'["{name}"]  # {counts[name]}', f"freedom = {s.freedom:g}", f"root_rate_mean = {s.rate[0]:.3f}",
-                  f"root_rate_sd = {s.rate[1]:.3f}", f'["{name}".rms]']
+        lines += [f'["{name}"]  # {counts[name]}', f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
+                  f"root_passing_rate = [{s.passing_rate[0]:.3f}, {s.passing_rate[1]:.3f}]", f'["{name}".rms]']
         lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.rms.items()]
         lines.append("")
     return "\n".join(lines)
@@ -100,7 +100,7 @@ def main() -> None:
         groups_of[of].add(group)
         if any(name not in done for name, _ in files):
             for name, one in held_out(files, flown):
-                done[name] = {"file": name, "rate": one.rate,
+                done[name] = {"file": name, "rate": one.rate, "passing_rate": one.passing_rate,
                                    "strengths": {k: v.tolist() for k, v in one.strengths.items()},
                               "errors": {k: v.tolist() for k, v in one.errors.items()}}
                 if args.keep:
@@ -109,7 +109,7 @@ def main() -> None:
                 print(f"{of}: {name}: {one.rate:.2f} nats a second", file=sys.stderr, flush=True)
         for row in (done[name] for name, _ in files):
             cases[of].append(Apparent(*({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors")),
-                                      row["rate"]))
+                                      row["rate"], row["passing_rate"]))
     classes = {of: measured(flights) for of, flights in cases.items()}
     counts = {of: f"{len(flights)} flights in {len(groups_of[of])} groups" for of, flights in cases.items()}
     new = args.out.with_suffix(".new")

@@ -40,7 +40,7 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
 )
 ODD = 6.0  #: usual deviations from the others' mean by which a nominal flight is left out, and at least
 FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])  #: this, m/s^2 and rad/s^2
-SCATTER_FLIGHTS = 6  #: nominal flights to which every effect is fitted; more adds time, the table knows the rest
+SCATTER_FLIGHTS = 4  #: nominal flights to which every effect is fitted; more adds time, the table knows the rest
 SENSITIVE = 3.0  #: baseline flights whose offsets differ by more than this many deviations are named
 
 

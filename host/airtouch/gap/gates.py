@@ -7,7 +7,7 @@ the logarithm of the number of blocks for each parameter (Schwarz 1978).
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from airtouch.gap.data import Data
 from airtouch.gap.fit import fit, judge, left_over
 from airtouch.gap.flight import PERIOD_S
 from airtouch.gap.problem import Part, problem_of, whole_of
-from airtouch.gap.select import Judged
 from airtouch.gap.spectra import AIR, LENGTH
 
 MOST_STRETCHES = 4  #: of one flight
@@ -27,14 +26,24 @@ LEAST_BLOCKS = 6  #: in the air
 WHOLE = 0.9  #: of a flight's blocks: what acts there does not come and go
 
 
-def best_gated(data: Data, without: Sequence[str] = ()) -> Judged | None:
+@dataclass(frozen=True)
+class Gated:
+    """An effect with its stretches and parameters, what it gains after all costs, and what the choice of them costs."""
+
+    name: str
+    terms: tuple[Term, ...]
+    gain: float
+    cost: float
+
+
+def best_gated(data: Data, without: Sequence[str] = ()) -> Gated | None:
     """The effect that explains most by acting in some stretches only; None where none gains anything."""
     judged = [j for name, variants in candidates.gated(without).items() for v in variants
               if (j := _judged(data, name, v)) is not None]
     return max(judged, key=lambda j: j.gain, default=None)
 
 
-def _judged(data: Data, name: str, terms: Sequence[Term]) -> Judged | None:
+def _judged(data: Data, name: str, terms: Sequence[Term]) -> Gated | None:
     whole = whole_of(data)
     problem = problem_of(data, whole)
     off = _each(data, whole, ())
@@ -64,7 +73,7 @@ def _judged(data: Data, name: str, terms: Sequence[Term]) -> Judged | None:
     free = sum(len(t.free) for t in gated)
     gained = judge(data, whole, refitted.terms) - judge(data, whole, ()) - cost
     gained -= 0.5 * free * np.log(blocks)
-    return Judged(name, refitted.terms, gained, (refitted, refitted), choice=cost, evidence=gained)
+    return Gated(name, refitted.terms, gained, cost)
 
 
 def _each(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:

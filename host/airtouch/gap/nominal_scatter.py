@@ -31,24 +31,26 @@ class Apparent:
     """One nominal flight held against others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
-    chance; rate: nats a second that a model without names gains.
+    chance; rate: nats a second that a model without names gains; passing: that the best effect does that comes and goes.
     """
 
     strengths: Mapping[str, np.ndarray]
     errors: Mapping[str, np.ndarray]
     rate: float
+    passing_rate: float = 0.0
 
 
 @dataclass(frozen=True)
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate: mean and standard deviation of the square root of the rate of the model without names.
+    rate, passing_rate: mean and standard deviation of the square root of each.
     """
 
     rms: Mapping[str, np.ndarray]
     freedom: float
     rate: tuple[float, float]
+    passing_rate: tuple[float, float] = (0.0, 0.0)
 
     def evidence(self, name: str, strength: np.ndarray) -> float:
         """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
@@ -62,13 +64,19 @@ class Scatter:
         return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
 
     def allowed(self, seconds: float, least: float) -> float:
-        """Log likelihood that a model without names may gain in a flight of so many seconds.
+        """Log likelihood that a model without names may gain in a nominal flight of so many seconds.
 
-        least: what would be news in a flight of a nominal rate, 0 nats; log rates scatter as Student's.
+        least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
         """
-        middle, spread = self.rate
+        return self._usual(self.rate, seconds, least)
+
+    def passing(self, seconds: float, least: float) -> float:
+        """The same of an effect that comes and goes."""
+        return self._usual(self.passing_rate, seconds, least)
+
+    def _usual(self, rate: tuple[float, float], seconds: float, least: float) -> float:
         sure = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
-        return least + seconds * (middle + min(sure, MOST_SURE) * spread) ** 2
+        return least + seconds * (rate[0] + min(sure, MOST_SURE) * rate[1]) ** 2
 
 
 def scatter_of(baseline: Sequence[Apparent]) -> Scatter:
@@ -87,10 +95,11 @@ def scatter_of(baseline: Sequence[Apparent]) -> Scatter:
     rms = {}
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
-        rms[name] = np.array([_likeliest(math.sqrt(wide) * _column(rows, name, "strengths", k),
+        rms[name] = prior if not rows else np.array([_likeliest(math.sqrt(wide) * _column(rows, name, "strengths", k),
                                          math.sqrt(wide) * _column(rows, name, "errors", k), p, worth)
                               for k, p in enumerate(prior)])
-    return Scatter(rms, worth + len(known), _rate(own, known, worth))
+    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth),
+                   _rate(own.passing_rate, [f.passing_rate for f in known], worth))
 
 
 def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
@@ -109,9 +118,10 @@ def _likeliest(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> 
     return float(GRID[int(np.argmax(level))])
 
 
-def _rate(own: Scatter, known: Sequence[Apparent], worth: float) -> tuple[float, float]:
-    middle, spread = own.rate
-    roots = np.minimum(np.sqrt([f.rate for f in known]) if known else np.zeros(0), middle + MOST_SURE * spread)
+def _rate(own: tuple[float, float], rates: Sequence[float], worth: float) -> tuple[float, float]:
+    """Mean and standard deviation of square roots of rates, from those of a class and those of the baseline (n,)."""
+    middle, spread = own
+    roots = np.minimum(np.sqrt(rates), middle + MOST_SURE * spread)
     total = worth + len(roots)
     mean = (worth * middle + roots.sum()) / total
     return float(max(mean, middle)), float(np.sqrt((worth * spread ** 2 + ((roots - mean) ** 2).sum()) / total))
@@ -135,7 +145,9 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     classes = list(classes)
     names = {n for c in classes for n in c.rms}
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
-    return Scatter(rms, min(c.freedom for c in classes), max((c.rate for c in classes), key=lambda r: r[0] + r[1]))
+    highest = lambda rates: max(rates, key=lambda r: r[0] + r[1])
+    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes),
+                   highest(c.passing_rate for c in classes))
 
 
 @cache
@@ -143,7 +155,7 @@ def table() -> dict[str, Scatter]:
     """The shipped classes of vehicles by name."""
     text = (resources.files("airtouch") / "gap" / "nominal_scatter.toml").read_text(encoding="utf-8")
     return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
-                          (entry["root_rate_mean"], entry["root_rate_sd"]))
+                          tuple(entry["root_rate"]), tuple(entry["root_passing_rate"]))
             for name, entry in tomllib.loads(text).items()}
 
 
@@ -157,6 +169,12 @@ def measured(flights: Sequence[Apparent]) -> Scatter:
         found = [_likeliest(_column(rows, name, "strengths", k), _column(rows, name, "errors", k), 0.0, 0.0)
                  for k in range(size)]
         rms[name] = np.array(found)
-    roots = np.sqrt([f.rate for f in flights])
-    middle = float(np.median(roots))
-    return Scatter(rms, float(len(flights)), (middle, 1.4826 * float(np.median(np.abs(roots - middle)))))
+    return Scatter(rms, float(len(flights)), _robust([f.rate for f in flights]),
+                   _robust([f.passing_rate for f in flights]))
+
+
+def _robust(rates: Sequence[float]) -> tuple[float, float]:
+    """Mean and standard deviation of square roots, the tenth that are largest cut to the rest (winsorised)."""
+    roots = np.sqrt(rates)
+    roots = np.minimum(roots, np.quantile(roots, 0.9))
+    return float(roots.mean()), float(roots.std(ddof=1))

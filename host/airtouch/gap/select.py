@@ -16,6 +16,7 @@ from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over, strength_variance
 from airtouch.gap.flight import PERIOD_S
+from airtouch.gap.gates import best_gated
 from airtouch.gap.generic import generic_gain
 from airtouch.gap.nominal_scatter import Apparent
 from airtouch.gap.problem import Part, whole_of
@@ -35,9 +36,8 @@ UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectrum is assumed, not measured
 MOST_EFFECTS = 3
-MOST_STEPS = 4  #: effects named, and deviations that nominal flights have as well
+MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
-GATED_SHARE = 0.5  #: of what a model without names gains, that an effect must gain by coming and going
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
@@ -146,7 +146,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
     """Judge every candidate, then add effects one by one while held-out data ask for them.
 
-    Where much is left, effects that come and go are tried in their place (gap.gates), but those of `without`.
+    Effects that come and go are tried first (gap.gates), but those of `without`.
     """
     parts = halves(data)
     base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]  # none, as sure of the commands' floor
@@ -155,39 +155,70 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     steps: list[Judged] = []
     least = {name: needed(data, j.terms) for name, j in singles.items()}
     tried, need = singles, least
-    while sum(s.named for s in steps) < MOST_EFFECTS and len(steps) < MOST_STEPS:
+    passing = _passing(data, parts, base, singles, least, without)
+    if passing is not None:
+        steps, least = [passing], {**least, passing.name: passing.evidence}
+        singles = {**singles, passing.name: passing}
+        tried, need = _beside(data, parts, base, screen, candidates, steps, singles, progress)
+    while sum(s.named for s in steps) < MOST_EFFECTS:
         so_far = steps[-1].gain if steps else 0.0
-        best = _best_of({n: j for n, j in tried.items() if j.gain - so_far >= need[n]})
+        enough = {n: j for n, j in tried.items() if j.gain - so_far >= need[n]}
+        if sum(not s.named for s in steps) == MOST_DEVIATIONS:
+            enough = {n: j for n, j in enough.items() if j.evidence >= need[n]}
+        best = _best_of(enough)
         if best is None:
             break
         if not any(s.named for s in steps):  # what nominal flights have as well stands beside every candidate
             singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
         steps.append(replace(best, named=best.evidence >= need[best.name]))
-        if sum(s.named for s in steps) < MOST_EFFECTS and len(steps) < MOST_STEPS:
-            tried = _round(data, parts, base, screen, candidates, steps[-1], progress)
-            named = any(s.named for s in steps)
-            need = {n: _needed_beside(data, steps[-1], j) if named else needed(data, j.terms[len(steps[-1].terms):])
-                    for n, j in tried.items()}
+        if sum(s.named for s in steps) < MOST_EFFECTS:
+            tried, need = _beside(data, parts, base, screen, candidates, steps, singles, progress)
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
-    if data.study.scatter is not None and after >= max(_usual(data), UNKNOWN_GAIN):
-        from airtouch.gap.gates import best_gated  # it judges by this module's means
-
-        gated = best_gated(data, without)
-        so_far = steps[-1].gain if steps else 0.0
-        if gated is not None and gated.gain > max(so_far, GATED_SHARE * before) + LEAST_GAIN:
-            steps, singles[gated.name] = [gated], gated
-            least[gated.name] = LEAST_GAIN
-            after = _nameless(data, parts, gated)
     last = steps[-1].terms if steps else ()
     return Selection(singles, tuple(steps), before, after, parts, least, data.study.nominal, _assumes(data, last),
                      _usual(data))
 
 
+def _passing(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], singles: Mapping[str, Judged],
+             least: Mapping[str, float], without: Sequence[str]) -> Judged | None:
+    """An effect that comes and goes, where it explains more than one that always acts and more than it does in
+
+    nominal flights; None where none does.
+    """
+    if data.study.scatter is None:
+        return None
+    gated = best_gated(data, without)
+    steady = max((j.gain for n, j in singles.items() if j.evidence >= least[n]), default=0.0)
+    if gated is None or gated.gain < data.study.scatter.passing(_seconds(data), LEAST_GAIN) or gated.gain < steady:
+        return None
+    crossed = _crossed(data, parts, base, gated.name, (), gated.terms, None, gated.cost)
+    return replace(crossed, evidence=gated.gain)
+
+
+def _beside(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], screen: Screen,
+            candidates: Mapping[str, Sequence[Hypothesis]], steps: Sequence[Judged], first: Mapping[str, Judged],
+            progress: Callable[[str], None]) -> tuple[dict[str, Judged], dict[str, float]]:
+    """Candidates judged beside the steps so far, and the gain that each needs.
+
+    Beside a deviation of nominal flights only those are judged that gained something without it.
+    """
+    named = any(s.named for s in steps)
+    worth = candidates if named else {n: v for n, v in candidates.items() if n not in first or first[n].gain > 0.0}
+    tried = _round(data, parts, base, screen, worth, steps[-1], progress)
+    need = {n: _needed_beside(data, steps[-1], j) if named else needed(data, j.terms[len(steps[-1].terms):])
+            for n, j in tried.items()}
+    return tried, need
+
+
+def _seconds(data: Data) -> float:
+    return sum(len(f) for f in data.flights) * PERIOD_S
+
+
 def _usual(data: Data) -> float:
     """Log likelihood that a model without names gains in nominal flights as long as these."""
     scatter = data.study.scatter
-    return scatter.allowed(sum(len(f) for f in data.flights) * PERIOD_S, UNKNOWN_GAIN) if scatter else 0.0
+    return scatter.allowed(_seconds(data), UNKNOWN_GAIN) if scatter else 0.0
 
 
 def apparent(data: Data) -> Apparent:
@@ -195,10 +226,10 @@ def apparent(data: Data) -> Apparent:
     parts = halves(data)
     base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]
     singles = _round(data, parts, base, Screen(data), every(), None, lambda _: None)
-    seconds = sum(len(f) for f in data.flights) * PERIOD_S
+    gated = best_gated(data)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                    _nameless(data, parts, None) / seconds)
+                    _nameless(data, parts, None) / _seconds(data), max(gated.gain, 0.0) / _seconds(data) if gated else 0.0)
 
 
 def _error(data: Data, judged: Judged) -> np.ndarray:
@@ -404,7 +435,7 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
     """Score of every single candidate beside 0 for `none`; those that could be named keep the order of their gains."""
     singles, least = selection.singles, selection.least
     out = {n: _against_none(singles[n].evidence, least[n], len(names)) for n in names}
-    if selection.named:
+    if selection.named and selection.named[0].name in names:
         first = selection.named[0]
         for n in names:
             if out[n] >= 0.0:
