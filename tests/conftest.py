@@ -1,22 +1,29 @@
 """What every test may ask for."""
 
 import os
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: tests run beside one another
 
 import pytest
+import skips
 from hypothesis import settings
+from skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401
 
 settings.register_profile("reproducible", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
 
 
+def pytest_configure(config):
+    """The simulator is compiled once, before several workers would each do so."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        import airtouch.simulation.batch
+        import airtouch.simulation.replay  # noqa: F401
+
 
 @pytest.fixture(scope="session")
-def flights() -> Path:
+def flights():
     """The folder of recorded flights; tests that need it skip where it is absent."""
-    folder = Path(os.environ.get("AIRTOUCH_FLIGHTS", Path(__file__).parents[2] / "shared" / "flights"))
+    folder = skips.folder()
     if not folder.is_dir():
         pytest.skip(f"no recorded flights at {folder}; set AIRTOUCH_FLIGHTS")
     return folder

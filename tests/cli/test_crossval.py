@@ -59,12 +59,12 @@ def test_a_damaged_cache_is_done_again(generated, tmp_path):
 
 def test_the_cache_changes_with_the_conditions(generated, tmp_path):
     folder = shutil.copytree(generated, tmp_path / "copy")
-    before = crossval.cache_key("baseline", dataset.collect([folder]), 0, 0, {})
+    before = crossval.cache_key("baseline", (files := dataset.collect([folder])), files[:2], 0, {})
     manifest = folder / "manifest.csv"
     first = manifest.read_text().splitlines()[1]
     manifest.write_text(manifest.read_text().replace(first, first.replace(",low,", ",high,")))
-    assert crossval.cache_key("baseline", dataset.collect([folder]), 0, 0, {}) != before
-    assert crossval.cache_key("baseline", dataset.collect([generated]), 1, 0, {}) != before
+    assert crossval.cache_key("baseline", (files := dataset.collect([folder])), files[:2], 0, {}) != before
+    assert crossval.cache_key("baseline", (files := dataset.collect([generated])), files[2:], 0, {}) != before
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [(",clean,1,", ",clean,0,", "two folds"), (",clean,1,", ",clean,,", "no fold")])

@@ -116,3 +116,27 @@ def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple
     result = train(*arguments, "--out", tmp_path / "m.npz")
     assert result.exit_code != 0 and not (tmp_path / "m.npz").exists()
     assert said in (str(result.exception) + result.output)
+
+
+def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path) -> None:
+    from made_flight import SMALL, made_flight
+
+    from airtouch import logs
+    from airtouch.detector import best
+
+    for folder, count in (("mine", 3), ("calm", 1)):
+        (tmp_path / folder).mkdir()
+        for i in range(count):
+            log = made_flight(i)
+            if folder == "calm":
+                log.columns["zrange_m"][:] = 0.8
+            logs.write(log, tmp_path / folder / f"f{i}.csv")
+    best.fit([made_flight(8)], recipe=SMALL, steps=5).save(tmp_path / "old.npz")
+    result = train(tmp_path / "mine", "--start", tmp_path / "old.npz", "--labelled", 2, "--free-air", tmp_path / "calm",
+                   "--steps", 5, "--out", tmp_path / "new.npz")
+    assert result.exit_code == 0, result.output
+    assert "trained on 2 flights" in result.output
+    metadata = best.load(tmp_path / "new.npz").metadata
+    assert len(metadata["flights"]) == 3 and metadata["free_air"] == 1
+    refused = train(tmp_path / "mine", "--detector", "paper", "--labelled", 2, "--out", tmp_path / "m.npz")
+    assert refused.exit_code == 2 and "for --detector best" in refused.output

@@ -9,16 +9,29 @@ import click
 
 from airtouch.cli import scores as show
 from airtouch.cli.flights import need_flights
-from airtouch.detector import crossval, dataset, evaluate
+from airtouch.detector import crossval, dataset, evaluate, sensors
+from airtouch.detector import folds as folds_of
+from airtouch.detector import free_air as free_air_flights
 
 
 @click.command(name="crossval")
-@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
               help="Drop edges without an FR-CFAR alert.")
 @click.option("--epochs", type=click.IntRange(1),
               help="Training epochs; the detector's own number if left out.")
+@click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
+@click.option("--by", type=click.Choice(["fold", "day"]), default="fold", show_default=True,
+              help="What is held out together: the manifest's folds, or whole days in five groups.")
+@click.option("--without", metavar="GROUP", help="One split only: the flights of the folder or day GROUP are scored by "
+              "a model of all others.")
+@click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
+              help="best: take this sensor from the flights that are scored.")
+@click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
+              help="best: train on the flights of this folder too; nothing there is an edge. May be repeated.")
+@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+              help="Commanded speed of flights whose manifest does not say.")
 @click.option("--seed", default=0, show_default=True, help="Of training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")
@@ -30,28 +43,36 @@ from airtouch.detector import crossval, dataset, evaluate
 @click.option("--force", is_flag=True, help="Replace the JSON file.")
 @click.option("--ledger", type=click.Path(path_type=Path),
               help="Append a line to this file: how often the folds were looked at.")
-def command(folder: Path | None, detector: str, physical_filter: bool, epochs: int | None, seed: int,
-            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
+def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epochs: int | None, steps: int | None,
+            by: str, without: str | None, silence: tuple[str, ...], free_air: tuple[Path, ...], speed: float | None,
+            seed: int, random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
             ledger: Path | None) -> None:
-    """Cross-validate a detector over the folds of FOLDER's manifest.csv, split by flight.
+    """Cross-validate a detector over FLIGHTS, folders with a manifest.csv, split by flight.
 
-    Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
+    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
     training flights of each fold alone. Exit code 2 when a flight was left out.
     """
     show.check_free(json_path, force)
-    files = dataset.collect([need_flights(folder)])
-    options = {} if epochs is None else {"epochs": epochs}
+    if detector != "best" and (steps or silence or free_air):
+        raise click.UsageError("--steps, --silence and --free-air are for --detector best")
+    files = dataset.collect(flights or [need_flights()], speed)
+    split = folds_of.only(files, without) if without else folds_of.by_day(files) if by == "day" else None
+    options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}
+    air = free_air_flights.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True)) if free_air else ()
     scores, folds, left_out = crossval.crossval(
-        detector, files, out, seed=seed, options=options, physical_filter=physical_filter,
-        tell=lambda line: click.echo(line, err=True))
+        detector, files, out, folds=split, seed=seed, options=options, physical_filter=physical_filter,
+        silenced=silence, free_air=air, tell=lambda line: click.echo(line, err=True))
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
-    title = detector if physical_filter else f"{detector}, physical filter off"
+    title = ", ".join([detector, *([] if physical_filter else ["physical filter off"]),
+                       *(f"no {sensor}" for sensor in silence), *([f"trained without {without}"] if without else []),
+                       *(["whole days held out"] if by == "day" and not without else []),
+                       *([f"{len(air)} flights in free air"] if air else [])])
     result = evaluate.as_json(title, scores, left_out, [f["lag_s"] for f in folds], {})
     result["folds"] = folds
     screen = show.console()
     screen.print(show.table({title: result, **result["by_height"]},
-                            f"{title}: {len(folds)} folds by flight, seed {seed}"))
+                            f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}"))
     if random_windows:
         leak = crossval.random_windows(files, seed=seed, epochs=random_epochs)
         result["random_windows"] = leak

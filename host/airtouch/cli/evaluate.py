@@ -45,6 +45,10 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
                 screen.print(show.table(result[f"by_{what}"], f"by {what}"))
         for name in sorted({s.note for s in scores if s.note}):
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
+    trained_on = len(result["in_training"])
+    if trained_on:
+        screen.print(f"warning: the model was trained on {trained_on} of these {len(scores)} flights; how it does on others "
+                     "is what airtouch crossval says")
     if json_path:
         show.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")

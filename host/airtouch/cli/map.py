@@ -49,8 +49,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     if truth:
         found, lag, model_sigma = logs.true_edges(log), 0.0, 0.01
     else:
-        evaluate.check(log)
         module = registry.get(detector)
+        evaluate.check(log, evaluate.spare_of(module))
         trained = module.load(model)
         found, lag = module.run(log, trained).edges, module.lag_s(trained)
         model_sigma = getattr(trained, "metadata", {}).get("sigma_s", edge_map.ASSUMED_SIGMA_S)

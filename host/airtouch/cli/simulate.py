@@ -19,6 +19,8 @@ def _list_effects(ctx: click.Context, _: click.Parameter, value: bool) -> None:
         for p in effect.parameters:
             unit = "" if p.unit == "1" else f" {p.unit}"
             click.echo(f"    {p.name} = {p.default:g}{unit}  ({p.low:g} to {p.high:g}{unit}) {p.summary}")
+        for name, values in effect.presets.items():
+            click.echo(f"    preset={name}: " + ", ".join(f"{k} = {v:g}" for k, v in values.items()))
     ctx.exit()
 
 

@@ -15,6 +15,7 @@ from airtouch import logs
 from airtouch.cli.flights import need_flights
 from airtouch.cli.scores import check_free
 from airtouch.detector import dataset, evaluate, registry
+from airtouch.detector import free_air as air
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
@@ -26,6 +27,12 @@ from airtouch.logs.flight_log import FlightLog
               help="Model file to write.")
 @click.option("--epochs", type=click.IntRange(1), help="paper: at most so many; its own number if left out.")
 @click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
+@click.option("--start", type=click.Path(path_type=Path), metavar="MODEL.npz",
+              help="best: go on from this model instead of from nothing; 300 steps unless --steps says otherwise.")
+@click.option("--labelled", type=click.IntRange(1), metavar="K",
+              help="best: train on K of the flights only, drawn by --seed.")
+@click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
+              help="best: the flights of this folder too; nothing there is an edge. May be repeated.")
 @click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
               help="Share of zeros: paper, in the first dense layer; best, in the dilated layers.")
 @click.option("--block", type=click.Choice(["1", "4"]),
@@ -39,7 +46,8 @@ from airtouch.logs.flight_log import FlightLog
               help="Fixes every bit of the result on one machine, simulated flights included.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
-            sparsity: float | None, block: str | None, df_lambda: float | None, simulated: int | None,
+            start: Path | None, labelled: int | None, free_air: tuple[Path, ...], sparsity: float | None,
+            block: str | None, df_lambda: float | None, simulated: int | None,
             scenario: str | None, without: tuple[str, ...], seed: int, force: bool) -> None:
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
 
@@ -51,17 +59,23 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         raise click.UsageError("either FLIGHTS or --simulated, not both")
     if not simulated and (scenario or without):
         raise click.UsageError("--scenario and --without need --simulated N")
+    if detector != "best" and (start or labelled or free_air):
+        raise click.UsageError("--start, --labelled and --free-air are for --detector best")
     check_free(out, force)
     module = registry.get(detector)
     if detector == "baseline":
         raise AirTouchError("baseline has nothing to train; --detector best or paper")
     given = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
-             "df_lambda": df_lambda}
+             "df_lambda": df_lambda, "most_flights": labelled}
     options = {name: value for name, value in given.items() if value is not None}
     what: dict[str, Any] | None = None
-    start = time.monotonic()
+    if start:
+        options["start"] = module.load(start)
+    if free_air:
+        options["free_air"] = air.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True))
+    began = time.monotonic()
     if not simulated:
-        chosen, failures = _read(flights)
+        chosen, failures = _read(flights, evaluate.spare_of(module))
     with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
                   TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
         tasks: dict[str, int] = {}
@@ -78,20 +92,20 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)
-    _report(model.metadata, time.monotonic() - start)
+    _report(model.metadata, time.monotonic() - began)
     click.echo(f"written: {out} ({out.stat().st_size} bytes)")
     if failures:
         click.echo(f"airtouch: {len(chosen)} flights used, {failures} left out (see above)", err=True)
         sys.exit(2)
 
 
-def _read(paths: tuple[Path, ...]) -> tuple[list[FlightLog], int]:
-    """The logs that can be trained on, and how many could not."""
+def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
+    """The logs that can be trained on with `spare` sensors missing, and how many could not."""
     chosen, failures = [], 0
     for file in dataset.collect(paths or (need_flights(),)):
         try:
             log = logs.read(file.path)
-            evaluate.check(log)
+            evaluate.check(log, spare)
             if evaluate.truth(log) is None:
                 raise AirTouchError(f"{file.path}: no down range in this log, so no truth to train on")
             chosen.append(log)
@@ -114,7 +128,7 @@ def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: 
 
 def _report(metadata: dict, seconds: float) -> None:
     held = set(metadata.get("held_out", ()))
-    fitted = [name for name in metadata["flights"] if name not in held]
+    fitted = [name for name in metadata["flights"][metadata.get("flights_before", 0):] if name not in held]
     click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
     if held:
         click.echo(f"held out ({len(held)}): {', '.join(sorted(held))}")

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from airtouch import __version__, kernels, logs
-from airtouch.detector import tuning
-from airtouch.detector.channels import level_acceleration, nine_channels
+from airtouch.detector import evaluate, sensors, training_set, tuning
+from airtouch.detector.score import SAMPLE_PERIOD_S
+from airtouch.detector.channels import nine_channels
 from airtouch.detector.stream import model as model_file
-from airtouch.detector.stream.batches import channels_of
+from airtouch.detector.stream.batches import channels_of, flight_of
 from airtouch.detector.stream.float_network import float_logits
 from airtouch.detector.stream.model import StreamModel
 from airtouch.detector.stream.recipe import STRIDE, Recipe
@@ -25,7 +26,7 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream_detector import StreamEvents
-from airtouch.logs.flight_log import GYRO, PWM, FlightLog
+from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.edge_decoder import DecoderConfig
 
 #: Chosen once over the five folds, by tools/choose_decoder.py with models of three seeds (host/docs/looks.md).
@@ -33,6 +34,9 @@ DECODER = DecoderConfig(over_share=0.3, entry_score=2.3, exit_score=1.1, late_en
                         smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20)
 #: rms timing error of held-out flights with these settings, three seeds (printed by the same tool); for maps.
 TIMING_SIGMA_S = 0.10
+#: Changes to a model's recipe where training goes on from it.
+FINE_TUNING = {"steps": 300, "peak_rate": 1e-3}
+SPARE_SENSORS = 1  #: of acceleration, rates and motors, one may be missing
 KINDS = {1: "entry", 2: "exit"}
 
 #: progress(stage, done, total, note), stage "features" (flights) or "steps"
@@ -40,7 +44,10 @@ Progress = Callable[[str, int, int, str], None]
 
 
 def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
-    """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
+    """P(over a platform) and edges of one flight, by the sensors that the log has; None is the shipped model.
+
+    Raises AirTouchError, naming columns, where more than one of acceleration, rates and motors is missing.
+    """
     model = model or load(None)
     events = flight_events(log, model)
     return trace_of(log, model, events.logits, events.edge, events.airborne)
@@ -60,51 +67,83 @@ def trace_of(log: FlightLog, model: StreamModel, logits: np.ndarray, edge: np.nd
     over, *crossing = (1.0 / (1.0 + np.exp(-logits.astype(np.float64)))).T
     recent = (model.decoder.hold_steps + model.decoder.look_back) * STRIDE
     edges = []
+    absent = sensors.missing(log)
     for i in np.flatnonzero(edge):
         kind = int(edge[i])
         edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
-    return Trace(np.where(airborne, over, 0.0), edges, {"channels": nine_channels(log), "logits": logits})
+    signals = {"logits": logits} if absent else {"channels": nine_channels(log), "logits": logits}
+    return Trace(np.where(airborne, over, 0.0), edges, signals, f"no {absent[0]} in this log" if absent else "")
 
 
 def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:
     """One flight through the C detector."""
-    return kernels.stream_detector(level_acceleration(log), log.stack(GYRO), log.stack(PWM), model.int8,
-                                   model.recipe.motion, model.decoder)
+    logged = sensors.signals(log)
+    return kernels.stream_detector(logged.acc, logged.gyro, logged.pwm, model.int8,
+                                   sensors.silenced(model.recipe.motion, logged.missing), model.decoder)
 
 
 def fit(
-    flights: Sequence[FlightLog], seed: int = 0, *, recipe: Recipe | None = None, decoder: DecoderConfig = DECODER,
-    most_flights: int | None = None, progress: Progress | None = None,
-    command: str = "airtouch.detector.best.fit", **changes: Any
+    flights: Sequence[FlightLog], seed: int = 0, *, start: StreamModel | None = None,
+    pseudo_labels: Sequence[Sequence[logs.Edge] | None] | None = None, free_air: Sequence[FlightLog] = (),
+    recipe: Recipe | None = None, decoder: DecoderConfig | None = None, most_flights: int | None = None,
+    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", **changes: Any
 ) -> StreamModel:
     """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
 
-    recipe: shape and training, changed by `changes` (fields of `Recipe`). decoder: its settings.
-    most_flights: train on so many at most, drawn by seed.
+    flights: 100 Hz logs, labelled by their own down range. pseudo_labels: one entry a flight, its edges, or None where
+    the down range labels it (`pseudo_labels` below makes them). start: a model to go on from: same network, its zeros
+    stay, FINE_TUNING in place of a full training. free_air: flights without edges (`free_air.read`).
+    recipe: shape and training, changed by `changes` (fields of `Recipe`: steps, peak_rate, ...). decoder: its settings;
+    `start`'s, else DECODER. most_flights: train on so many at most, drawn by seed. A sensor that no flight has is
+    silent for good. The flights' names and hashes go into the model's metadata.
     Raises AirTouchError without TensorFlow, without flights with edges and for unknown fields.
     """
-    from airtouch.detector.stream import batches, quantisation, training
+    from airtouch.detector.stream import quantisation, training
     from airtouch.detector.train import use_tensorflow
 
     told = progress or (lambda *_: None)
-    recipe = _changed(recipe or Recipe(), changes)
+    labels = list(pseudo_labels) if pseudo_labels is not None else [None] * len(flights)
+    if len(labels) != len(flights):
+        raise AirTouchError(f"training: {len(labels)} pseudo-labels for {len(flights)} flights; give one a flight")
+    if recipe is None:
+        recipe = replace(start.recipe, **FINE_TUNING) if start else Recipe()
+    recipe = _changed(recipe, changes)
     use_tensorflow(seed)
     if most_flights is not None and most_flights < len(flights):
-        drawn = np.random.default_rng(seed).permutation(len(flights))[:most_flights]
-        flights = [flights[i] for i in sorted(drawn)]
+        drawn = sorted(np.random.default_rng(seed).permutation(len(flights))[:most_flights])
+        flights, labels = [flights[i] for i in drawn], [labels[i] for i in drawn]
+    recipe = replace(recipe, muted=tuple(sorted({*recipe.muted, *sensors.silent_in_all(flights)})))
+    if start is not None and start.recipe.weight_shapes() != recipe.weight_shapes():
+        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations alone")
     prepared = []
-    for i, log in enumerate(flights):
-        prepared.append(batches.flight_of(log, recipe))
+    for i, (log, edges) in enumerate(zip(flights, labels)):
+        prepared.append(flight_of(log, recipe, edges))
         told("features", i + 1, len(flights), os.path.basename(log.source))
     if not sum(len(f.edges) for f in prepared):
         raise AirTouchError("training: the flights hold no edges; give flights over a platform, with down range")
-    weights = training.fit(prepared, recipe, seed, lambda done, total, note: told("steps", done, total, note))
+    weights = training.fit(prepared, recipe, seed, lambda done, total, note: told("steps", done, total, note),
+                           free_air=[flight_of(log, recipe, ()) for log in free_air],
+                           start=start.weights if start else None)
     int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in prepared], recipe))
+    decoder = decoder or (start.decoder if start else DECODER)
     model = StreamModel(recipe, weights, int8, tflite, {
         "detector": "best", "version": __version__, "command": command, "seed": seed, "lag_s": 0.0,
-        "sigma_s": TIMING_SIGMA_S, "decoder": asdict(decoder), "flights": [os.path.basename(log.source) for log in flights]})
-    found = [(logs.true_edges(log), run(log, model).edges) for log in flights]
+        "sigma_s": TIMING_SIGMA_S, "decoder": asdict(decoder), **training_set.of(flights, start),
+        "free_air": len(free_air)})
+    found = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
+             for log, edges in zip(flights, labels)]
     return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(found)})
+
+
+def pseudo_labels(flights: Sequence[FlightLog], model: StreamModel) -> list[list[logs.Edge] | None]:
+    """For `fit`: None for a flight whose down range labels it, else the edges that the model detects, without its lag.
+
+    Their heights are NaN, for they are not known.
+    """
+    lag = round(lag_s(model) / SAMPLE_PERIOD_S)
+    return [None if evaluate.truth(log) is not None else
+            [logs.Edge(max(edge.sample - lag, 0), edge.kind, np.nan, np.nan) for edge in run(log, model).edges]
+            for log in flights]
 
 
 def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:

@@ -1,11 +1,14 @@
 """The nine channels of the paper (section 4.2) out of a flight log."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
 
+ACCELERATIONS, RATES, DIFFERENCES = ("ax", "ay", "az"), ("gyro x", "gyro y", "gyro z"), ("m2-m1", "m3-m1", "m4-m1")
 #: Names of the columns of `nine_channels`.
-NAMES = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "m2-m1", "m3-m1", "m4-m1")
+NAMES = (*ACCELERATIONS, *RATES, *DIFFERENCES)
 
 
 def nine_channels(log: FlightLog) -> np.ndarray:
@@ -15,10 +18,28 @@ def nine_channels(log: FlightLog) -> np.ndarray:
     about body axes, motor differences PWM (0..65535) against motor 1.
     Raises AirTouchError that names the columns which the log lacks.
     """
-    gyro = log.stack(GYRO)
-    pwm = log.stack(PWM)
-    channels = np.hstack([level_acceleration(log), gyro, pwm[:, 1:] - pwm[:, :1]])
-    return channels.astype(np.float32)
+    return logged_channels(log, ())[1]
+
+
+def logged_channels(log: FlightLog, missing: Collection[str]) -> tuple[list[str], np.ndarray]:
+    """Names (k) and values (n, k) float32 of those of the nine channels whose sensor is not missing.
+
+    missing: of "acceleration", "rates", "motors" (`sensors.missing`). Raises AirTouchError that names the columns
+    which the log lacks of the others.
+    """
+    names: list[str] = []
+    parts = [np.empty((len(log), 0))]
+    if "acceleration" not in missing:
+        names += ACCELERATIONS
+        parts.append(level_acceleration(log))
+    if "rates" not in missing:
+        names += RATES
+        parts.append(log.stack(GYRO))
+    if "motors" not in missing:
+        pwm = log.stack(PWM)
+        names += DIFFERENCES
+        parts.append(pwm[:, 1:] - pwm[:, :1])
+    return names, np.hstack(parts).astype(np.float32)
 
 
 def level_acceleration(log: FlightLog) -> np.ndarray:

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from airtouch import __version__
-from airtouch.detector import evaluate
+from airtouch.detector import evaluate, sensors, training_set
 from airtouch.detector.dataset import FlightFile
+from airtouch.detector.folds import Folds, by_fold
 from airtouch.detector.registry import Detector, get
 from airtouch.detector.score import FlightScore
 from airtouch.errors import AirTouchError
@@ -22,59 +23,55 @@ from airtouch.logs.flight_log import FlightLog
 Tell = Callable[[str], None]
 
 
-def folds_of(files: Sequence[FlightFile]) -> dict[int, list[FlightFile]]:
-    """Fold -> its flights. Raises AirTouchError for flights without a fold or with fewer than two folds."""
-    folds: dict[int, list[FlightFile]] = {}
-    for file in files:
-        if file.condition.fold is None:
-            raise AirTouchError(f"{file.path}: no fold in the manifest beside it; "
-                                "add a column 'fold' (0, 1, ...)")
-        folds.setdefault(file.condition.fold, []).append(file)
-    if len(folds) < 2:
-        raise AirTouchError("cross-validation needs at least two folds; the manifest's column 'fold' has "
-                            f"{len(folds)}")
-    return dict(sorted(folds.items()))
-
-
 def crossval(
     name: str,
     files: Sequence[FlightFile],
     out: Path,
     *,
+    folds: Folds | None = None,
     seed: int = 0,
     options: dict[str, Any] | None = None,
     physical_filter: bool = True,
+    silenced: tuple[str, ...] = (),
+    free_air: Sequence[FlightLog] = (),
     detector: Detector | None = None,
     tell: Tell = lambda _: None,
 ) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
     """(scores of all flights, one entry a fold, flights left out).
 
     Finished folds are kept in `out` and not done again for the same flights, settings and version.
-    options go to the detector's `fit`. physical_filter False chooses the decoding again without it.
+    folds: which flights are held out together (`detector.folds`), the manifest's folds if left out. options go to the
+    detector's `fit`. physical_filter False chooses the decoding again without it. silenced: sensors that are taken
+    from the flights that are scored, not from those trained on. free_air: flights without edges to train on too.
     detector: one that is not registered, under the name given.
     """
     detector = detector or get(name)
     if not physical_filter and not hasattr(detector, "retune"):
         raise AirTouchError(f"{name} has no physical filter to switch off")
-    folds = folds_of(files)
+    folds = by_fold(files) if folds is None else folds
     out.mkdir(parents=True, exist_ok=True)
-    readable, left_out = readable_flights(files)
+    readable, left_out = readable_flights(files, evaluate.spare_of(detector))
     scores: list[FlightScore] = []
     entries: list[dict[str, Any]] = []
+    shown = {**(options or {}), **({"free_air": [training_set.flight_hash(log) for log in free_air]} if free_air else {})}
+    given = {**(options or {}), **({"free_air": free_air} if free_air else {})}
     for fold, members in folds.items():
+        held = {f.path for f in members}
         test = [f for f in members if f.path in readable]
-        train = [readable[f.path] for f in files if f.path in readable and f.condition.fold != fold]
-        key = cache_key(name, files, fold, seed, options or {})
-        cache = out / f"{name}{'' if physical_filter else '-unfiltered'}_fold{fold}_{key}.json"
+        train = [readable[f.path] for f in files if f.path in readable and f.path not in held]
+        key = cache_key(name, files, members, seed, shown)
+        variant = "".join(("" if physical_filter else "-unfiltered", *(f"-no-{sensor}" for sensor in silenced)))
+        cache = out / f"{name}{variant}_fold{fold}_{key}.json"
         entry = cached(cache)
         if entry is None:
             tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
             started = time.monotonic()
             kept = out / f"{name}_fold{fold}_{key}.npz"
-            model = model_of_fold(detector, train, kept, seed, options or {})
+            model = model_of_fold(detector, train, kept, seed, given)
             if not physical_filter:
                 model = detector.retune(model, train, False)
-            results = [evaluate.evaluate_flight(f, readable[f.path], detector, model).score for f in test]
+            results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], silenced), detector, model).score
+                       for f in test]
             entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
                      "seconds": round(time.monotonic() - started, 1),
                      "per_flight": [s.as_dict() for s in results]}
@@ -86,13 +83,14 @@ def crossval(
     return scores, entries, left_out
 
 
-def readable_flights(files: Sequence[FlightFile]) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
-    """Logs by path, and those that cannot be used with the reason."""
+def readable_flights(files: Sequence[FlightFile],
+                     spare: int = 0) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
+    """Logs by path, and those that cannot be used with the reason; `spare` sensors may be missing."""
     logs: dict[Path, FlightLog] = {}
     left_out = []
     for file in files:
         try:
-            log = evaluate.read_flight(file)
+            log = evaluate.read_flight(file, spare)
             if evaluate.truth(log) is None:
                 raise AirTouchError(f"{file.path}: no down range in this log, so no true edges to train on")
             logs[file.path] = log
@@ -136,13 +134,14 @@ def random_windows(files: Sequence[FlightFile], *, seed: int = 0, epochs: int = 
             "windows": int(test.sum()), "epochs": epochs}
 
 
-def cache_key(name: str, files: Sequence[FlightFile], fold: int, seed: int, options: dict[str, Any]) -> str:
+def cache_key(name: str, files: Sequence[FlightFile], held: Sequence[FlightFile], seed: int,
+              options: dict[str, Any]) -> str:
     """Twelve hexadecimal digits that change with anything a fold's result depends on."""
-    total = hashlib.sha256(f"{__version__} {name} {fold} {seed} {sorted(options.items())}".encode())
+    total = hashlib.sha256(f"{__version__} {name} {seed} {sorted(options.items())}".encode())
     for file in files:
         stat = os.stat(file.path) if file.path.exists() else None
         content = stat and (stat.st_size, stat.st_mtime_ns)
-        total.update(f"{file.path.name} {file.condition} {content}".encode())
+        total.update(f"{file.path.name} {file.condition} {content} {file in held}".encode())
     return total.hexdigest()[:12]
 
 

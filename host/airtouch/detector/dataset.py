@@ -1,6 +1,7 @@
 """Which flights, under which conditions: `manifest.csv` beside them."""
 
 import csv
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +19,7 @@ class Condition:
     use: "clean" or "messy". fold: cross-validation fold. height: class of height
     over the platform. angle_deg: between the path and the edge's normal. wind:
     where a fan blew. speed_mps: commanded speed, turns seconds into metres.
+    day: when it was flown; flights of one day share battery, tape and trim.
     """
 
     use: str | None = None
@@ -26,6 +28,7 @@ class Condition:
     angle_deg: float | None = None
     wind: str | None = None
     speed_mps: float | None = None
+    day: str | None = None
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class FlightFile:
 def read_manifest(path: Path) -> dict[str, Condition]:
     """File name -> condition, in the manifest's order.
 
-    Columns used: file (needed), use, fold, height, angle_deg, wind, speed_mps; others
+    Columns used: file (needed), use, fold, height, angle_deg, wind, speed_mps, day; others
     are ignored, empty cells are None. Raises AirTouchError with file, line and remedy.
     """
     try:
@@ -82,10 +85,18 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
         files = _flights_of(path, listed) if path.is_dir() else [path]
         for file in files:
             condition = listed.get(file.name, Condition())
+            if condition.day is None:
+                condition = replace(condition, day=day_of(file))
             if condition.speed_mps is None and speed_mps is not None:
                 condition = replace(condition, speed_mps=speed_mps)
             found.setdefault(file.resolve(), FlightFile(file, condition))
     return list(found.values())
+
+
+def day_of(path: Path) -> str | None:
+    """The day in a file's name, four digits before four of the time (`imu_data_0126-1906`), or None."""
+    found = re.search(r"(\d{4})-\d{4}", path.name)
+    return found.group(1) if found else None
 
 
 def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
@@ -114,4 +125,4 @@ def _condition(row: dict[str, str | None], place: str) -> Condition:
     if speed is not None and not 0 < speed < 100:
         raise AirTouchError(f"{place}: speed_mps is {speed:g}, it must be above 0 and below 100")
     return Condition(text("use"), number("fold", int), text("height"), number("angle_deg"), text("wind"),
-                     speed)
+                     speed, text("day"))

@@ -1,14 +1,14 @@
 """A detector over many flights: bad ones set aside, the others scored."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from airtouch import logs
-from airtouch.detector import summary
-from airtouch.detector.channels import NAMES, nine_channels
+from airtouch.detector import sensors, summary, training_set
+from airtouch.detector.channels import ACCELERATIONS, RATES, logged_channels
 from airtouch.detector.dataset import FlightFile
 from airtouch.detector.registry import Detector
 from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore, score_flight
@@ -30,28 +30,35 @@ class Result:
     score: FlightScore
 
 
-def read_flight(file: FlightFile) -> FlightLog:
-    """A log that can be scored. Raises AirTouchError with the reason and the remedy."""
+def read_flight(file: FlightFile, spare: int = 0) -> FlightLog:
+    """A log that can be scored; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
     log = logs.read(file.path)
-    check(log)
+    check(log, spare)
     if truth(log) and file.condition.speed_mps is None:
         raise AirTouchError(f"{file.path}: speed unknown, so errors in metres are too: "
                             "give --speed, or speed_mps in a manifest.csv beside the flight")
     return log
 
 
-def check(log: FlightLog) -> None:
-    """Raise AirTouchError, one line, for a log that no detector can use."""
+def spare_of(detector: Detector) -> int:
+    """How many of the three sensors a detector can do without: its SPARE_SENSORS, else none."""
+    return getattr(detector, "SPARE_SENSORS", 0)
+
+
+def check(log: FlightLog, spare: int = 0) -> None:
+    """Raise AirTouchError, one line, for a log that a detector cannot use which can do without `spare` sensors."""
     period = sample_period(log)
     if abs(period - SAMPLE_PERIOD_S) > 0.02 * SAMPLE_PERIOD_S:
         raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, the detectors need 100 Hz: "
                             "airtouch logs convert --rate 100")
-    channels = nine_channels(log)
+    names, channels = logged_channels(log, sensors.missing(log) if spare else ())
+    if spare:
+        sensors.signals(log)  # names what is missing, where that is too much
     if len(log) * SAMPLE_PERIOD_S < SHORTEST_S:
         raise AirTouchError(f"{log.source}: {len(log) * SAMPLE_PERIOD_S:.2f} s of data (it may be cut off); "
                             f"at least {SHORTEST_S:g} s are needed")
     finite = np.isfinite(channels)
-    for name, missing in zip(NAMES, 1.0 - finite.mean(axis=0), strict=True):
+    for name, missing in zip(names, 1.0 - finite.mean(axis=0), strict=True):
         if missing > MOST_MISSING:
             raise AirTouchError(f"{log.source}: {name} is missing (NaN) in {missing:.0%} of the samples; "
                                 "log the flight again or leave it out")
@@ -59,13 +66,14 @@ def check(log: FlightLog) -> None:
     if np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:
         raise AirTouchError(f"{log.source}: no flight in this log (mean PWM above 15000 for less than 1 s)")
     used = np.where(finite, channels, 0.0)[flying]
-    for name, spread in zip(NAMES, np.ptp(used, axis=0), strict=True):
+    for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
         if spread == 0.0:
             raise AirTouchError(f"{log.source}: {name} is constant in flight; the sensor or the log is stuck")
-    for a in range(3):
-        if np.corrcoef(used[:, a], used[:, 3 + a])[0, 1] > 0.999999:
-            raise AirTouchError(f"{log.source}: {NAMES[3 + a]} is a copy of {NAMES[a]}; "
-                                "log the gyro or leave it out")
+    for rate, acceleration in zip(RATES, ACCELERATIONS):
+        if {rate, acceleration} <= set(names):
+            pair = used[:, names.index(rate)], used[:, names.index(acceleration)]
+            if np.corrcoef(*pair)[0, 1] > 0.999999:
+                raise AirTouchError(f"{log.source}: {rate} is a copy of {acceleration}; log the gyro or leave it out")
 
 
 def truth(log: FlightLog) -> list[logs.Edge] | None:
@@ -80,7 +88,9 @@ def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model:
     trace = detector.run(log, model)
     score = score_flight(file.path.name, file.condition, truth(log), logs.airborne(log), trace.probability,
                          trace.edges, detector.lag_s(model))
-    return Result(log, trace, score)
+    note = "; ".join(text for text in (score.note, trace.note) if text)
+    trained = training_set.contains(getattr(model, "metadata", {}), log)
+    return Result(log, trace, replace(score, note=note, in_training=trained))
 
 
 def evaluate(
@@ -97,7 +107,7 @@ def evaluate(
     left_out: list[tuple[str, str]] = []
     for file in files:
         try:
-            result = evaluate_flight(file, read_flight(file), detector, model)
+            result = evaluate_flight(file, read_flight(file, spare_of(detector)), detector, model)
         except AirTouchError as error:
             left_out.append((str(file.path), str(error)))
             on_result(error)
@@ -123,6 +133,7 @@ def as_json(
         "by_height": summary.by_height(scores),
         "by_angle": summary.by_angle(scores),
         "by_wind": summary.by_wind(scores),
+        "in_training": [score.file for score in scores if score.in_training],
         "left_out": [{"file": file, "reason": reason} for file, reason in left_out],
         "per_flight": [score.as_dict() for score in scores],
     }

@@ -19,7 +19,10 @@ DETECTORS = {
 
 
 class Detector(Protocol):
-    """What a detector's module offers. `model` is whatever its `fit` and `load` return."""
+    """What a detector's module offers. `model` is whatever its `fit` and `load` return.
+
+    A module that says SPARE_SENSORS = k takes logs that lack k of acceleration, rates and motors; others need all.
+    """
 
     def run(self, log: FlightLog, model: Any = None) -> Trace:
         """Edges of one flight at 100 Hz; None is the shipped model. AirTouchError for what it cannot use."""

@@ -44,7 +44,8 @@ class FlightScore:
 
     false: samples of unmatched detections, None where the truth is not known.
     windows: airborne samples (over and found, over, not over and found, not over).
-    bins: reliability table, (10, 3). airborne_s: seconds in the air.
+    bins: reliability table, (10, 3). airborne_s: seconds in the air. note: what limits the result, one line.
+    in_training: whether the model was trained on this flight.
     """
 
     file: str
@@ -56,6 +57,7 @@ class FlightScore:
     windows: tuple[int, int, int, int] = (0, 0, 0, 0)
     bins: np.ndarray = field(default_factory=lambda: np.zeros((BINS, 3)))
     note: str = ""
+    in_training: bool = False
 
     def balanced_accuracy(self) -> float | None:
         """Mean of the shares found over and not over a platform; None without both."""
@@ -75,6 +77,7 @@ class FlightScore:
             "windows": list(self.windows),
             "reliability": self.bins.tolist(),
             "note": self.note,
+            "in_training": self.in_training,
         }
 
     @classmethod
@@ -84,7 +87,8 @@ class FlightScore:
         return cls(
             entry["file"], Condition(**entry["condition"]), tuple(EdgeScore(**e) for e in entry["edges"]),
             None if false is None else tuple(false), entry["detections"], entry["airborne_s"],
-            tuple(entry["windows"]), np.array(entry["reliability"], float), entry["note"])
+            tuple(entry["windows"]), np.array(entry["reliability"], float), entry["note"],
+            entry.get("in_training", False))
 
 
 def match(true: Sequence[float], detected: Sequence[float], tolerance: float) -> list[tuple[int, int]]:

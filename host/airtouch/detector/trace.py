@@ -26,8 +26,10 @@ class Trace:
     probability: (n,) P(over a platform); NaN where it is not known (yet).
     edges: detections in order of time.
     signals: what reports plot, each (n,) or (n, k).
+    note: what limits this flight's result, one line, or nothing.
     """
 
     probability: np.ndarray
     edges: list[Detection]
     signals: dict[str, np.ndarray] = field(default_factory=dict)
+    note: str = ""

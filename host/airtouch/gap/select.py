@@ -157,7 +157,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     tried, need = singles, least
     passing = _passing(data, parts, base, singles, least, without)
     if passing is not None:
-        steps, least = [passing], {**least, passing.name: passing.evidence}
+        steps, least = [passing], {**least, passing.name: data.study.scatter.passing(_seconds(data), LEAST_GAIN)}
         singles = {**singles, passing.name: passing}
         tried, need = _beside(data, parts, base, screen, candidates, steps, singles, progress)
     while sum(s.named for s in steps) < MOST_EFFECTS:

@@ -4,6 +4,8 @@ A vehicle gives the nominal values, effects change them. Defaults of the control
 the firmware's documented ones (crazyflie-firmware, platform_defaults_cf2.h).
 """
 
+import functools
+
 import numpy as np
 
 from airtouch.vehicle import Vehicle
@@ -88,6 +90,11 @@ def from_vehicle(vehicle: Vehicle) -> np.ndarray:
 
     Its fields may be changed in place; lengths and units are in FIELDS.
     """
+    return _nominal(vehicle).copy()
+
+
+@functools.lru_cache(64)
+def _nominal(vehicle: Vehicle) -> np.ndarray:
     plant = np.zeros(1, DTYPE)
     for name, _, default, _ in FIELDS:
         plant[name] = default

@@ -87,7 +87,8 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
     source, table = scenario.name, scenario.table
     values: dict[str, Any] = {}
     for key, node in table.get("values", {}).items():
-        values[key] = draw(node, values, rng, f"{source}: values.{key}")
+        value = draw(node, values, rng, f"{source}: values.{key}")
+        values |= value if isinstance(value, dict) else {key: value}  # a table: values that are drawn together
     ground = draw(table.get("world", {}), values, rng, f"{source}: world")
     platforms = [_platform(draw(p, values, rng, f"{source}: platform {i + 1}"), f"{source}: platform {i + 1}")
                  for i, p in enumerate(table.get("platform", []))]

@@ -150,7 +150,8 @@ static void streamAnew(uint32_t from) {
   const uint8_t session = (uint8_t)(receiver->session % 255 + 1);
   deliver(packed, packReset(session, 0xfeedbeef, EDGE_LINK_PAPER, digests[1], packed));
   CHECK(receiver->network == &receiver->networks[1] && receiver->empty, "a new session begins, whatever was said before");
-  for (uint32_t i = 0; i < (uint32_t)toy->window + toy->stride; i++) {
+  // The network begins on a multiple of its stride, and answers on one.
+  for (uint32_t i = 0; i < toy->window + 2u * (toy->stride - 1u); i++) {
     send(from + i, 1, 0);
   }
   CHECK(receiver->answers > 0 && receiver->filled >= toy->window, "answers come once the window is full");

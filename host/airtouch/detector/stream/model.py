@@ -20,6 +20,8 @@ from airtouch.reference.stream_int8 import StreamNetwork
 FORMAT = 1
 KIND = {"format": FORMAT, "network": "stream"}
 _INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
+#: what a model's file means that does not say so, because it is older
+_BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air": 0.0}
 _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 
 
@@ -106,7 +108,7 @@ def parse(data: bytes, source: str) -> StreamModel:
 def _recipe(table: object, source: str) -> Recipe:
     wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; {archive.REMEDY}")
     try:
-        recipe = Recipe(**{**table, "dilations": tuple(table["dilations"]),
+        recipe = Recipe(**{**_BEFORE, **table, "dilations": tuple(table["dilations"]),
                             "muted": tuple(table["muted"])})
         numbers = [recipe.width, recipe.first_taps, recipe.taps, *recipe.dilations, *recipe.muted]
     except (KeyError, TypeError):

@@ -21,7 +21,10 @@ class Recipe:
     The rest: learning (steps, batch, crop in samples of which warm_up are not scored, one-cycle peak,
     weight decay, loss weights), channels that are muted (held at 0, for ablations) and augmentation (share of crops around an edge, flights of the rare
     heights drawn `balance` times as often, gains, offsets and noise in usual swings, yaw in degrees,
-    time warp, share mirrored left to right).
+    time warp, share mirrored left to right). silent_acceleration, silent_rates, silent_motors: shares of the crops in
+    which that sensor's channels are held at 0, so that one network also runs without it; a sensor that no training
+    flight has is always silent. phases: share of the crops that hold take-off or landing. free_air: share of the crops
+    from flights without edges, where there are such.
     """
 
     width: int = 24
@@ -48,6 +51,11 @@ class Recipe:
     yaw_deg: float = 20.0
     warp: float = 0.08
     mirror: float = 0.5
+    silent_acceleration: float = 0.15
+    silent_rates: float = 0.05
+    silent_motors: float = 0.1
+    phases: float = 0.15
+    free_air: float = 0.2
 
     @property
     def shapes(self) -> tuple[tuple[int, int, int], ...]:

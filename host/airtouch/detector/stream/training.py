@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from airtouch.detector.pruning import keep_mask, polynomial_sparsity
+from airtouch.detector.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.detector.stream.batches import Flight, batch
 from airtouch.detector.stream.recipe import STRIDE, Recipe
 
@@ -33,9 +33,11 @@ def build(recipe: Recipe):  # noqa: ANN201 - a keras.Model
 
 
 def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
-        progress: Callable[[int, int, str], None] = lambda *_: None) -> Weights:
+        progress: Callable[[int, int, str], None] = lambda *_: None, *,
+        free_air: Sequence[Flight] = (), start: Weights | None = None) -> Weights:
     """Float weights (`Recipe.weight_shapes`) trained on the flights; same arguments, same bits.
 
+    free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
     Call `detector.train.use_tensorflow(seed)` before.
     """
     import keras
@@ -43,34 +45,34 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
 
     rng = np.random.default_rng(seed)
     model = build(recipe)
+    if start is not None:
+        model.set_weights([start[name].reshape(v.shape)
+                           for name, v in zip(_names(recipe), model.trainable_variables, strict=True)])
     rise = recipe.steps // 6
     rate = keras.optimizers.schedules.CosineDecay(
         recipe.peak_rate / 20, recipe.steps - rise, alpha=1e-3, warmup_target=recipe.peak_rate, warmup_steps=rise)
     optimizer = keras.optimizers.AdamW(rate, weight_decay=recipe.weight_decay, global_clipnorm=1.0)
     optimizer.build(model.trainable_variables)
-    masks = [tf.Variable(tf.ones_like(v), trainable=False) for v in model.trainable_variables]
+    masks = [tf.Variable(_mask(v.numpy(), start is not None and name in _pruned(recipe)), trainable=False)
+             for name, v in zip(_names(recipe), model.trainable_variables, strict=True)]
     weight = tf.constant([1.0, recipe.event_weight, recipe.event_weight])
     scored = recipe.warm_up // STRIDE
 
     @tf.function(jit_compile=True)
-    def gradients(x, y):  # noqa: ANN001, ANN202
+    def learn(x, y):  # noqa: ANN001, ANN202
         with tf.GradientTape() as tape:
             loss = tf.nn.sigmoid_cross_entropy_with_logits(y, model(x, training=True))[:, scored:]
             loss = tf.reduce_mean(tf.reduce_sum(loss * weight, -1))
-        return loss, tape.gradient(loss, model.trainable_variables)
-
-    @tf.function
-    def update(gradient):  # noqa: ANN001, ANN202
+        gradient = tape.gradient(loss, model.trainable_variables)
         optimizer.apply_gradients(zip(gradient, model.trainable_variables))
         for variable, mask in zip(model.trainable_variables, masks):
             variable.assign(variable * mask)
+        return loss
 
     losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
     for step in range(recipe.steps):
-        loss, gradient = gradients(*map(tf.constant, batch(flights, recipe, rng)))
-        update(gradient)
-        losses.append(loss)
-        if step % RANK_EVERY == 0 or step == last_rank:
+        losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
+        if start is None and (step % RANK_EVERY == 0 or step == last_rank):
             _rank(model, masks, recipe, step / recipe.steps)
         if (step + 1) % 50 == 0:
             progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
@@ -91,6 +93,19 @@ def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa:
         values = model.trainable_variables[2 * layer].numpy()
         flat = values.reshape(-1, values.shape[-1])
         masks[2 * layer].assign(keep_mask(flat, sparsity).reshape(values.shape))
+
+
+def _pruned(recipe: Recipe) -> list[str]:
+    """The weights that pruning takes zeros of."""
+    return [f"layer{layer}.kernel" for layer in range(1, 1 + len(recipe.dilations))]
+
+
+def _mask(values: np.ndarray, pruned: bool) -> np.ndarray:
+    """float32 0 where a pruned kernel (taps, in, out) has a block of four zeros along its inputs, 1 elsewhere."""
+    if not pruned:
+        return np.ones_like(values)
+    blocks = values.reshape(-1, BLOCK, values.shape[-1]).any(axis=1)
+    return np.repeat(blocks, BLOCK, axis=0).reshape(values.shape).astype(np.float32)
 
 
 def _names(recipe: Recipe) -> list[str]:

@@ -75,14 +75,18 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
     """`name:parameter=value unit,...` as on the command line, to a name and its values.
 
     Every value carries the parameter's unit, as in `wind:x=0.3m/s`; pure numbers carry none.
+    `preset=NAME` takes values that were measured together.
     Raises AirTouchError that says what was expected.
     """
     name, _, rest = text.partition(":")
     effect = get(name.strip())
     units = {p.name: p.unit for p in effect.parameters}
-    given = {}
+    given: dict[str, float | str] = {}
     for part in filter(None, (p.strip() for p in rest.split(","))):
         key, equals, quantity = (piece.strip() for piece in part.partition("="))
+        if key == "preset" and equals:
+            given[key] = quantity
+            continue
         match = _QUANTITY.match(quantity)
         if not equals or not match:
             raise AirTouchError(f"{text!r}: write {effect.name}:parameter=value with its unit")

@@ -3,7 +3,7 @@
 import functools
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numba
@@ -16,7 +16,7 @@ from airtouch.simulation.compiled import jit
 
 warnings.filterwarnings("ignore", "First-class function type feature is experimental")
 
-PARAMETERS = 8  #: an effect's parameters in compiled code, at most
+PARAMETERS = 10  #: an effect's parameters in compiled code, at most
 MEMORY = 12  #: numbers that an effect may keep from step to step
 SIGNATURE = types.void(float64[::1], float64[::1], float64[::1], uint64[::1], float64[::1])
 WrenchFunction = types.FunctionType(SIGNATURE)
@@ -25,7 +25,7 @@ WrenchFunction = types.FunctionType(SIGNATURE)
 def wrench(function: Callable) -> Any:
     """Compile `function(p, s, memory, stream, out)` so that simulator and diagnosis can call it.
 
-    p: the effect's parameters in their declared order. s: signals, by the places in
+    p: the effect's parameters in their declared order (10 at most). s: signals, by the places in
     `simulation.signals`. memory (12,): zero at the start of a flight, its own from then
     on. stream: its random numbers, for `random_stream.normal(stream)`. out (6,): add force
     (N) and torque (N m) about the centre of mass, body axes. Called once a step.
@@ -86,13 +86,21 @@ class Effect:
     parameters: tuple[Parameter, ...]
     settings: Callable[[Any, Mapping[str, float]], None] | None = None
     wrench: Any = None
+    presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  #: values measured together
 
-    def values(self, given: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Every parameter: what is given, else its default.
+    def values(self, given: Mapping[str, float | str] | None = None) -> dict[str, float]:
+        """Every parameter: what is given, else what the preset says, else its default.
 
+        given: {parameter: value}, and under "preset" the name of one of `presets`.
         Raises AirTouchError for an unknown name and for values out of bounds.
         """
         given = dict(given or {})
+        preset = given.pop("preset", None)
+        if preset is not None:
+            if preset not in self.presets:
+                known = ", ".join(self.presets) or "it has none"
+                raise AirTouchError(f"{self.name} has no preset {preset!r}; known: {known}")
+            given = {**self.presets[preset], **given}
         known = {p.name: p for p in self.parameters}
         for name in given:
             if name not in known:
@@ -114,7 +122,7 @@ class Effect:
                 else p.neutral + strength * (values[p.name] - p.neutral) for p in self.parameters}
 
     def vector(self, values: Mapping[str, float]) -> np.ndarray:
-        """The parameters (8,) as compiled code gets them."""
+        """The parameters (10,) as compiled code gets them."""
         out = np.zeros(PARAMETERS)
         out[:len(self.parameters)] = [values[p.name] for p in self.parameters]
         return out

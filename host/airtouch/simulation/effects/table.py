@@ -21,7 +21,9 @@ def table() -> str:
             cells = (p.name, p.unit, f"{p.default:g}", f"{p.low:g}", f"{p.high:g}", neutral, p.summary,
                      p.source)
             lines.append("| " + " | ".join(cells) + " |")
-        lines.append("")
+        lines += ["", *(f"Preset `{name}`: {', '.join(f'{k} {v:g}' for k, v in values.items())}."
+                        for name, values in effect.presets.items())]
+        lines += [""] if effect.presets else []
     return "\n".join(lines)
 
 

@@ -1,0 +1,133 @@
+"""`airtouch twin`: fit the simulator to recorded flights of one drone."""
+
+import json
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+
+FIT, SUMMARY, REPORT = "fit.json", "twin.json", "report.html"
+
+
+@click.command(name="twin")
+@click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("twin"), show_default=True,
+              help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
+@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True,
+              help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
+@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
+              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
+@click.option("--batch", type=click.IntRange(40), default=240, show_default=True, help="Simulated flights a round.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes the result.")
+@click.option("--workers", type=click.IntRange(1), help="Threads; default one a core.")
+@click.option("--resume", is_flag=True, help="Go on with a fit that stopped.")
+@click.option("--force", is_flag=True, help="Replace the twin in --out.")
+def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | None, folds: tuple[int, ...],
+            rounds: int, batch: int, seed: int, workers: int | None, resume: bool, force: bool) -> None:
+    """Fit the simulator to FLIGHTS of one drone: logs, or folders (the clean flights of a manifest.csv).
+
+    \b
+    airtouch twin my-flights --out twin
+    airtouch simulate twin/scenario.toml --vehicle twin/vehicle.toml --flights 100 --out simulated
+    airtouch gap diagnose my-flights --vehicle twin/vehicle.toml
+
+    What to fly: take off, hover 5 s or more, then fly straight over a table or a box and on, and land. Four
+    flights at least, better twenty, at two or three heights over the box (2 to 10 cm). Log acceleration, gyro,
+    motor commands and the down range at 100 Hz. Nothing else is needed: heights, times and speeds
+    come from the logs.
+
+    \b
+    report.html    recorded and simulated signals overlaid; medians around edges; how well a classifier tells
+                   the two apart, phase by phase (AUROC, 0.5 is closed); what stays different, largest first
+    vehicle.toml   and scenario.toml: the twin, for simulate, gap and train
+    """
+    from airtouch import vehicle as vehicles
+    from airtouch.report import twin_report
+    from airtouch.simulation.batch import available_cores
+    from airtouch.twin import compare, files, fit, levers
+    from airtouch.twin import flights as recordings
+
+    _check_free(out, resume, force)
+    craft = vehicles.load(vehicle)
+    with _bar("reading") as bar:
+        recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
+    for _, reason in recorded.left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    out.mkdir(parents=True, exist_ok=True)
+    aim = fit.target(recorded.courses, recorded.features)
+    listed = levers.default(craft)
+    workers = workers or available_cores()
+    with _bar("fitting") as bar:
+        state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers,
+                        kept=out / FIT, progress=lambda done, total, now: bar(done, total, _misfit(now)))
+    files.write(out, craft, listed, state.values, recorded.courses, force=True)
+    with _bar("flying the twin") as bar:
+        flown, lost = compare.flown(recorded.courses, craft, listed, state.values, seed, progress=bar)
+    with _bar("telling apart") as bar:
+        phases: list[str] = []
+        found = compare.compare(recorded, aim, flown, lost, seed, lambda name: (phases.append(name), bar(len(phases), 6, name)))
+    typed = shlex.join(["airtouch", *sys.argv[1:]])
+    write_bytes(json.dumps(_summary(found, listed, state, recorded, typed), indent=1).encode(), out / SUMMARY, force=True)
+    twin_report.write_report(out / REPORT, recorded, found, listed, state.values, state.history[0]["misfit"],
+                             command=typed, force=True)
+    click.echo(f"{len(recorded.courses)} flights; misfit in scatters: {_misfit(state.history[0]['misfit'])} "
+               f"-> {_misfit(found.misfit)}")
+    for a in found.auroc:
+        click.echo(f"{a.phase:7} AUROC {a.value:.3f} ({a.low:.3f} to {a.high:.3f}), {a.real_flights} flights, "
+                   f"{a.windows} windows; tells: {a.telling[0]}")
+    click.echo("largest differences:")
+    for gap in found.gaps[:5]:
+        where, what, difference, scatters, n = twin_report.gap_row(gap)
+        click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
+    click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
+
+
+def _check_free(out: Path, resume: bool, force: bool) -> None:
+    if (out / FIT).exists() and not (resume or force):
+        raise AirTouchError(f"{out}: holds a twin already; --resume goes on with it, --force starts anew")
+    if force and not resume:
+        (out / FIT).unlink(missing_ok=True)
+
+
+def _misfit(now: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.2f}" for name, value in now.items())
+
+
+def _summary(found: Any, listed: Any, state: Any, recorded: Any, typed: str) -> dict[str, Any]:
+    """What the report shows, as plain values."""
+    return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": found.misfit,
+            "auroc": [asdict(a) for a in found.auroc], "lost": found.lost,
+            "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,
+                      "difference": g.difference, "scatters": g.scatters, "flights": g.flights} for g in found.gaps],
+            "levers": {lever.name: float(v) for lever, v in zip(listed, state.values, strict=True)},
+            "history": state.history}
+
+
+class _bar:
+    """A progress bar on stderr: call it with (done, total[, note])."""
+
+    def __init__(self, name: str) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self.progress = Progress(TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                                 TextColumn("{task.fields[note]}"), console=Console(stderr=True))
+        self.task = self.progress.add_task(name, total=None, note="")
+
+    def __enter__(self) -> "_bar":
+        self.progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.progress.stop()
+
+    def __call__(self, done: int, total: int, note: str = "") -> None:
+        self.progress.update(self.task, completed=done, total=total, note=note)

@@ -1,0 +1,192 @@
+"""Fit of the levers: rounds of simulated flights, then one weighted least-squares step on their features.
+
+Each simulated flight flies the course of a recorded one, with levers drawn around their present values.
+The difference of the two flights' features is regressed on the levers (an ensemble of flights gives the
+Jacobian; Evensen, The Ensemble Kalman Filter, 2003), and the levers move to where the mean difference, in
+units of the recorded flights' scatter, is least. A ridge keeps a step within what the round has tried.
+"""
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.twin import fly
+from airtouch.twin import levers as lever_set
+from airtouch.twin.course import Course
+from airtouch.twin.features import GROUPS, Feature, names
+from airtouch.twin.levers import Lever
+from airtouch.vehicle import Vehicle
+
+ROUNDS, FLIGHTS = 12, 240
+MEMORY_ROUNDS = 4  #: rounds whose flights enter a regression
+RIDGE = 1.0  #: weight of a step of one `Lever.step` against a misfit of one scatter in each group
+MOST_STEP = 2.0  #: of a round, in `Lever.step`
+MODEL = 0.25  #: scatters by which a mean feature may stay off: no simulator has everything
+FREEDOM = 40.0  #: independent features that a group counts as
+CLIP = 5.0  #: scatters; larger differences of one flight count as that
+FEWEST = 4  #: recorded flights that must have a feature
+GROUP_WEIGHT = {"trim": 1.0, "spectrum": 1.0, "coherency": 1.0, "over": 0.7, "entry": 1.0, "exit": 1.0}
+#: progress(round, rounds, misfit by group)
+Progress = Callable[[int, int, Mapping[str, float]], None]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Recorded flights: courses, features (flights, features), and each feature's scatter (features,)."""
+
+    courses: Sequence[Course]
+    features: np.ndarray
+    scatter: np.ndarray
+
+
+@dataclass
+class State:
+    """A fit between rounds: levers (p,), misfit by group of each round, and the last rounds' flights."""
+
+    values: np.ndarray
+    history: list[dict[str, Any]]
+    drawn: list[np.ndarray]
+    apart: list[np.ndarray]
+
+
+def target(courses: Sequence[Course], features: np.ndarray) -> Target:
+    """Recorded flights with the scatter of their features: 1.48 median deviations, at least `Feature.least`."""
+    listed = names()
+    scatter = np.full(len(listed), np.nan)
+    for k, feature in enumerate(listed):
+        values = features[np.isfinite(features[:, k]), k]
+        if len(values) >= FEWEST:
+            scatter[k] = max(1.4826 * np.median(np.abs(values - np.median(values))), feature.least)
+    return Target(list(courses), features, scatter)
+
+
+def fit(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int = ROUNDS, flights: int = FLIGHTS,
+        seed: int = 0, fixed: Mapping[str, Any] | None = None, workers: int = 1, kept: Path | None = None,
+        progress: Progress | None = None) -> State:
+    """The levers after all rounds. Same arguments, same result.
+
+    kept: a file in which each finished round is written; a fit that stopped goes on from it.
+    """
+    state = _load(kept, levers, seed, flights) or State(lever_set.starts(levers), [], [], [])
+    for number in range(len(state.history), rounds):
+        _round(state, aim, vehicle, levers, number, rounds, flights, seed, fixed, workers)
+        if progress:
+            progress(number + 1, rounds, state.history[-1]["misfit"])
+        if kept:
+            _save(kept, state, levers, seed, flights)
+    return state
+
+
+def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever], number: int, rounds: int,
+           flights: int, seed: int, fixed: Mapping[str, Any] | None, workers: int) -> None:
+    began = time.process_time()
+    rng = np.random.default_rng([seed, number, 13])
+    steps = np.array([lever.step for lever in levers])
+    values = lever_set.clipped(levers, state.values + steps * rng.standard_normal((flights, len(levers))))
+    of = np.concatenate([rng.permutation(len(aim.courses)) for _ in range(flights // len(aim.courses) + 1)])[:flights]
+    simulated = fly.flown_features([aim.courses[i] for i in of], vehicle, levers, values, seed,
+                                   number * flights, fixed, workers)
+    apart = np.clip((simulated - aim.features[of]) / aim.scatter, -CLIP, CLIP)
+    lost = int((~np.isfinite(simulated[:, 0])).sum())
+    if lost > 0.5 * flights:
+        raise AirTouchError(f"{lost} of {flights} simulated flights did not end well; give a vehicle file nearer "
+                            "to this drone with --vehicle")
+    state.drawn, state.apart = [*state.drawn[-MEMORY_ROUNDS + 1:], values], [*state.apart[-MEMORY_ROUNDS + 1:], apart]
+    jacobian, gap, variance = regression(np.vstack(state.drawn), np.vstack(state.apart), state.values, steps, len(values))
+    before = misfit(gap)
+    recorded = np.maximum(np.isfinite(aim.features).sum(axis=0), 1)
+    step = _step(jacobian, gap, variance + 1.0 / recorded, levers, state.values, steps) * (1.0 if number < rounds - 3 else 0.5)
+    state.history.append({"values": state.values.tolist(), "misfit": before, "lost": lost,
+                          "cpu_s": round(time.process_time() - began, 1)})
+    state.values = lever_set.clipped(levers, state.values + steps * step)
+
+
+def regression(drawn: np.ndarray, apart: np.ndarray, centre: np.ndarray, steps: np.ndarray,
+               newest: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(features, levers) change by `Lever.step`; (features,) mean difference at `centre` and its variance, in scatters.
+
+    drawn: (flights, levers); apart: (flights, features), NaN where a flight has none. The mean is the newest
+    flights' own, corrected by the Jacobian for where their levers were drawn.
+    """
+    x = (drawn - centre) / steps
+    jacobian = np.zeros((apart.shape[1], x.shape[1]))
+    gap, variance = np.full(apart.shape[1], np.nan), np.full(apart.shape[1], np.nan)
+    masks: dict[bytes, list[int]] = {}
+    finite = np.isfinite(apart)
+    for k in range(apart.shape[1]):
+        masks.setdefault(finite[:, k].tobytes(), []).append(k)
+    for columns in masks.values():
+        use = finite[:, columns[0]]
+        n = int(use.sum())
+        last = use[-newest:]
+        if n < FEWEST or not last.any():
+            continue
+        design = np.column_stack([x[use], _rounds(use, newest)])
+        ridge = np.diag(np.r_[np.full(x.shape[1], 0.02 * n + 2.0), np.full(design.shape[1] - x.shape[1], 1e-9)])
+        solution = np.linalg.solve(design.T @ design + ridge, design.T @ apart[np.ix_(use, columns)])
+        jacobian[columns] = solution[:x.shape[1]].T
+        recent = slice(len(x) - newest, None)
+        rest = apart[recent][last][:, columns] - x[recent][last] @ solution[:x.shape[1]]
+        gap[columns], variance[columns] = rest.mean(axis=0), rest.var(axis=0) / len(rest)
+    return jacobian, gap, variance
+
+
+def _rounds(use: np.ndarray, newest: int) -> np.ndarray:
+    """(used flights, rounds) which round each flight is of: an intercept each."""
+    number = np.arange(len(use)) // newest
+    return (number[use][:, None] == np.unique(number[use])[None, :]).astype(float)
+
+
+def misfit(gap: np.ndarray) -> dict[str, float]:
+    """Group -> rms of the mean differences, in scatters of the recorded flights."""
+    group = np.array([f.group for f in names()])
+    return {name: float(np.sqrt(np.nanmean(gap[group == name] ** 2)))
+            for name in GROUPS if np.isfinite(gap[group == name]).any()}
+
+
+def _step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarray, levers: Sequence[Lever],
+          values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Steps of the levers, in `Lever.step`, that make the weighted sum of squared gaps least."""
+    listed: tuple[Feature, ...] = names()
+    good = np.isfinite(gap)
+    group = np.array([f.group for f in listed])
+    weight = np.zeros(len(listed))
+    for name in GROUPS:
+        here = good & (group == name)
+        if here.any():
+            weight[here] = GROUP_WEIGHT[name] * np.sqrt(FREEDOM / here.sum() / (variance[here] + MODEL**2))
+    low = np.maximum((np.array([v.low for v in levers]) - values) / steps, -MOST_STEP) - 1e-9
+    high = np.minimum((np.array([v.high for v in levers]) - values) / steps, MOST_STEP) + 1e-9
+    a = np.vstack([jacobian[good] * weight[good, None], np.sqrt(RIDGE) * np.eye(len(steps))])
+    b = np.r_[-gap[good] * weight[good], np.zeros(len(steps))]
+    return lsq_linear(a, b, bounds=(low, high)).x
+
+
+def _save(path: Path, state: State, levers: Sequence[Lever], seed: int, flights: int) -> None:
+    write_bytes(json.dumps({
+        "levers": [lever.name for lever in levers], "seed": seed, "flights": flights,
+        "values": state.values.tolist(), "history": state.history,
+        "drawn": [d.tolist() for d in state.drawn],
+        "apart": [[[None if not np.isfinite(v) else round(v, 4) for v in row] for row in a.tolist()]
+                  for a in state.apart]}).encode(), path, force=True)
+
+
+def _load(path: Path | None, levers: Sequence[Lever], seed: int, flights: int) -> State | None:
+    if path is None or not path.is_file():
+        return None
+    try:
+        table = json.loads(path.read_text())
+        same = (table["levers"], table["seed"], table["flights"]) == ([v.name for v in levers], seed, flights)
+        apart = [np.array([[np.nan if v is None else v for v in row] for row in a]) for a in table["apart"]]
+        return State(np.array(table["values"]), table["history"], [np.array(d) for d in table["drawn"]],
+                     apart) if same else None
+    except (ValueError, KeyError, TypeError):
+        raise AirTouchError(f"{path}: a damaged fit; remove it or use --force") from None

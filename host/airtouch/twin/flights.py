@@ -1,0 +1,59 @@
+"""Recorded flights read, checked and turned into courses and features."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector import dataset
+from airtouch.errors import AirTouchError
+from airtouch.twin import course as courses
+from airtouch.twin.channels import channels
+from airtouch.twin.course import Course
+from airtouch.twin.features import features
+
+FEWEST = 4  #: flights that a twin is fitted to, at least
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """Flights that a twin is fitted to: courses, channels (each (n, 12)), features (flights, features)."""
+
+    vehicle: str
+    courses: list[Course]
+    channels: list[np.ndarray]
+    features: np.ndarray
+    left_out: list[tuple[str, str]]
+
+
+def recorded(paths: Sequence[str | Path], *, speed_mps: float | None = None, folds: Sequence[int] = (),
+             progress: Callable[[int, int], None] = lambda *_: None) -> Recorded:
+    """Flights of files and folders; speeds and angles from a manifest beside them, or from the logs.
+
+    folds: only flights of these folds of the manifest. Those that cannot be used are in `left_out` with
+    the reason. Raises AirTouchError, with what to fly, where fewer than FEWEST can be used, and for two vehicles.
+    """
+    files = [f for f in dataset.collect(paths, speed_mps) if not folds or f.condition.fold in folds]
+    if not files:
+        raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest")
+    usable, numbers, shapes, left_out, named = [], [], [], [], []
+    for i, file in enumerate(files):
+        try:
+            log = logs.read(file.path)
+            chosen = courses.course(log, file.condition.speed_mps, file.condition.angle_deg)
+            numbers.append(features(log, chosen))
+            shapes.append(channels(log))
+            usable.append(chosen)
+            named.append(log.slice(0, 1))
+        except AirTouchError as error:
+            left_out.append((str(file.path), str(error)))
+        progress(i + 1, len(files))
+    if not usable:
+        raise AirTouchError(left_out[0][1])
+    if len(usable) < FEWEST:
+        why = f"; {left_out[0][1]}" if left_out else ""
+        raise AirTouchError(f"{len(usable)} of {len(files)} flights can be used and {FEWEST} are needed: fly straight "
+                            f"over the platform's two edges {FEWEST - len(usable)} more times, at two heights{why}")
+    return Recorded(courses.one_vehicle(named), usable, shapes, np.array(numbers), left_out)

@@ -1,0 +1,146 @@
+"""What may be moved to make simulated flights like recorded ones, with bounds and units."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation import effects as registry
+from airtouch.vehicle import Vehicle
+
+VEHICLE = "vehicle"
+ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
+TRIM_UNIT = "thrust loss"
+
+
+@dataclass(frozen=True)
+class Lever:
+    """One number of the simulator.
+
+    of: an effect, "vehicle" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
+    axis), or a direction of ROTOR_SIGNS. step: a change that a round tries. spread: half width over which
+    each flight draws it, None where all flights have the same.
+    """
+
+    of: str
+    key: str
+    start: float
+    low: float
+    high: float
+    step: float
+    unit: str
+    spread: float | None = None
+
+    @property
+    def name(self) -> str:
+        """As printed and stored."""
+        return f"{self.of}.{self.key}"
+
+
+def default(vehicle: Vehicle) -> tuple[Lever, ...]:
+    """The levers of a fit, started from a vehicle and plain effects."""
+    gyro = vehicle.gyro_noise_rms_radps
+    acc = vehicle.acc_noise_rms_mps2
+    flow = vehicle.flow_noise_mps
+    yaw = vehicle.yaw_torque_over_thrust_m
+    return (
+        Lever("thrust_coefficient", "loss", 0.0, -0.3, 0.3, 0.02, "1", 0.03),
+        *(Lever("trim", key, 0.0, -0.15, 0.15, 0.01, TRIM_UNIT, 0.02) for key in ROTOR_SIGNS),
+        Lever("battery_sag", "capacity", 0.6, 0.2, 2.0, 0.1, "1"),
+        Lever("motor_lag", "factor", 1.0, 0.4, 2.0, 0.1, "1"),
+        Lever("actuator_delay", "delay", 0.004, 0.0, 0.03, 0.002, "s"),
+        Lever(VEHICLE, "yaw_torque_over_thrust_m", yaw, 0.3 * yaw, 3 * yaw, 0.15 * yaw, "m"),
+        Lever("controller_gain", "rate", 0.8, 0.3, 2.0, 0.1, "1"),
+        Lever("controller_gain", "attitude", 1.0, 0.4, 2.0, 0.1, "1"),
+        Lever("controller_gain", "position", 1.0, 0.4, 2.0, 0.1, "1"),
+        Lever("controller_gain", "height", 1.0, 0.4, 2.0, 0.1, "1"),
+        Lever("motor_noise", "rms", 0.006, 0.0, 0.05, 0.0015, "1"),
+        Lever("motor_noise", "time", 0.5, 0.05, 3.0, 0.15, "s"),
+        Lever("motor_noise", "fast", 0.005, 0.0, 0.05, 0.0015, "1"),
+        Lever("gust", "rms", 0.1, 0.0, 1.0, 0.03, "m/s"),
+        Lever("rotor_drag", "horizontal", 0.0147, 0.0, 0.08, 0.004, "N s/m"),
+        Lever("blade_flapping", "tilt", 0.01, 0.0, 0.1, 0.01, "rad s/m"),
+        Lever("blade_flapping", "hub", 0.02, 0.0, 0.1, 0.02, "m"),
+        *(Lever(VEHICLE, f"acc_noise_ratio.{i}", vehicle.acc_noise_ratio[i], 0.05, 6.0, 0.1, f"of {acc:g} m/s²")
+          for i in range(3)),
+        *(Lever(VEHICLE, f"gyro_noise_ratio.{i}", vehicle.gyro_noise_ratio[i], 0.05, 6.0, 0.1, f"of {gyro:g} rad/s")
+          for i in range(3)),
+        *(Lever(VEHICLE, f"flow_noise_mps.{i}", flow[i], 0.0, 0.3, 0.01, "m/s") for i in range(3)),
+        Lever("ground_effect", "strength", 1.0, 0.0, 3.0, 0.15, "1"),
+        Lever("ground_effect", "fade", 0.0875, 0.03, 0.3, 0.01, "m"),
+        Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1"),
+        Lever("ground_effect", "turbulence", 0.6, 0.0, 3.0, 0.1, "1"),
+        Lever("ground_effect", "turbulence_time", 0.04, 0.005, 0.3, 0.006, "s"),
+        Lever("ground_effect", "heave", 0.6, 0.0, 2.0, 0.1, "1"),
+        Lever("ground_effect", "pitch", 0.8, 0.0, 2.0, 0.1, "1"),
+        Lever("ground_effect", "swirl", 0.004, 0.0, 0.05, 0.001, "m"),
+        Lever("flow_scale", "share", 0.0, -0.1, 1.0, 0.03, "1"),
+        Lever("flow_scale", "transient", 0.1, -1.0, 1.0, 0.05, "1"),
+        Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.01, "m", 0.01),
+        Lever("range_step", "kick", 0.0, -0.2, 0.2, 0.015, "m", 0.02),
+    )
+
+
+def starts(levers: Sequence[Lever]) -> np.ndarray:
+    """(levers,) the start of each."""
+    return np.array([lever.start for lever in levers])
+
+
+def clipped(levers: Sequence[Lever], values: np.ndarray) -> np.ndarray:
+    """Values within their bounds."""
+    return np.clip(values, [lever.low for lever in levers], [lever.high for lever in levers])
+
+
+def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float]) -> Vehicle:
+    """The vehicle with its levers set."""
+    changes: dict[str, Any] = {}
+    for lever, value in zip(levers, values, strict=True):
+        if lever.of != VEHICLE:
+            continue
+        field, _, axis = lever.key.partition(".")
+        if axis:
+            numbers = list(changes.get(field, getattr(vehicle, field)))
+            numbers[int(axis)] = float(value)
+            changes[field] = tuple(numbers)
+        else:
+            changes[field] = float(value)
+    return replace(vehicle, **changes)
+
+
+def table(levers: Sequence[Lever], values: Sequence[float], fixed: Mapping[str, Any] | None = None,
+          spread: bool = True) -> dict[str, Any]:
+    """The effects of a scenario with the levers set; `fixed` are effects that no lever moves.
+
+    spread: levers with a spread become ranges that each flight draws from. Raises AirTouchError for a
+    lever of an effect or parameter that does not exist.
+    """
+    out: dict[str, Any] = {name: dict(given) if isinstance(given, Mapping) else list(given)
+                           for name, given in (fixed or {}).items()}
+    trims = np.zeros(4)
+    width = 0.0
+    for lever, value in zip(levers, values, strict=True):
+        if lever.of == "trim":
+            trims += np.array(ROTOR_SIGNS[lever.key]) * float(value)
+            width = max(width, lever.spread or 0.0)
+        elif lever.of != VEHICLE:
+            out.setdefault(lever.of, {})[lever.key] = _node(lever, float(value), spread)
+    for name, given in out.items():
+        known = {p.name for p in registry.get(name).parameters} | {"preset"}
+        for one in given if isinstance(given, list) else [given]:
+            if set(one) - known:
+                raise AirTouchError(f"levers: {name} has no parameter {', '.join(sorted(set(one) - known))}")
+    if any(lever.of == "trim" for lever in levers):
+        out["weak_motor"] = [{"rotor": i + 1, "thrust_loss": _range(-trims[i], width if spread else 0.0)}
+                             for i in range(4)]
+    return out
+
+
+def _node(lever: Lever, value: float, spread: bool) -> Any:
+    return _range(value, lever.spread if spread and lever.spread else 0.0)
+
+
+def _range(middle: float, half: float) -> Any:
+    middle = round(float(middle), 6)
+    return {"low": round(middle - half, 6), "high": round(middle + half, 6)} if half > 0.0 else middle

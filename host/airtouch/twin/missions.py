@@ -1,0 +1,56 @@
+"""The recorded courses as a scenario: hover, velocity step, platform, stop, landing."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from airtouch.logs.segments import LEVEL_PART
+from airtouch.simulation.scenario import Scenario
+from airtouch.twin.course import RISE_S, Course
+
+NAME = "twin"
+WIDTH_M = 4.0  #: of the platform, across the path
+LEAST_BEFORE_M = 0.05  #: from the velocity step to the edge
+LEAST_STOP_M = 0.35  #: flown on after the platform, so that drift does not keep a flight over it
+WAIT_S = 0.5
+LAND_MPS = 0.2  #: of the firmware's landing
+#: what a flight draws together, from one recorded course
+KEYS = ("cruise", "clearance", "speed", "angle", "climb", "hover", "before", "length", "stop", "after")
+
+
+def drawn(course: Course) -> dict[str, float]:
+    """The values (KEYS) with which the simulator flies a course: m, s, m/s, degrees.
+
+    The edges are put where the recorded flight, at its speed and with the same rise, crossed them.
+    """
+    before = max(course.speed_mps * (course.before_s - 0.5 * RISE_S), LEAST_BEFORE_M)
+    values = {"cruise": course.cruise_m, "clearance": course.clearance_m, "speed": course.speed_mps,
+              "angle": course.angle_deg, "climb": max(course.climb_s / LEVEL_PART, 1.0), "hover": max(course.hover_s, 0.5),
+              "before": before, "length": course.speed_mps * course.over_s,
+              "stop": max(course.speed_mps * course.stop_s, LEAST_STOP_M),
+              "after": max(course.after_s - course.stop_s, 0.1)}
+    return {name: round(float(value), 4) for name, value in values.items()}
+
+
+def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME) -> dict[str, Any]:
+    """A scenario's table: each flight draws one of the courses and flies it with these effects."""
+    return {
+        "name": name,
+        "summary": f"{len(courses)} recorded courses, flown again.",
+        "values": {"course": {"choice": [drawn(c) for c in courses]}},
+        "platform": [{
+            "shape": "rectangle", "size_m": ["= length * cos(angle)", WIDTH_M],
+            "centre_m": ["= before + 0.5 * length", 0.0], "angle_deg": "= angle",
+            "top_m": "= max(cruise - clearance, 0.01)", "material": "acrylic"}],
+        "mission": {"control": "velocity", "step": [
+            {"do": "wait", "time_s": WAIT_S},
+            {"do": "take-off", "height_m": "= cruise", "time_s": "= climb"},
+            {"do": "hover", "time_s": "= hover"},
+            {"do": "go", "distance_m": "= before + length + stop", "speed_mps": "= speed"},
+            {"do": "hover", "time_s": "= after"},
+            {"do": "land", "time_s": f"= cruise / {LAND_MPS}"}]},
+        "effects": dict(effects)}
+
+
+def one(course: Course, effects: Mapping[str, Any], name: str = NAME) -> Scenario:
+    """A scenario of one course."""
+    return Scenario(name, "", table([course], effects, name))

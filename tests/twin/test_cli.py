@@ -1,0 +1,94 @@
+"""`airtouch twin`, from the outside."""
+
+import json
+import shutil
+
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs, vehicle
+from airtouch.cli import airtouch
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import batch, scenario
+from airtouch.twin.course import course
+
+pytest.importorskip("sklearn")
+
+
+def run(*arguments):
+    return CliRunner().invoke(airtouch, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(made, tmp_path_factory):
+    """Six recorded flights, of a simulator."""
+    out = tmp_path_factory.mktemp("recorded")
+    for i, (_, log, _) in enumerate(made[:6]):
+        logs.write(log, out / f"flight_{i}.csv.gz")
+    return out
+
+
+@pytest.fixture(scope="module")
+def twin(folder, tmp_path_factory):
+    out = tmp_path_factory.mktemp("twin") / "mine"
+    result = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40, "--workers", 1)
+    assert result.exit_code == 0, result.output + str(result.exception)
+    return out, result.output
+
+
+def test_files_are_those_that_simulate_takes(twin):
+    out, said = twin
+    scene, craft = scenario.load(out / "scenario.toml"), vehicle.load(out / "vehicle.toml")
+    flown = [f for f in batch.flights(scene, 4, vehicle=craft, workers=1) if isinstance(f, FlightLog)]
+    assert len(flown) >= 2
+    assert 0.6 < course(flown[0]).cruise_m < 1.0
+    assert "AUROC" in said and "largest differences:" in said
+
+
+def test_report_shows_all_of_it(twin):
+    out, _ = twin
+    page = (out / "report.html").read_text()
+    for text in ("Can a classifier tell?", "What stays different, largest first", "Around the edges, medians and quartiles",
+                 "Spectra in free air", "One flight and its twin", "ground_effect.strength"):
+        assert text in page
+    summary = json.loads((out / "twin.json").read_text())
+    assert len(summary["flights"]) == 6 and summary["gaps"]
+    sizes = [abs(g["scatters"]) for g in summary["gaps"]]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_it_does_not_overwrite_and_it_goes_on(twin, folder, tmp_path):
+    out = tmp_path / "mine"
+    shutil.copytree(twin[0], out)
+    again = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40)
+    assert again.exit_code != 0 and "--resume" in str(again.exception)
+    result = run("twin", folder, "--out", out, "--rounds", 2, "--batch", 40, "--resume", "--workers", 1)
+    assert result.exit_code == 0, result.output + str(result.exception)
+    assert len(json.loads((out / "twin.json").read_text())["history"]) == 2
+
+
+def test_bad_input_is_one_line_with_what_to_fly(made, folder, tmp_path):
+    def refused(name, flown):
+        place = tmp_path / name
+        place.mkdir()
+        for i, log in enumerate(flown):
+            logs.write(log, place / f"{i}.csv")
+        result = run("twin", place, "--out", tmp_path / "out")
+        assert result.exit_code != 0
+        said = str(result.exception)
+        assert "\n" not in said
+        return said
+
+    some = [log for _, log, _ in made[:5]]
+    assert "4 are needed: fly straight over" in refused("few", some[:2])
+    blind = [FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta) for log in some]
+    assert "no down range in this log; log range.zrange" in refused("blind", blind)
+    assert "hover 5 s" in refused("hurried", [log.slice(course(log).entry - 100, len(log)) for log in some])
+    other = FlightLog(some[0].columns, {**some[0].meta, "vehicle": "quadrotor-450"})
+    assert "two vehicles" in refused("two", [*some, other])
+
+
+def test_help_teaches():
+    said = run("twin", "--help").output
+    for text in ("What to fly", "airtouch simulate twin/scenario.toml", "0.5 is closed"):
+        assert text in said

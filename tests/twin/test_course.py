@@ -1,0 +1,125 @@
+"""What is read off a log against how the flight was really flown."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import VELOCITY, FlightLog
+from airtouch.simulation import controller
+from airtouch.twin import missions
+from airtouch.twin.course import PHASES, course, one_vehicle
+from twin_courses import made_course
+
+
+def without(log, *names):
+    return FlightLog({k: v for k, v in log.columns.items() if k not in names}, dict(log.meta))
+
+
+def test_edges_are_where_the_platform_is(made):
+    """Position is true in a simulated log: the drone is at the platform's edges at the course's edges."""
+    for planned, log, _ in made:
+        read = course(log)
+        values = missions.drawn(planned)
+        assert log["x_m"][read.entry] == pytest.approx(values["before"], abs=0.03)
+        assert log["x_m"][read.exit] == pytest.approx(values["before"] + values["length"], abs=0.03)
+
+
+def test_heights_and_times_are_those_of_the_mission(made):
+    errors = []
+    for planned, log, plan in made:
+        read = course(log)
+        moving = np.flatnonzero(plan.setpoints[:, controller.VX] > 0.0)
+        errors.append((read.cruise_m - planned.cruise_m, read.clearance_m - planned.clearance_m,
+                       0.01 * (read.step - moving[0]), 0.01 * (read.exit + 100 * read.stop_s - moving[-1])))
+        assert read.climb_s == pytest.approx(planned.climb_s, abs=0.5)
+    cruise, clearance, step, stop = np.abs(errors).T
+    assert np.median(cruise) < 0.03 and np.median(clearance) < 0.02
+    assert np.median(step) < 0.3 and np.median(stop) < 0.8
+
+
+def test_speed_comes_from_the_log(made):
+    """From velocities to 0.06 m/s; from accelerations alone to 0.1, in the median to 0.06."""
+    apart = []
+    for planned, log, _ in made:
+        read = course(log)
+        assert read.speed_from == "velocity"
+        bare = course(without(log, *VELOCITY))
+        assert bare.speed_from == "acceleration"
+        apart.append((read.speed_mps - planned.speed_mps, bare.speed_mps - planned.speed_mps))
+        assert course(log, 0.31).speed_mps == 0.31 and course(log, 0.31).speed_from == "stated"
+    print(np.round(apart, 3))
+    assert np.abs(apart).max(axis=0)[0] < 0.08
+    assert np.median(np.abs(apart), axis=0)[1] < 0.08
+
+
+def test_phases_are_in_order_and_the_platform_is_low(made):
+    for _, log, _ in made:
+        read = course(log)
+        spans = read.phases()
+        assert tuple(spans) == PHASES
+        low = log["zrange_m"] < 0.5 * read.cruise_m
+        assert low[spans["over"]].all() and not low[spans["hover"]].any() and not low[spans["cruise"]].any()
+        assert spans["hover"].stop <= spans["cruise"].start <= spans["cruise"].stop <= spans["entry"].start
+
+
+def test_flown_again_the_course_is_the_same(fly_course, vehicle):
+    """Without noise and gusts, the mission made of a course brings its times back within a quarter of a second."""
+    quiet = replace(vehicle, flow_noise_mps=(0.0, 0.0, 0.0))
+    for number in range(4):
+        first = course(fly_course(made_course(number, 0.06), {}, number, craft=quiet))
+        second = course(fly_course(first, {}, 77, craft=quiet))
+        for name, most in (("before_s", 0.25), ("over_s", 0.25), ("cruise_m", 0.03), ("clearance_m", 0.03)):
+            assert getattr(second, name) == pytest.approx(getattr(first, name), abs=most), name
+
+
+def test_recorded_flights_have_their_true_edges(flights):
+    folder = flights / "airtouch"
+    with open(folder / "manifest.csv") as file:
+        rows = [r for r in csv.DictReader(file) if r["use"] == "clean" and r["fold"] in "012"]
+    speeds, tops = [], []
+    for row in rows:
+        log = logs.read(folder / row["file"])
+        read, (entry, leave, *_) = course(log), logs.true_edges(log)
+        assert (read.entry, read.exit) == (entry.sample, leave.sample)
+        assert 0.7 < read.cruise_m < 0.9 and 0.0 <= read.clearance_m < 0.13
+        tops.append(read.cruise_m - read.clearance_m)
+        speeds.append(read.speed_mps - float(row["speed_mps"]))
+    print(f"speed from acceleration less stated: median {np.median(speeds):+.3f}, quartiles "
+          f"{np.percentile(speeds, [25, 75]).round(3)} m/s, {len(speeds)} flights")
+    assert len(speeds) == 53
+    assert np.mean(np.abs(np.array(tops) - 0.74) < 0.03) > 0.9  # one table
+    assert abs(np.median(speeds)) < 0.08
+
+
+def test_logs_that_do_not_do_say_what_to_fly(made):
+    log = made[0][1]
+    cases = {
+        "no down range": without(log, "zrange_m"),
+        "no platform in its down range; fly": log.slice(0, course(log).entry - 50),
+        "free air before the platform; hover 5 s": log.slice(course(log).entry - 200, len(log)),
+        "no column gyro_x_radps": without(log, "gyro_x_radps"),
+        "logged at 50 Hz": FlightLog({k: v[::2] for k, v in log.columns.items()}, {"source": "half"}),
+    }
+    for said, bad in cases.items():
+        with pytest.raises(AirTouchError, match=said) as error:
+            course(bad)
+        assert "\n" not in str(error.value)
+
+
+def test_two_vehicles_are_refused(made):
+    log = made[0][1]
+    other = FlightLog(dict(log.columns), {**log.meta, "vehicle": "quadrotor-450"})
+    assert one_vehicle([log, log]) == "crazyflie-2.1-flow"
+    with pytest.raises(AirTouchError, match="two vehicles: .*; fit one twin for each"):
+        one_vehicle([log, other])
+
+
+def test_drawn_values_are_plain_and_positive(made):
+    for planned, _, _ in made:
+        values = missions.drawn(replace(planned, stop_s=0.0, before_s=0.0))
+        assert all(isinstance(v, float) for v in values.values())
+        assert values["before"] > 0 and values["stop"] > 0 and values["length"] > 0

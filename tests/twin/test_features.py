@@ -1,0 +1,101 @@
+"""Features of a flight against SciPy and closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import csd, welch
+
+from airtouch.twin import channels as ch
+from airtouch.twin.channels import channels
+from airtouch.twin.course import course
+from airtouch.twin.features import BANDS_HZ, BINS_S, CLASSES, LENGTH, PAIRS, features, height_class, names
+
+NAMES = [f.name for f in names()]
+
+
+def rows(group):
+    return [k for k, f in enumerate(names()) if f.group == group]
+
+
+def noise_log(log, motors, rates):
+    """A flight whose motors' roll command and roll rate are given series."""
+    columns = {f"m{i + 1}_pwm": 45000.0 + 0.25 * sign * motors for i, sign in enumerate((-1, -1, 1, 1))}
+    return log.with_columns({**columns, "gyro_x_radps": np.deg2rad(rates)})
+
+
+@pytest.fixture(scope="module")
+def long_flight(made):
+    """A flight of 80 s of free air: the first one, stretched by repeating its hover."""
+    log, read = made[0][1], course(made[0][1])
+    piece = np.arange(read.level + 120, read.level + 420)
+    order = np.r_[np.arange(read.level + 420), np.tile(piece, 26), np.arange(read.level + 420, len(log))]
+    extra = 26 * 300
+    stretched = log.with_columns({k: v[order] for k, v in log.columns.items()})
+    return stretched, replace(read, step=read.step + extra, entry=read.entry + extra, exit=read.exit + extra,
+                              landing=read.landing + extra)
+
+
+def test_spectra_are_those_of_welch(long_flight):
+    log, read = long_flight
+    rng = np.random.default_rng(0)
+    rate = rng.normal(0.0, 3.0, len(log))
+    values = features(noise_log(log, rng.normal(0.0, 800.0, len(log)), rate), read)
+    f, density = welch(rate[read.free], fs=100.0, window="hann", nperseg=LENGTH, detrend="linear")
+    scale = 10 * np.log10(100.0 * (np.hanning(LENGTH) ** 2).sum() / 2.0)  # one-sided density to |FFT|^2
+    for a, b in BANDS_HZ[1:-1]:
+        expected = 10 * np.log10(density[(f >= a) & (f < b)].mean()) + scale
+        assert values[NAMES.index(f"gyro x {a:g}-{b:g} Hz")] == pytest.approx(expected, abs=0.8)
+
+
+def test_coherency_has_the_phase_of_a_delay(long_flight):
+    """The rate follows the command by 30 ms: coherency e^(-i w 30 ms) while it is whole."""
+    log, read = long_flight
+    rng = np.random.default_rng(1)
+    command = rng.normal(0.0, 800.0, len(log))
+    values = features(noise_log(log, command, 0.01 * np.roll(command, 3)), read)
+    assert PAIRS[0] == (ch.GYRO_X, ch.ROLL)
+    for a, b in BANDS_HZ[1:6]:
+        got = complex(*(values[NAMES.index(f"gyro x with motor roll {a:g}-{b:g} Hz {part}")] for part in ("re", "im")))
+        f = np.fft.rfftfreq(LENGTH, 0.01)
+        w = 2 * np.pi * f[(f >= a) & (f < b)]
+        assert got == pytest.approx(np.exp(-1j * w * 0.03).mean(), abs=0.08)
+
+
+def test_channels_that_have_nothing_to_do_with_each_other_are_incoherent(long_flight):
+    log, read = long_flight
+    rng = np.random.default_rng(2)
+    values = features(noise_log(log, rng.normal(0.0, 800.0, len(log)), rng.normal(0.0, 3.0, len(log))), read)
+    some = [values[k] for k in rows("coherency") if NAMES[k].startswith("gyro x with motor roll")]
+    f, cross = csd(rng.normal(size=4000), rng.normal(size=4000), fs=100.0, nperseg=LENGTH)
+    assert np.abs(some).mean() < 0.1 and len(f) == len(cross)
+
+
+def test_edge_means_are_those_of_the_channels(made):
+    _, log, _ = made[1]
+    read = course(log)
+    x, values = channels(log), features(log, read)
+    level = x[read.entry - 100:read.entry - 40].mean(axis=0)
+    name = height_class(read.clearance_m)
+    for a, b in BINS_S[:6]:
+        part = x[read.entry + round(100 * a):read.entry + round(100 * b)].mean(axis=0)
+        az = values[next(k for k in rows("entry") if NAMES[k] == f"{name} az {a:+g}..{b:+g} s")]
+        down = values[next(k for k in rows("entry") if NAMES[k] == f"{name} down range {a:+g}..{b:+g} s")]
+        assert az == pytest.approx(part[ch.AZ] - level[ch.AZ], abs=1e-9)
+        assert down == pytest.approx(part[ch.DOWN], abs=1e-9)
+    others = [k for k in rows("entry") if not NAMES[k].startswith(name)]
+    assert np.isnan(values[others]).all()
+
+
+def test_height_classes_cover_what_flies():
+    assert [height_class(h) for h in (0.01, 0.05, 0.08, 0.5)] == [*CLASSES, None]
+
+
+def test_hover_level_and_slope(made):
+    _, log, _ = made[0]
+    read = course(log)
+    t = np.arange(len(log)) * 0.01
+    ramp = log.with_columns({f"m{i}_pwm": 40000.0 + 70.0 * t for i in range(1, 5)})
+    values = features(ramp, read)
+    assert values[NAMES.index("hover PWM slope")] == pytest.approx(70.0, rel=1e-6)
+    assert values[NAMES.index("trim motor roll")] == pytest.approx(0.0, abs=1e-6)

@@ -1,0 +1,112 @@
+"""A fit recovers lever values that were withheld: flights of a simulator whose levers are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation.flight import Diverged
+from airtouch.twin import fit, fly, levers
+from airtouch.twin.course import course
+from airtouch.twin.features import features, names
+from twin_courses import made_course
+
+FIXED = {"gust": {"rms": 0.1}, "rotor_drag": {}}
+#: lever -> the value that the "recorded" flights are flown with
+TRUTH = {"motor_lag.factor": 1.3, "vehicle.gyro_noise_ratio.0": 0.7, "ground_effect.strength": 1.5,
+         "trim.roll": 0.02, "motor_noise.rms": 0.011}
+
+
+@pytest.fixture(scope="module")
+def chosen(vehicle):
+    return tuple(lever for lever in levers.default(vehicle) if lever.name in TRUTH)
+
+
+@pytest.fixture(scope="module")
+def aim(vehicle, chosen):
+    truth = np.array([TRUTH[lever.name] for lever in chosen])
+    courses, numbers = [], []
+    for i in range(45):
+        log = fly.fly(made_course(i, (0.03, 0.05, 0.09)[i % 3]), vehicle, chosen, truth, 11, i, FIXED)
+        try:
+            courses.append(course(log) if not isinstance(log, Diverged) else None)
+        except AirTouchError:
+            courses.append(None)  # drift kept it over the platform
+        if courses[-1] is None:
+            courses.pop()
+            continue
+        numbers.append(features(log, courses[-1]))
+    assert len(courses) >= 36
+    return fit.target(courses, np.array(numbers))
+
+
+@pytest.fixture(scope="module")
+def fitted(aim, vehicle, chosen):
+    return fit.fit(aim, vehicle, chosen, rounds=7, flights=120, fixed=FIXED, seed=5)
+
+
+def test_withheld_levers_are_recovered(fitted, chosen):
+    """Within 1.5 of a lever's step (a tenth of the lag, 0.15 of the strength, ...), from up to four steps off."""
+    for lever, value in zip(chosen, fitted.values, strict=True):
+        off = (value - TRUTH[lever.name]) / lever.step
+        print(f"{lever.name}: start {lever.start:.4g}, truth {TRUTH[lever.name]:.4g}, fitted {value:.4g} "
+              f"({off:+.2f} steps)")
+        assert abs(off) < 1.5, lever.name
+
+
+def test_misfit_falls(fitted):
+    first, last = fitted.history[0]["misfit"], fitted.history[-1]["misfit"]
+    assert last["spectrum"] < 0.6 * first["spectrum"]
+    assert last["trim"] < 0.5 * first["trim"]
+
+
+def test_same_seed_same_levers_and_a_stopped_fit_goes_on(aim, vehicle, chosen, tmp_path):
+    settings = {"flights": 48, "fixed": FIXED, "seed": 2}
+    whole = fit.fit(aim, vehicle, chosen, rounds=3, **settings)
+    fit.fit(aim, vehicle, chosen, rounds=1, kept=tmp_path / "fit.json", **settings)
+    told = []
+    resumed = fit.fit(aim, vehicle, chosen, rounds=3, kept=tmp_path / "fit.json",
+                      progress=lambda done, total, misfit: told.append(done), **settings)
+    assert told == [2, 3]
+    np.testing.assert_allclose(resumed.values, whole.values, rtol=0, atol=0.02 * max(v.step for v in chosen))
+
+
+def test_a_damaged_fit_is_named(aim, vehicle, chosen, tmp_path):
+    (tmp_path / "fit.json").write_text("{")
+    with pytest.raises(AirTouchError, match="damaged fit"):
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, kept=tmp_path / "fit.json")
+
+
+def test_regression_is_least_squares():
+    """A linear world: the Jacobian and the gap at the centre come back."""
+    rng = np.random.default_rng(0)
+    true, offset = rng.normal(size=(len(names()), 3)), rng.normal(size=len(names()))
+    steps, centre = np.array([0.1, 2.0, 5.0]), np.array([1.0, 10.0, -5.0])
+    drawn = centre + steps * rng.standard_normal((400, 3))
+    apart = offset + (drawn - centre) / steps @ true.T + 0.05 * rng.standard_normal((400, len(names())))
+    apart[rng.random(apart.shape[0]) < 0.3, 7] = np.nan
+    jacobian, gap, variance = fit.regression(drawn, apart, centre, steps, 200)
+    np.testing.assert_allclose(jacobian, true, atol=0.12)
+    np.testing.assert_allclose(gap, offset, atol=0.05)
+    assert np.median(variance) == pytest.approx(0.05**2 / 200, rel=0.8)  # the ridge adds some
+
+
+def test_levers_are_those_of_the_registry(vehicle):
+    listed = levers.default(vehicle)
+    assert len({lever.name for lever in listed}) == len(listed)
+    levers.table(listed, levers.starts(listed))
+    for lever in listed:
+        assert lever.low <= lever.start <= lever.high and lever.step > 0, lever.name
+    wrong = (*listed, levers.Lever("gust", "colour", 0.0, 0.0, 1.0, 0.1, "1"))
+    with pytest.raises(AirTouchError, match="gust has no parameter colour"):
+        levers.table(wrong, levers.starts(wrong))
+
+
+def test_craft_sets_fields_and_axes(vehicle):
+    chosen = tuple(v for v in levers.default(vehicle) if v.of == levers.VEHICLE)
+    values = levers.starts(chosen)
+    assert levers.craft(vehicle, chosen, values) == vehicle
+    values[[v.key for v in chosen].index("gyro_noise_ratio.2")] = 0.7
+    changed = levers.craft(vehicle, chosen, values)
+    assert changed == replace(vehicle, gyro_noise_ratio=(*vehicle.gyro_noise_ratio[:2], 0.7))
