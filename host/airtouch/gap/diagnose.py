@@ -24,6 +24,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
+AT_FLOOR = 1.0  #: gap, of which no effect is named, that is at its floor
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as nobody "
@@ -56,7 +57,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     say("how far")
     ranking, overall = _ranking(data, found)
     effects = _effects(data, found)
-    verdict = _verdict(found)
+    verdict = _verdict(found, overall.before)
     named = [candidates.term_of(e) for e in effects] if verdict == "effect" else []
     cells = where(gap_map(study, seen, nominal, named))
     alike = _alike(found)
@@ -84,8 +85,8 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     """
     data = _data(study, flights) if data is None else data
     found = select(data, candidates.every(without), without=tuple(without))
-    verdict = _verdict(found)
     ranking, overall = _ranking(data, found)
+    verdict = _verdict(found, overall.before)
     named = verdict == "effect"
     return Diagnosis(
         verdict, tuple(_effects(data, found)) if named else (), tuple(ranking), _alike(found), (),
@@ -110,9 +111,10 @@ def _some(flights: Sequence[Flight]) -> list[Flight]:
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 
 
-def _verdict(found: Selection) -> str:
+def _verdict(found: Selection, before: float) -> str:
+    """before: the gap over its floor; what does not stand over it is nothing, whatever small differences add up to."""
     if not found.explained:
-        return "unknown"
+        return "unknown" if before > AT_FLOOR or found.chosen is not None else "none"
     return "none" if found.chosen is None else "effect"
 
 
@@ -189,8 +191,8 @@ def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray
 def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:
     """Every candidate with probability and shrink, best first; and the shrink of what was chosen."""
     parts = found.parts
-    chance = probabilities(found)
     overall = shrink_of(data, parts, found.chosen)
+    chance = probabilities(found, found.chosen is None and overall.before <= AT_FLOOR)
     out = []
     for name, p in chance.items():
         one = found.singles.get(name)

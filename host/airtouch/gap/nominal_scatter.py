@@ -18,11 +18,14 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
+from scipy.stats import t as student
 
 MOST_SURE = 3.0  #: standard deviations of the rate that are no news, at most
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
 WORTH = 4.0  #: flights that a class of the table counts as at most, beside the baseline's own
 NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
+RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
+RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
 GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the likeliest is taken
 
 
@@ -128,7 +131,7 @@ def _rate(own: tuple[float, float], rates: Sequence[float], worth: float) -> tup
 
 
 def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
-    """Log likelihood of the baseline's strengths in a class."""
+    """Log likelihood of the baseline's strengths and rates in a class."""
     total, nu = 0.0, own.freedom
     for flight in baseline:
         for name, rms in own.rms.items():
@@ -137,6 +140,8 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
                 variance = np.maximum(rms[:n], NEVER_BELOW) ** 2 + wide * flight.errors[name][:n] ** 2
                 far = wide * flight.strengths[name][:n] ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
+        for rate, (middle, spread) in ((flight.rate, own.rate), (flight.passing_rate, own.passing_rate)):
+            total += float(student.logpdf(np.sqrt(rate), RATE_FREEDOM, middle, max(spread, RATE_NEVER_BELOW)))
     return total
 
 

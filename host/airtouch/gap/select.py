@@ -443,8 +443,10 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
     return [out[n] for n in names]
 
 
-def probabilities(selection: Selection) -> dict[str, float]:
+def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
     """Of every single candidate, `none` and `unknown`; they sum to 1.
+
+    at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
 
     `unknown` has one half where as much is left as is allowed, and odds that grow with its square.
     """
@@ -456,6 +458,9 @@ def probabilities(selection: Selection) -> dict[str, float]:
     unknown = odds / (1.0 + odds)
     if selection.chosen is not None and selection.explained:  # not above the effect that is the answer
         share = weight[names.index(selection.named[0].name)] / weight.sum()
+        unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
+    if at_floor:
+        share = weight[-1] / weight.sum()
         unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
     known = (1.0 - unknown) * weight / weight.sum()
     return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))

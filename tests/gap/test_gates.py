@@ -1,0 +1,114 @@
+"""Effects that come and go: stretches found in flights into which one was injected, and none where none was."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle as vehicles
+from airtouch.gap import calibrate, candidates, flight, gates
+from airtouch.gap.channels import inside, residual
+from airtouch.gap.data import Data
+from airtouch.gap.diagnose import brief
+from airtouch.gap.unexplained import unexplained
+from airtouch.simulation import effects, scenario
+from airtouch.simulation.batch import flights as simulated
+from airtouch.simulation.effects import Active
+
+VEHICLE = vehicles.load("crazyflie-2.1-flow")
+FROM_S, TO_S = 9.0, 15.0
+
+
+def flown(count, seed):
+    off = list(scenario.load("diagnosis").table.get("effects", {}))
+    logs = simulated("diagnosis", count, vehicle=VEHICLE, without=off, seed=seed, workers=1)
+    return [flight.ready(log, VEHICLE) for log in logs]
+
+
+@pytest.fixture(scope="module")
+def study():
+    return calibrate.calibrated(VEHICLE, flown(4, 61))[0]
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return flown(1, 62)[0]
+
+
+def pushed(one, share):
+    """A flight that something presses down between FROM_S and TO_S, by a share of its weight."""
+    t = np.arange(len(one)) * flight.PERIOD_S
+    force = one.acceleration.copy()
+    force[(t >= FROM_S) & (t < TO_S), 2] -= share * VEHICLE.gravity_mps2
+    return replace(one, acceleration=force)
+
+
+def test_a_wake_is_found_with_its_seconds(study, quiet):
+    data = Data(study, [pushed(quiet, 0.1)])
+    found = gates.best_gated(data)
+    assert found is not None and found.gain > 100.0
+    acts = inside(found.terms[0].gate, quiet)
+    t = np.arange(len(quiet)) * flight.PERIOD_S
+    true = (t >= FROM_S) & (t < TO_S)
+    assert (acts & true).sum() > 0.7 * true.sum()
+    assert (acts & ~true).sum() * flight.PERIOD_S < 3.0  # blocks last 2.56 s
+
+
+def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, quiet):
+    found = gates.best_gated(Data(study, [quiet]))
+    assert found is None or found.gain < study.scatter.passing(len(quiet) * flight.PERIOD_S, 12.0)
+
+
+def test_the_diagnosis_says_when(study, quiet):
+    told = brief(study, [pushed(quiet, 0.1)])
+    stretches = [s for e in told.effects for s in e.seconds]
+    assert stretches and all(name == quiet.name for name, _, _ in stretches)
+    plain = next(e for e in told.plain()["effects"] if "seconds" in e)
+    assert FROM_S - 2.0 < plain["seconds"][0]["from_s"] < plain["seconds"][-1]["to_s"] < TO_S + 2.0
+
+
+def test_outside_its_gate_an_effect_changes_nothing(quiet):
+    effect = effects.get("downwash")
+    values = effect.values({"strength": 0.3, "width": 0.0, "turbulence": 0.0})
+    gated = Active(effect, values, ((quiet.name, FROM_S, TO_S),))
+    before, after = (residual(quiet, VEHICLE, a) for a in ((), (gated,)))
+    always = residual(quiet, VEHICLE, (Active(effect, values),))
+    on = inside(gated.gate, quiet)
+    np.testing.assert_array_equal(after[~on], before[~on])
+    np.testing.assert_allclose(after[on], always[on], atol=1e-9)
+    assert np.abs(after[on, 2] - before[on, 2]).min() > 0.2 * VEHICLE.gravity_mps2
+
+
+def test_a_wake_of_some_width_pushes_under_its_axis_only():
+    from airtouch.simulation import replay
+    from airtouch.simulation import signals as at
+    effect = effects.get("downwash")
+    active = Active(effect, effect.values({"strength": 0.25, "x": 1.0, "width": 0.1, "turbulence": 0.0}))
+    s = np.zeros((3, at.COUNT))
+    s[:, at.STEP], s[:, at.MASS], s[:, at.GRAVITY] = 0.01, 0.034, 9.81
+    s[:, at.ROTATION], s[:, at.ROTATION + 4], s[:, at.ROTATION + 8] = 1.0, 1.0, 1.0
+    s[:, at.POSITION] = 1.0, 1.1, 2.0
+    lift = replay.wrench_of(active, s)[:, 2] / (0.034 * 9.81)
+    np.testing.assert_allclose(lift, [-0.25, -0.25 / np.e, 0.0], atol=1e-9)
+
+
+def test_every_gated_effect_is_one_of_the_registry():
+    assert set(candidates.gated()) == set(candidates.GATED) <= set(effects.EFFECTS)
+    assert "wind" not in candidates.gated(["wind"])
+
+
+def test_what_stays_open_is_shown_with_its_seconds(study, quiet):
+    from airtouch.gap.gap_map import gap_map, where
+    from airtouch.gap.select import select
+    rng = np.random.default_rng(3)
+    t = np.arange(len(quiet)) * flight.PERIOD_S
+    on = (t >= FROM_S) & (t < TO_S)
+    force = quiet.acceleration.copy()
+    force[on, 1] += 1.5 * np.sin(2.0 * np.pi * 4.0 * t[on]) + 0.1 * rng.normal(size=on.sum())
+    odd = replace(quiet, acceleration=force)
+    found = select(Data(study, [odd]), {}, without=tuple(candidates.GATED))
+    cells = where(gap_map(study, [odd], flown(2, 63)))
+    shown = unexplained(study, [odd], found, cells)
+    first = next(u for u in shown if u["channel"] == "force_y")
+    assert FROM_S - 2.0 < first["from_s"] < first["to_s"] < TO_S + 2.0
+    assert first["over_floor"] > 3.0
