@@ -44,6 +44,8 @@ class Controller:
     on_error: bool = False  #: derivative acts on the error, angle loop included
     hold_s: float = 0.0  #: the estimator's attitude, velocity and height are renewed so often; 0: at every run
     chip_hz: float = 0.0  #: bandwidth of the gyro itself, 0 for all
+    range_gains: tuple[float, float] = (0.0, 0.0)  #: of a reading of the down range, to height and (1/s) climb
+    range_s: float = 0.025  #: period of these readings
     acc_hz: float = 0.0  #: low-pass of the acceleration that the climb is integrated from, 0 for none
 
 
@@ -73,6 +75,7 @@ def firmware(row: Any, axis: str) -> Controller:
         gain = float(climb["p"]) * float(row["thrust_scale"]) * slope
         return Controller(gain, float(height["p"]), integral=_share(climb["i"], climb["p"]),
                           angle_integral=_share(height["i"], height["p"]), hold_s=hold,
+                          range_gains=_range_gains(row["firmware"]), range_s=0.001 * float(periods["range_ms"]),
                           acc_hz=float(row["firmware"]["filters"]["acc_hz"]))
     i = AXES.index(axis) - 1
     rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
@@ -84,6 +87,18 @@ def firmware(row: Any, axis: str) -> Controller:
                       bool(row["firmware"]["controller"]["derivative_on_error"]), hold, float(row["gyro_bandwidth"]))
 
 
+def _range_gains(release: Any) -> tuple[float, float]:
+    """Steady gains of the firmware's Kalman filter from a near down range reading to height and climb (1/s)."""
+    period, variance = 0.001 * float(release["periods"]["range_ms"]), float(release["range"]["std_m"]) ** 2
+    noise = 1000.0 * period * (0.001 * float(release["kalman"]["noise_acc_z_mps2"])) ** 2
+    ahead, p, gains = np.array([[1.0, period], [0.0, 1.0]]), np.eye(2), np.zeros(2)
+    for _ in range(400):
+        p = ahead @ p @ ahead.T + np.diag([0.0, noise])
+        gains = p[:, 0] / (p[0, 0] + variance)
+        p = p - np.outer(gains, p[0])
+    return float(gains[0]), float(gains[1])
+
+
 def _share(part: Any, of: Any) -> float:
     return float(part) / float(of)
 
@@ -92,7 +107,8 @@ def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
 
     Sources, roll and pitch: white rate, white angle, velocity falling with the frequency,
-    torque; thrust: white climb, climb falling with the frequency, its square, force.
+    torque; thrust: white climb, climb falling with the frequency, its square, force, white error of the down
+    range, the same drifting from reading to reading.
     row: plant row of `simulation.flight.prepare`, effects in it.
     """
     folds = FOLDS if c.period_s < 0.5 * PERIOD_S else FOLDS[:1]
@@ -205,8 +221,10 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         plant, climb, _, _, whole = _parts(c, row, axis, f, s)
         size = 1.0 / (1.0 + plant * whole)
         climbs = np.abs(whole * size) ** 2
-        return np.array([np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4,
-                         np.abs(whole / s * size) ** 2])
+        sources = [np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4, np.abs(whole / s * size) ** 2]
+        if c.range_gains[0]:
+            sources += _range_errors(c, row, f, size)
+        return np.array(sources)
     return np.abs(_transfers(c, row, axis, f)[0]) ** 2
 
 
@@ -234,6 +252,37 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     turned = s * turned
     turned[0] += _difference(f) / _butterworth(s, c.chip_hz)
     return logged, turned
+
+
+def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
+    """Power (bins,) of the logged command for white errors of the down range, and for drifting ones; aliases in it.
+
+    size: of the closed loop over the open one at f.
+    """
+    white, drifting = np.zeros(len(f)), np.zeros(len(f))
+    for k in FOLDS:
+        g = f + k / PERIOD_S
+        power = np.abs(_ranged(c, row, g) * (1.0 if k else size)) ** 2
+        white += power
+        drifting += power / (4.0 * np.sin(np.pi * g * c.range_s) ** 2 + (0.6 * np.pi * c.range_s) ** 2)
+    return [white, drifting]
+
+
+def _ranged(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
+    """Command for an error of the down range of 1 m at f (Hz), through the estimator's height and climb.
+
+    Between two readings T apart the estimate moves on its own: X = (1 - (1 - K H) F / z)^-1 K.
+    """
+    s = 2j * np.pi * f
+    a, b, t = *c.range_gains, c.range_s
+    z = np.exp(-s * t)
+    # (1 - K H) F = [[1 - a, (1 - a) t], [-b, 1 - b t]]
+    m00, m01, m10, m11 = 1.0 - z * (1.0 - a), -z * (1.0 - a) * t, z * b, 1.0 - z * (1.0 - b * t)
+    det = m00 * m11 - m01 * m10
+    height, climb = (m11 * a - m01 * b) / det, (m00 * b - m10 * a) / det
+    k = float(row["height_gain"])
+    gain = k * c.gain * (1.0 + c.integral / s)
+    return np.sinc(f * t) * gain * (climb + c.angle * k * (1.0 + c.angle_integral / s) * height)
 
 
 def _delayed(s: np.ndarray, delay: float, step: float) -> np.ndarray:
