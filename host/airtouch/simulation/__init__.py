@@ -9,6 +9,9 @@ import os
 from pathlib import Path
 
 
+PARTS = (".", "effects", "firmware")  #: folders with compiled functions
+
+
 def _drop_stale_machine_code() -> None:
     """Remove cached machine code when any source of this package has changed.
 
