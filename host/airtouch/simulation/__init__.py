@@ -9,7 +9,6 @@ import os
 from pathlib import Path
 
 
-PARTS = (".", "effects", "firmware")  #: folders with compiled functions
 
 
 def _drop_stale_machine_code() -> None:
