@@ -13,6 +13,13 @@ settings.register_profile("reproducible", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
 
 
+def pytest_configure(config):
+    """The simulator is compiled once, before several workers would each do so."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        import airtouch.simulation.batch
+        import airtouch.simulation.replay  # noqa: F401
+
+
 @pytest.fixture(scope="session")
 def flights():
     """The folder of recorded flights; tests that need it skip where it is absent."""

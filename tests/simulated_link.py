@@ -17,6 +17,7 @@ from types import SimpleNamespace
 from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.crtpstack import CRTPPacket
 from cflib.crtp.exceptions import WrongUriType
+from patience import HANG_S
 
 from airtouch.sitl import Server
 from airtouch.sitl.faults import Fault, Line
@@ -25,7 +26,6 @@ from airtouch.sitl.packet import LOG, PARAM, Packet
 URI = "simulated://"
 CLOCKED = [f"airtouch.crazyflie.{name}" for name in ("collect", "drone", "flight", "log_blocks", "monitor")]
 CLOCKED += ["cflib.crazyflie.link_statistics", "cflib.positioning.motion_commander"]
-PATIENCE_S = 120.0  #: real seconds for what takes milliseconds; then the test fails
 LOOK_S = 0.0002
 CREATE, APPEND, SETTINGS = 6, 7, 1
 
@@ -83,7 +83,7 @@ class Clock:
 
     def settle(self) -> None:
         """Wait until cflib's threads and ours have nothing left to do now."""
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + HANG_S
         while self._drone.busy() or any(t not in self._asleep for t in threading.enumerate()
                                         if t in self._sleepers or t.name == "airtouch-revive"):
             assert time.monotonic() < end, "a thread never comes to rest"
@@ -106,7 +106,7 @@ class Clock:
 
     def wait(self, alarm: threading.Event) -> None:
         """Until the alarm goes off."""
-        assert alarm.wait(PATIENCE_S), "nobody lets time pass"
+        assert alarm.wait(HANG_S), "nobody lets time pass"
 
 
 class Queue:

@@ -12,8 +12,9 @@
 #define RECENT_SAMPLES 16u  // in which the latest sums are kept apart
 #define USUAL_BINS 7  // those of 6 to 8 Hz in 2 s: the loops over them unroll
 
-// Inlined whatever the compiler thinks of it, so that USUAL_BINS is a constant there.
-#if defined(__GNUC__)
+// Inlined whatever the compiler thinks of it, so that USUAL_BINS is a constant there. With -DAIRTOUCH_PLAIN_C it is C11
+// alone, as gap8/kernels/extensions.h: the same bits, only slower.
+#if defined(__GNUC__) && !defined(AIRTOUCH_PLAIN_C)
 #define INLINED static inline __attribute__((always_inline))
 #define UNROLLED _Pragma("GCC unroll 7")
 #else

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from objects import compiled
 
 ROOT = Path(__file__).parents[2]
 INCLUDES = [f"-I{ROOT / folder}" for folder in ("firmware/kernels", "firmware/link", "gap8/kernels", "gap8/model",
@@ -22,8 +23,10 @@ def build(driver: Path, program: Path) -> Path:
     compiler = shutil.which(os.environ.get("CC", "cc"))
     if compiler is None:
         pytest.skip("no C compiler on this machine")
-    done = subprocess.run([compiler, "-std=gnu11", "-O2", "-g", "-Wall", "-Wextra", *SANITIZERS, *INCLUDES, *SOURCES,
-                           driver, "-lm", "-o", program], capture_output=True, text=True)
+    flags = ["-std=gnu11", "-O2", "-g", "-Wall", "-Wextra", *SANITIZERS, *INCLUDES]
+    made, error = compiled(compiler, flags, [*SOURCES, driver])
+    assert not error, error
+    done = subprocess.run([compiler, *SANITIZERS, *made, "-lm", "-o", program], capture_output=True, text=True)
     if "cannot find -lasan" in done.stderr or "libclang_rt" in done.stderr:
         pytest.skip(f"{compiler} has no sanitizers")
     assert done.returncode == 0, done.stderr

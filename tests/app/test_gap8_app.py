@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import HANG_S
 
 from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
 from tools.emulator import build, elf
@@ -133,7 +134,7 @@ def team(compiler, tmp_path_factory):
 
 @pytest.mark.parametrize("cores", [1, 2, 4, 8])
 def test_a_team_of_cores_gives_the_same_packets(team, cores):
-    run = subprocess.run([team, str(cores)], capture_output=True, text=True, timeout=60)
+    run = subprocess.run([team, str(cores)], capture_output=True, text=True, timeout=HANG_S)
     assert run.returncode == 0 and int(run.stdout) == 31
 
 

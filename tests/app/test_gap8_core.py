@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from app.sanitized import build
+from patience import HANG_S
 
 
 @pytest.fixture(scope="module")
@@ -13,7 +14,7 @@ def driver(tmp_path_factory):
     program = build(Path(__file__).with_name("gap8_driver.c"), tmp_path_factory.mktemp("gap8") / "driver")
 
     def run(*words):
-        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=120)
+        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=HANG_S)
         assert done.returncode == 0, done.stderr[-3000:]
         return done.stdout
 

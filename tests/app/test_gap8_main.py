@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from objects import compiled
+from patience import HANG_S
 
 from airtouch.kernels.app_core import DETECTORS, HEALTH, AppCore, Gap8Core
 
@@ -60,7 +62,7 @@ class Chip:
         """Ends it: its exit status, 0 unless a sanitizer found something."""
         self._process.stdin.close()
         self._process.stdout.close()
-        return self._process.wait(20)
+        return self._process.wait(HANG_S)
 
 
 @pytest.fixture(scope="module")
@@ -75,12 +77,14 @@ def program(tmp_path_factory):
                       capture_output=True).returncode:
         pytest.skip(f"{compiler} has no sanitizers")
     flags = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZERS, *(f"-I{path}" for path in INCLUDES)]
-    main = folder / "main.o"
-    for command in ([*flags, "-Dmain=appMain", "-c", APP / "main.c", "-o", main],
-                    [*flags, main, *(path for path in SOURCES if path.name != "main.c"), "-pthread", "-lm", "-o",
-                     folder / "app"]):
-        built = subprocess.run([compiler, *command], capture_output=True, text=True)
-        assert built.returncode == 0, built.stderr
+    made = []
+    for named, sources in ((["-Dmain=appMain"], [APP / "main.c"]), ([], [p for p in SOURCES if p.name != "main.c"])):
+        objects, error = compiled(compiler, [*flags, *named], sources)
+        assert not error, error
+        made += objects
+    built = subprocess.run([compiler, *SANITIZERS, *made, "-pthread", "-lm", "-o", folder / "app"], capture_output=True,
+                           text=True)
+    assert built.returncode == 0, built.stderr
     return folder / "app"
 
 

@@ -8,6 +8,7 @@ import pytest
 from app.sanitized import build
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import HANG_S
 
 PASS, DROP, FLIP, RESET = 0, 6, 10, 62
 
@@ -23,7 +24,7 @@ def driver(tmp_path_factory):
         for number, script in enumerate(scripts):
             files.append(folder / f"{number}.script")
             files[-1].write_bytes(script)
-        done = subprocess.run([program, *files], capture_output=True, text=True, timeout=120)
+        done = subprocess.run([program, *files], capture_output=True, text=True, timeout=HANG_S)
         assert done.returncode == 0, done.stderr[-3000:]
         return int(re.fullmatch(r"\d+ scripts, answers after at most (\d+) packets\n", done.stdout)[1])
 

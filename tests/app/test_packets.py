@@ -10,6 +10,7 @@ import pytest
 from app.sanitized import build
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from patience import HANG_S
 
 FEATURES, RESULT = 2, 3
 
@@ -20,7 +21,7 @@ def driver(tmp_path_factory):
     program = build(Path(__file__).with_name("packet_driver.c"), tmp_path_factory.mktemp("packets") / "driver")
 
     def run(*words):
-        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=120)
+        done = subprocess.run([program, *words], capture_output=True, text=True, timeout=HANG_S)
         assert done.returncode == 0, done.stderr[-3000:]
         return tuple(map(int, re.fullmatch(r"(\d+) packets read, (\d+) refused\n", done.stdout).groups()))
 

@@ -5,7 +5,9 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import objects
 import pytest
+from patience import HANG_S
 
 from airtouch import vehicle as vehicles
 from airtouch.detector import vehicle_header
@@ -32,9 +34,10 @@ LONGEST_NAME = 26  # group, name and two bytes: the firmware asserts on a longer
 
 
 @pytest.fixture(scope="module")
-def headers(tmp_path_factory):
+def headers():
     """A folder with the vehicle's header under the name that the build gives it."""
-    folder = tmp_path_factory.mktemp("vehicle")
+    folder = objects.FOLDER / "vehicle"
+    folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(ROOT / vehicle_header.FOLDER / "crazyflie-2.1-flow.h", folder / "airtouch_vehicle.h")
     return folder
 
@@ -49,19 +52,17 @@ def shells(headers, tmp_path_factory):
     command = [compiler, "-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
                "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DCONFIG_PLATFORM_CF2", f"-I{headers}",
                *(f"-I{i}" for i in INCLUDES)]
-    compiled(subprocess.run([*command, "-c", *CORE], cwd=folder, capture_output=True, text=True))
+    core, error = objects.compiled(compiler, command[1:], CORE)
+    assert not error, error[:3000]
     for name, (flags, sources) in BUILDS.items():
-        compiled(subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources,
-                                 *folder.glob("*.o"), "-lm", "-o", folder / name], capture_output=True, text=True))
+        done = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core, "-lm", "-o",
+                               folder / name], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[:3000]
     return {name: folder / name for name in BUILDS}
 
 
-def compiled(run):
-    assert run.returncode == 0, run.stderr[:3000]
-
-
 def run(program, *arguments):
-    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
 

@@ -9,11 +9,11 @@ import sys
 from unittest.mock import Mock
 
 import pytest
+from patience import HANG_S
 
 from airtouch.crazyflie import guard
 
 LAND_HEADER = 0x8C
-PATIENCE_S = 240.0  #: then it counts as hung
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def drone():
     """A socket that takes the drone's place."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as served:
         served.bind(("127.0.0.1", 0))
-        served.settimeout(PATIENCE_S)
+        served.settimeout(HANG_S)
         yield served
 
 
@@ -29,7 +29,7 @@ def uri(drone):
     return f"udp://127.0.0.1:{drone.getsockname()[1]}"
 
 
-FLYER = """
+FLYER = f"""
 import sys, time
 from airtouch.crazyflie.guard import guarding
 with guarding(sys.argv[1], 0.25, 4.0) as watch:
@@ -39,7 +39,7 @@ with guarding(sys.argv[1], 0.25, 4.0) as watch:
     elif sys.argv[2] == "raises":
         raise RuntimeError("a bug")
     else:
-        time.sleep(60)
+        time.sleep({HANG_S})
 """
 
 
@@ -66,7 +66,7 @@ def test_the_drone_is_landed_when_its_pilot_dies(drone, how):
 
 def test_a_pilot_that_landed_is_left_alone(drone):
     process = flyer(drone, "lands")
-    assert process.wait(PATIENCE_S) == 0 and process.stderr.read() == ""  # the guard has ended too
+    assert process.wait(HANG_S) == 0 and process.stderr.read() == ""  # the guard has ended too
     drone.setblocking(False)
     with pytest.raises(BlockingIOError):
         drone.recv(64)

@@ -13,9 +13,9 @@ from airtouch.errors import AirTouchError
 from airtouch.sitl.packet import LOG, Packet
 
 pytest.importorskip("cflib", reason="flying needs cflib")
+from patience import HANG_S  # noqa: E402
 from simulated_link import APPEND, CREATE, SETTINGS, URI, simulated  # noqa: E402
 
-PATIENCE_S = 120.0  #: real seconds for what happens at once
 
 
 @pytest.fixture
@@ -108,7 +108,7 @@ def test_the_link_may_go_while_a_command_is_sent(far, drone):
     def break_off():
         link.about_to_send = lambda: None
         threading.Thread(target=close, daemon=True).start()
-        assert closed.wait(PATIENCE_S)
+        assert closed.wait(HANG_S)
 
     (link,) = far.links
     link.about_to_send = break_off

@@ -23,9 +23,9 @@ from airtouch.sitl import serve
 
 pytest.importorskip("cflib", reason="flying needs cflib")
 from missions import HOP  # noqa: E402
+from patience import HANG_S  # noqa: E402
 
 SPEED = 2.0  #: drone seconds a second
-PATIENCE_S = 240.0  #: then it counts as hung
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def start(virtual, hop, cache, out):
     """`airtouch collect` as a process, in the air and with 100 rows on the disk."""
     code = "from airtouch.cli import main; main()"
     process = subprocess.Popen([sys.executable, "-c", code, "collect", "--uri", virtual.uri, "--mission", str(hop), "--out",
-                                str(out), "--cache", str(cache), "--link-timeout", str(PATIENCE_S)],
+                                str(out), "--cache", str(cache), "--link-timeout", str(HANG_S)],
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     part = out / "hop_0001.csv.gz.part"
     until(lambda: process.poll() is not None or height(virtual) > 0.3 and part.exists()
@@ -64,16 +64,16 @@ def start(virtual, hop, cache, out):
 
 
 def until(condition):
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + HANG_S
     while not condition():
         assert time.monotonic() < end, "it did not happen"
         time.sleep(0.02)
 
 
 def test_a_connection_is_made_through_losses(hop, cache, monkeypatch):
-    monkeypatch.setattr("airtouch.crazyflie.log_blocks.BLOCK_S", PATIENCE_S)
+    monkeypatch.setattr("airtouch.crazyflie.log_blocks.BLOCK_S", HANG_S)
     with serve(hop, port=0, speed=SPEED, faults=("loss=0.05,all",)) as virtual:
-        drone = Drone(virtual.uri, cache, PATIENCE_S)
+        drone = Drone(virtual.uri, cache, HANG_S)
         try:
             drone.start(blocks.MOTION)
             assert drone.variables
@@ -85,7 +85,7 @@ def test_ctrl_c_lands_and_keeps_the_log(hop, cache, tmp_path):
     with serve(hop, port=0, speed=SPEED) as virtual:
         process = start(virtual, hop, cache, tmp_path)
         process.send_signal(signal.SIGINT)
-        text = process.communicate(timeout=PATIENCE_S)[0]
+        text = process.communicate(timeout=HANG_S)[0]
         assert process.returncode == 1 and "stopped by the user" in text, text
         until(lambda: on_the_ground(virtual))
     assert "stopped by the user" in logs.read(tmp_path / "hop_0001.csv.gz").meta["ended"]

@@ -92,10 +92,10 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
              for p in halves(data)]
     np.testing.assert_allclose(found, PUSH / VEHICLE.mass_kg, rtol=0.35)
     assert gain_of(study, one) > 30.0
-    chance = {w: {r.name: r.probability for r in brief(study, one, w).ranking}["unknown"] for w in ((), ("sideways",))}
-    assert brief(study, one, ("sideways",)).verdict == "unknown" and chance[("sideways",)] > 0.9
-    named = brief(study, one)
-    assert named.verdict == "effect" and named.effects[0].name == "sideways" and chance[()] < 0.1
+    named, nameless = (brief(study, one, without, data) for without in ((), ("sideways",)))
+    chance, without_name = ({r.name: r.probability for r in d.ranking}["unknown"] for d in (named, nameless))
+    assert nameless.verdict == "unknown" and without_name > 0.9
+    assert named.verdict == "effect" and named.effects[0].name == "sideways" and chance < 0.1
 
 
 def test_an_effect_with_its_name_beats_the_model_without(study):

@@ -49,6 +49,11 @@ def found(study, flights, name):
     return best
 
 
+@pytest.fixture(scope="module")
+def nominal():
+    return spectrum({})
+
+
 def spectrum(effects):
     total = 0.0
     for log in simulated(scenario.parse(LONG, "long hover"), 8, vehicle=VEHICLE, effects=effects, workers=1):
@@ -62,16 +67,16 @@ def spectrum(effects):
     {"sensor_latency": {"delay": 0.004}}, {"sensor_latency": {"delay": 0.006}}, {"sensor_latency": {"delay": 0.008}},
     {"controller_gain": {"rate": 0.7}}, {"controller_gain": {"rate": 1.0, "height": 1.5}},
     {"motor_lag": {"factor": 1.5}}, {"inertia": {"fraction": 0.4}}, {"mass": {"fraction": 0.13}}])
-def test_predicted_ratio_is_that_of_the_simulated_loop(effects):
-    nominal = spectrum({})
+def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     row, changed = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
+    seen = spectrum(effects)
     for i, axis in enumerate(loop_model.AXES):
         strengths, _, _ = twin._fit(loop_model.firmware(row, axis), row, axis, nominal[:, i])
         f, fine = twin.frequencies(), twin.fine_frequencies()
         expected = twin.through_window(
             strengths @ loop_model.spectra(loop_model.firmware(changed, axis), changed, axis, fine))
         expected /= twin.through_window(strengths @ loop_model.spectra(loop_model.firmware(row, axis), row, axis, fine))
-        error = 10.0 * np.log10(spectrum(effects)[:, i] / nominal[:, i] / expected)
+        error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
         assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
 

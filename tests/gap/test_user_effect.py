@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airtouch.gap.diagnose import diagnose
+from airtouch.gap import measure
+from airtouch.gap.diagnose import brief, diagnose
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
 
@@ -39,6 +40,6 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
     assert found.shrink.value > 0.8
     assert abs(found.control["shrink"]["value"]) < 0.2
-    left_out = diagnose(real, vehicle, nominal, without=("magnet",))
+    left_out = brief(found.held[0], list(measure.usable(real, vehicle, [])), ("magnet",))  # the same calibration
     assert "magnet" not in [r.name for r in left_out.ranking]
     assert left_out.gap["after"] > found.gap["after"]

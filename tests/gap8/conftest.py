@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from objects import compiled
 
 ROOT = Path(__file__).parents[2]
 KERNELS, MODEL, BATCH, FIRMWARE = (ROOT / "gap8" / "kernels", ROOT / "gap8" / "model", ROOT / "host/airtouch/kernels",
@@ -22,8 +23,9 @@ class Compiler:
         self.command = command
 
     def __call__(self, sources: list[Path], out: Path, *flags: str) -> Path:
-        done = subprocess.run([self.command, *FLAGS, *flags, *map(str, sources), "-lm", "-o", str(out)],
-                              capture_output=True, text=True)
+        made, error = compiled(self.command, [*FLAGS, *flags], sources)
+        assert not error, error
+        done = subprocess.run([self.command, *flags, *made, "-lm", "-o", str(out)], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         return out
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from gap8.conftest import EMULATION, KERNELS, MODEL
+from patience import HANG_S
 
 SOURCES = [*sorted(KERNELS.glob("*.c")), *sorted(MODEL.glob("airtouch_[mrg]*.c")), Path(__file__).with_name("team.c")]
 
@@ -25,7 +26,7 @@ def programs(request, compiler, tmp_path_factory) -> dict[str, Path]:
 
 @pytest.mark.parametrize("cores", range(1, 9))
 def test_any_number_of_cores_gives_the_golden_answers(programs, cores):
-    done = subprocess.run([programs["plain"], str(cores), "3"], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([programs["plain"], str(cores), "3"], capture_output=True, text=True, timeout=HANG_S)
     assert (done.returncode, done.stdout) == (0, "same\n"), done.stderr
 
 
@@ -34,5 +35,5 @@ def test_any_number_of_cores_gives_the_golden_answers(programs, cores):
 def test_sanitizers_find_nothing(programs, sanitizer, cores):
     if sanitizer not in programs:
         pytest.skip(f"the C compiler has no {sanitizer} sanitizer that runs here")
-    done = subprocess.run([programs[sanitizer], str(cores), "1"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([programs[sanitizer], str(cores), "1"], capture_output=True, text=True, timeout=HANG_S)
     assert (done.returncode, done.stdout) == (0, "same\n"), done.stderr[-3000:]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import HANG_S
 
 from airtouch.parameters import c_header
 
@@ -87,6 +88,6 @@ def test_sanitizers_find_nothing_in_any_bytes(compiler, tmp_path):
                            capture_output=True, text=True)
     assert build.returncode == 0, build.stderr
     files = byte_files(tmp_path)
-    run = subprocess.run([driver, *files], capture_output=True, text=True, timeout=120)
+    run = subprocess.run([driver, *files], capture_output=True, text=True, timeout=HANG_S)
     assert run.returncode == 0, run.stderr[-3000:]
     assert run.stdout == f"{len(files)} files\n"

@@ -4,8 +4,8 @@ import contextlib
 import time
 
 import pytest
+from patience import HANG_S
 
-PATIENCE_S = 240.0  #: then it counts as hung
 
 
 @contextlib.contextmanager
@@ -21,7 +21,7 @@ def connected(uri, cache=None):
 
 def wait_for(condition):
     """Poll until condition() holds; its value, or a failure where it hangs."""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + HANG_S
     while time.monotonic() < end:
         value = condition()
         if value:

@@ -5,6 +5,7 @@ import socket
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from patience import HANG_S
 
 from airtouch.sitl import Server, serve
 from airtouch.sitl.packet import MOST_DATA, Packet, parse
@@ -12,6 +13,7 @@ from airtouch.sitl.packet import MOST_DATA, Packet, parse
 ECHO = bytes([15 << 4 | 0x0C]) + b"are you there"
 PACKETS = st.lists(st.tuples(st.integers(0, 15), st.integers(0, 3), st.integers(0, 15),
                              st.binary(max_size=MOST_DATA)), min_size=1, max_size=20)
+ASK_S = 0.2  #: then it is asked again
 server = None
 
 
@@ -34,7 +36,7 @@ def test_no_packet_breaks_the_firmware(packets):
 
 def answered(client, datagram):
     """What comes back, asked until it does: the noise may have filled the socket's buffer."""
-    for _ in range(1200):  # 240 s, then it counts as hung
+    for _ in range(int(HANG_S / ASK_S)):
         client.send(datagram)
         with contextlib.suppress(TimeoutError):
             return client.recv(2048)
@@ -49,7 +51,7 @@ def test_no_datagram_breaks_the_server():
         def client():
             made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             made.connect(("127.0.0.1", virtual.port))
-            made.settimeout(0.2)
+            made.settimeout(ASK_S)
             return made
 
         for _ in range(5):

@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 import pytest
-from sitl.clients import PATIENCE_S
+from patience import HANG_S
 
 from airtouch.sitl import serve
 
@@ -23,7 +23,7 @@ from cfclient.utils.logconfigreader import LogConfigReader
 from cfclient.utils.logdatawriter import LogWriter
 
 def wait_for(condition):
-    end = time.monotonic() + 200.0
+    end = time.monotonic() + float(sys.argv[2])
     while not condition():
         if time.monotonic() > end:
             raise SystemExit("it did not happen")
@@ -70,7 +70,7 @@ def test_headless_client_log_configurations_and_log_files(tmp_path):
     environment = {**os.environ, "HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path),
                    "QT_QPA_PLATFORM": "offscreen"}
     with serve("hover", port=0, without=["gust"]) as virtual:
-        done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri], env=environment, timeout=PATIENCE_S,
+        done = subprocess.run([sys.executable, "-c", SCRIPT, virtual.uri, str(HANG_S)], env=environment, timeout=HANG_S,
                               capture_output=True, text=True)
         assert done.returncode == 0, done.stderr[-2000:]
         assert virtual.drone.took_off_s is not None

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from sitl.clients import PATIENCE_S, connected, log_block, wait_for
+from patience import HANG_S
+from sitl.clients import connected, log_block, wait_for
 
 from airtouch.sitl import serve
 
@@ -100,7 +101,7 @@ def test_scan_finds_it(cflib, monkeypatch):
     with serve("hover", port=0) as virtual:
         monkeypatch.setattr(udpdriver, "_BASE_PORT", virtual.port)
         monkeypatch.setattr(udpdriver, "_NR_OF_PORTS_TO_SCAN", 1)
-        monkeypatch.setattr(udpdriver, "_SCAN_TIMEOUT", PATIENCE_S)
+        monkeypatch.setattr(udpdriver, "_SCAN_TIMEOUT", HANG_S)
         assert udpdriver.UdpDriver().scan_interface() == [[virtual.uri, ""]]
 
 

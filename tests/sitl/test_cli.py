@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from sitl.clients import PATIENCE_S
+from patience import HANG_S
 
 from airtouch import logs
 from airtouch.cli import main
@@ -26,13 +26,13 @@ def test_serves_until_ctrl_c_and_records(tmp_path):
                "--fault", "late=1ms", "--record", str(path)) as process:
         uri = process.stdout.readline().split(": ")[0]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
-            client.settimeout(PATIENCE_S)
+            client.settimeout(HANG_S)
             client.connect(("127.0.0.1", int(uri.rsplit(":", 1)[1])))
             client.send(ECHO)
             assert client.recv(100) == ECHO
             assert b"virtual Crazyflie" in client.recv(100)  # on the console
         process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=PATIENCE_S)
+        out, error = process.communicate(timeout=HANG_S)
     assert process.returncode == 0, error
     assert str(path) in out and len(logs.read(path)) > 0
 

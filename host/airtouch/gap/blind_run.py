@@ -34,28 +34,33 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
         blind.make(out, flights, seed, kinds=list(kinds) if kinds else None, progress=progress)
     answers = out / "answers"
     names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
-    answer(out, answers, [(n, ()) for n in names], workers, progress)
+    study = _study_in(out)
+    answer(out, answers, [(n, ()) for n in names], workers, progress, study)
     first = sorted(answers.glob("flight_????.json"))
     # the key is opened for the answers above; effects can be withheld only when they are known
     sealed = hashlib.sha256(json.dumps([json.loads(p.read_text()) for p in first], sort_keys=True).encode()).hexdigest()
     key = blind.open_key(out, sealed)["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := twins_of(e)) else (e,)) for n, e in single[:unknown]]
-    answer(out, answers, cases, workers, progress)
+    answer(out, answers, cases, workers, progress, study)
     return blind.score(out, answers)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
-           progress: Say = lambda _: None) -> None:
-    """Diagnose flights of a set, one JSON each in `answers`; each case is a flight and effects to leave out."""
+           progress: Say = lambda _: None, study: Study | None = None) -> None:
+    """Diagnose flights of a set, one JSON each in `answers`; each case is a flight and effects to leave out.
+
+    study: of the set, where it is there already.
+    """
     answers.mkdir(parents=True, exist_ok=True)
     todo = [(folder, answers, name, without) for name, without in cases if not _place(answers, name, without).exists()]
+    study = study or (_study_in(folder) if todo else None)
     if workers == 1 or len(todo) < 3:
-        _begin(folder)
+        _begin(study)
         for case in todo:
             progress(_diagnose(case))
         return
-    with ProcessPoolExecutor(workers, initializer=_begin, initargs=(folder,)) as pool:
+    with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
         for name in pool.map(_diagnose, todo, chunksize=2):
             progress(name)
 
@@ -64,10 +69,14 @@ def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
     return answers / ".".join([name, *(["without", *without] if without else []), "json"])
 
 
-def _begin(folder: Path) -> None:
-    """Calibrate once for each process."""
+def _study_in(folder: Path) -> Study:
+    return blind.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+
+
+def _begin(study: Study | None) -> None:
+    """One study for every process: it is calibrated once."""
     global _study
-    _study = blind.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+    _study = study
 
 
 def _diagnose(case: tuple[Path, Path, str, tuple[str, ...]]) -> str:

@@ -1,6 +1,6 @@
 """Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -64,9 +64,16 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     """
     response = data.study.response
     replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
-    every = _replayed(data, replayed)
     if response is None:
+        every = _replayed(data, replayed)
         return _without_means(data, replayed, every) if data.slow else every
+    return _cached(data, "_applied", active, lambda: _applied(data, response, active, replayed))
+
+
+def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
+             ) -> list[dict[str, np.ndarray]]:
+    """Spectra of the gap, torque compared with what the commands leave to expect. replayed: without COMMAND_ONLY."""
+    every = _replayed(data, replayed)
     law = data.study.controller
     beside = [a for a in replayed if not law.changes_loop((a,))]
     through = [a for a in beside if a.effect.wrench is None]
@@ -92,17 +99,26 @@ def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, n
 
 def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    study, out = data.study, []
-    kept = data.__dict__.setdefault("_spectra", {})
+    return _cached(data, "_spectra", active, lambda: [_replay(data, *pair, active)
+                                                      for pair in zip(data.flights, data.first, strict=True)])
+
+
+def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], active: Sequence[Active]) -> dict[str, np.ndarray]:
+    rest = residual(flight, data.study.vehicle, (*data.study.calibration, *active))
+    rest = held(np.where(flight.lost[:, None], np.nan, rest))
+    return {r: blocks(rest, first[r], r) for r in first}
+
+
+def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],
+            ) -> list[dict[str, np.ndarray]]:
+    """Spectra under a hypothesis, made once while it is among the last KEPT; those of no effect always."""
+    cache = data.__dict__.setdefault(name, {})
     key = tuple((a.effect.name, *a.values.values()) for a in active)
-    if key in kept:
-        return kept[key]
-    for flight, first in zip(data.flights, data.first, strict=True):
-        left = residual(flight, study.vehicle, (*study.calibration, *active))
-        left = held(np.where(flight.lost[:, None], np.nan, left))
-        out.append({r: blocks(left, first[r], r) for r in first})
-    if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
-        if len(kept) >= KEPT:
-            kept.pop(next(k for k in kept if k))
-        kept[key] = out
-    return out
+    if key not in cache:
+        made = make()
+        if active and sum(len(f) for f in data.flights) > KEPT_SAMPLES:
+            return made
+        if len(cache) >= KEPT:
+            cache.pop(next(k for k in cache if k))
+        cache[key] = made
+    return cache[key]

@@ -111,14 +111,20 @@ def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     range, the same drifting from reading to reading.
     row: plant row of `simulation.flight.prepare`, effects in it.
     """
-    folds = FOLDS if c.period_s < 0.5 * PERIOD_S else FOLDS[:1]
-    total = 0.0
-    for k in folds:
-        made = _sources(c, row, axis, np.abs(f + k / PERIOD_S))
-        if k:
-            made[1:] = 0.0
-        total = total + made
-    return total
+    return _with_aliases(_sources(c, row, axis, f), _aliases(c, row, axis, f))
+
+
+def _aliases(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """What of the first source's noise folds into the log, noise to command, complex (folds, bins)."""
+    if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
+        return np.zeros((0, len(f)))
+    return _transfers(c, row, axis, np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05))[0][0]
+
+
+def _with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
+    for folded in aliases:
+        power[0] += np.abs(folded) ** 2
+    return power
 
 
 def excess_phase(c: Controller, row: Any, axis: str) -> float:
@@ -150,11 +156,10 @@ def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarra
     smoothed over, standard deviation.
     """
     logged, turned = _transfers(c, row, axis, np.maximum(f, 0.05))
-    cross = turned * logged.conj()
-    for k in FOLDS[1:] if c.period_s < 0.5 * PERIOD_S else ():  # noise of the gyro folds into log and command alike
-        folded = _transfers(c, row, axis, np.maximum(np.abs(f + k / PERIOD_S), 0.05))[0][0]
+    cross, aliases = turned * logged.conj(), _aliases(c, row, axis, f)
+    for k, folded in zip(FOLDS[1:], aliases, strict=False):  # noise of the gyro folds into log and command alike
         cross[0] += _difference(f) * np.where(f + k / PERIOD_S < 0.0, folded, folded.conj())
-    cross, power = strengths @ cross, strengths @ spectra(c, row, axis, f)
+    cross, power = strengths @ cross, strengths @ _with_aliases(np.abs(logged) ** 2, aliases)
     if width > 0.0:
         cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))
     return cross / power

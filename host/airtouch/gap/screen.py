@@ -25,6 +25,7 @@ class Screen:
 
     data: Data
     kept: dict[tuple, list[dict[str, np.ndarray]]] = field(default_factory=dict)
+    judged: dict[int, tuple[np.ndarray, float, float]] = field(default_factory=dict)
 
     def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
         """Change of the flattened spectra per scaled parameter i of a term at neutral."""
@@ -41,6 +42,14 @@ class Screen:
                               for a, b in zip(after, before, strict=True)]
         gathered = problem._gather(self.kept[key])
         return np.where(problem.known, problem._with_twin(gathered), 0.0)
+
+    def before(self, problem: Problem, left: np.ndarray, added: np.ndarray) -> tuple[float, float]:
+        """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""
+        known = self.judged.get(id(left))
+        if known is None or known[0] is not left:
+            values, cost = without_offsets(problem, left, added)
+            known = self.judged[id(left)] = (left, problem.likelihood(values, added), cost)
+        return known[1:]
 
 
 def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray],
@@ -79,8 +88,8 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         problem = problem_of(screen.data, parts[test])
         moved = left[test] + sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(left[test])))
         after, cost = without_offsets(problem, moved, added[test])
-        before, paid = without_offsets(problem, left[test], added[test])
-        gain += problem.likelihood(after, added[test]) - cost - problem.likelihood(before, added[test]) + paid
+        before, paid = screen.before(problem, left[test], added[test])
+        gain += problem.likelihood(after, added[test]) - cost - before + paid
         found.append(x[:n])
     return gain, found
 

@@ -54,6 +54,7 @@ FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "posit
 LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
                "motor_fall", "inertia")
 SMOOTH = 2.0  #: bins: a block's window and `response.SMOOTH`
+PLANTS = 500  #: hypotheses whose plant is cached
 MOST_CHANGE = 5.0  #: of the share of torque
 #: effects that change the commands alone: replayed motor commands hold nothing of them
 COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
@@ -102,9 +103,9 @@ class Twin:
 
         A controller no faster than the log folds nothing: there the motors alone count.
         """
-        row, first = self._row(active), self._plain
-        if _same_loop(row, first):
+        if not self.changes_loop(active):
             return None
+        row, first = self._row(active), self._plain
         after, before = self._shares(row, f), self._shares(first, f)
         share = after / before if self.by_firmware else np.ones_like(before)
         motors = torque_per_command(row, AXES[1], f) / torque_per_command(first, AXES[1], f)
@@ -112,15 +113,27 @@ class Twin:
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
-        return not _same_loop(self._row(active), self._plain)
+        return self._plant(active)[1]
 
     @cached_property
     def _plain(self) -> Any:
         """Plant row of the vehicle as calibrated."""
-        return self._row(())
+        return prepare(self.vehicle, self.calibration)[0][0]
 
     def _row(self, active: Sequence[Active]) -> Any:
-        return prepare(self.vehicle, (*self.calibration, *active))[0][0]
+        """Plant row with effects; not to be changed."""
+        return self._plant(active)[0]
+
+    def _plant(self, active: Sequence[Active]) -> tuple[Any, bool]:
+        """Plant row with effects, and whether they change the roll and pitch loops."""
+        cache = self.__dict__.setdefault("_plants", {})
+        key = tuple((a.effect.name, *a.values.values()) for a in active)
+        if key not in cache:
+            if len(cache) >= PLANTS:
+                cache.clear()
+            row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
+            cache[key] = row, not _same_loop(row, self._plain)
+        return cache[key]
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
         """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""

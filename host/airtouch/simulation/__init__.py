@@ -9,9 +9,6 @@ import os
 from pathlib import Path
 
 
-PARTS = (".", "effects", "firmware")  #: folders with compiled functions
-
-
 def _drop_stale_machine_code() -> None:
     """Remove cached machine code when any source of this package has changed.
 
@@ -19,15 +16,14 @@ def _drop_stale_machine_code() -> None:
     that it calls, and would fly yesterday's equations.
     """
     folder = Path(__file__).parent
-    sources = sorted([p for part in PARTS for p in (folder / part).glob("*.py")])
-    stamp = "\n".join(f"{p.name} {s.st_mtime_ns} {s.st_size}" for p in sources for s in [p.stat()])
+    sources = sorted(folder.rglob("*.py"))
+    stamp = "\n".join(f"{p.relative_to(folder)} {s.st_mtime_ns} {s.st_size}" for p in sources for s in [p.stat()])
     kept = folder / "__pycache__" / "sources.stamp"
     with contextlib.suppress(OSError):
         if kept.is_file() and kept.read_text() == stamp:
             return
-        for part in PARTS:
-            for index in (folder / part).glob("__pycache__/*.nbi"):
-                index.unlink(missing_ok=True)
+        for index in folder.rglob("__pycache__/*.nbi"):
+            index.unlink(missing_ok=True)
         kept.parent.mkdir(exist_ok=True)
         temporary = kept.with_suffix(f".{os.getpid()}")
         temporary.write_text(stamp)

@@ -4,6 +4,8 @@ A vehicle gives the nominal values, effects change them. `firmware` holds the se
 (simulation.firmware.settings).
 """
 
+import functools
+
 import numpy as np
 
 from airtouch.simulation.firmware import settings
@@ -98,6 +100,11 @@ def from_vehicle(vehicle: Vehicle) -> np.ndarray:
 
     Its fields may be changed in place; lengths and units are in FIELDS.
     """
+    return _nominal(vehicle).copy()
+
+
+@functools.lru_cache(64)
+def _nominal(vehicle: Vehicle) -> np.ndarray:
     plant = np.zeros(1, DTYPE)
     for name, _, default, _ in FIELDS:
         plant[name] = default

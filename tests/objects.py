@@ -1,0 +1,35 @@
+"""Objects of C sources for the tests' programs: each compiled once for its content, flags and headers.
+
+They are in build/tests, and the processes of one test run share them: who comes second waits for the first.
+"""
+
+import fcntl
+import hashlib
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+FOLDER = Path(__file__).parents[1] / "build" / "tests"
+
+
+def compiled(compiler: str, flags: Sequence[str | Path], sources: Sequence[Path]) -> tuple[list[Path], str]:
+    """The objects of C sources, and what the compiler said where one does not compile (then there are none)."""
+    flags = [str(flag) for flag in flags]
+    folders = [Path(flag.removeprefix("-I")) for flag in flags if flag.startswith("-I")]
+    headers = sorted({path for folder in {*folders, *(s.parent for s in sources)} for path in folder.rglob("*.h")})
+    version = subprocess.run([compiler, "--version"], capture_output=True).stdout
+    common = version + "\0".join(flags).encode() + b"".join(str(h).encode() + h.read_bytes() for h in headers)
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    made = []
+    with (FOLDER / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        for source in sources:
+            key = hashlib.sha256(common + str(source).encode() + source.read_bytes()).hexdigest()[:24]
+            made.append(FOLDER / f"{source.stem}-{key}.o")
+            if not made[-1].exists():
+                part = made[-1].with_suffix(".part")
+                done = subprocess.run([compiler, *flags, "-c", source, "-o", part], capture_output=True, text=True)
+                if done.returncode:
+                    return [], done.stderr
+                part.rename(made[-1])
+    return made, ""
