@@ -44,14 +44,16 @@ class Vehicle:
     power_per_thrust15: float = 85.0  #: electrical power over thrust^1.5 of one rotor, W/N^1.5
     acc_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)  #: noise of each axis over the rms above
     gyro_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    flow_noise_mps: tuple[float, float, float] = (0.02, 0.02,
-                                                  0.0)  #: velocity estimate's error forward, left, up
+    range_drift_rms: float = 0.0  #: error of the down range that comes and goes, over the distance
+    range_drift_time_s: float = 0.5  #: its correlation time
+    gyro_bandwidth_hz: float = 116.0  #: of the gyro chip, its noise included; 0: all
+    flow_noise_mps: tuple[float, float] = (0.02, 0.02)  #: error of optical flow forward, left at 1 m
     flow_noise_time_s: float = 0.05  #: its correlation time
     acc_lowpass_hz: float = 0.0  #: of the logged accelerometer; 0: none
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
-    derivative_on_error: float = 0.0  #: 1: rate derivative on the error (firmware before 2024)
-    battery_compensation: float = 0.0  #: 1: the firmware compensates the battery voltage
     arm_pwm: float = 15000.0  #: the app takes it to be airborne while the mean PWM is above this
+    firmware: str = "2026.08"  #: release that flies: a file of simulation/firmwares, or a path to one
+    range_module: str = "map"  #: platform, map, none, or firmware: what the release has
     platform: str = ""  #: platform of crazyflie-firmware that flies it (cf2, cf21bl, bolt); "" where unknown
 
     def thrust(self, pwm: np.ndarray) -> np.ndarray:
@@ -61,9 +63,10 @@ class Vehicle:
         return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
 
 
-TEXTS = ("name", "platform")  #: fields that are no number
-#: fields of three numbers
-TRIPLES = ("inertia_kg_m2", "thrust_of_pwm_n", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps")
+TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are no number
+#: fields of so many numbers
+LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_noise_ratio": 3, "flow_noise_mps": 2}
+RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
 def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
@@ -98,9 +101,9 @@ def parse(text: str, source: str) -> Vehicle:
         raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(fields)}")
     values = {}
     for name, value in table.items():
-        if name in TRIPLES:
-            if not (isinstance(value, list) and len(value) == 3 and all(_is_number(v) for v in value)):
-                raise AirTouchError(f"{source}: {name} must be three numbers")
+        if name in LISTS:
+            if not (isinstance(value, list) and len(value) == LISTS[name] and all(_is_number(v) for v in value)):
+                raise AirTouchError(f"{source}: {name} must be {LISTS[name]} numbers")
             values[name] = tuple(float(v) for v in value)
         elif name in TEXTS:
             if not isinstance(value, str):
@@ -117,9 +120,22 @@ def parse(text: str, source: str) -> Vehicle:
                                 "yaw_torque_over_thrust_m", "motor_time_constant_s", "rotor_radius_m")
                     if n not in values]
         raise AirTouchError(f"{source}: missing {', '.join(required)}") from None
+    check_firmware(vehicle.firmware, vehicle.range_module, source)
     if vehicle.mass_kg <= 0 or min(vehicle.inertia_kg_m2) <= 0:
         raise AirTouchError(f"{source}: mass and inertia must be positive")
     return vehicle
+
+
+def check_firmware(firmware: str, range_module: str, source: str) -> None:
+    """Raise AirTouchError for a firmware or a range module that nobody knows; `source` names the file."""
+    from airtouch.simulation.firmware import settings
+
+    if range_module not in RANGE_MODULES:
+        raise AirTouchError(f"{source}: range_module is one of {', '.join(RANGE_MODULES)}, not {range_module!r}")
+    try:
+        settings.load(firmware)
+    except AirTouchError as error:
+        raise AirTouchError(f"{source}: {error}") from None
 
 
 def _is_number(value: object) -> bool:

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.crazyflie import mission
 from airtouch.errors import AirTouchError
-from airtouch.simulation import controller as c
+from airtouch.simulation import setpoint as c
 from airtouch.simulation import scenario
 
 

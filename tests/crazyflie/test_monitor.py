@@ -90,7 +90,7 @@ def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
     assert holed.detector.taken == pytest.approx(len(flight), abs=8)
     assert [f.kind for f in holed.board.felt] == [f.kind for f in whole.board.felt]
     for felt, expected in zip(holed.board.felt, whole.board.felt, strict=True):
-        assert felt.at_s == pytest.approx(expected.at_s, abs=0.25)
+        assert felt.at_s == pytest.approx(expected.at_s, abs=0.5)  # a slow entry moves with what is lost
     holed.intake.last_arrival_s = 5.0
     holed.refresh(0.004)
     assert holed.board.link.lost == pytest.approx(0.3, abs=0.03) and "round trip 4 ms" in str(holed.board.link)

@@ -78,7 +78,7 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
         expected /= twin.through_window(strengths @ loop_model.spectra(loop_model.firmware(row, axis), row, axis, fine))
         error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
-        assert np.abs(error[f < 5.0]).max() < 0.9
+        assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
 
 
 def test_latency_is_found_with_its_value(study):
@@ -96,7 +96,7 @@ def test_lower_rate_gain_is_found_and_is_no_latency(study):
 
 
 def test_range_step_is_found_at_edges(study):
-    flights = flown("paper-mixed", 4, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
+    flights = flown("paper-mixed", 8, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
     gain, values = found(study, flights, "range_step")
     assert gain > 12.0
     assert values["kick"] == pytest.approx(0.05, rel=0.3)

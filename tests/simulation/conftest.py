@@ -23,7 +23,7 @@ def quiet(vehicle):
     """The same vehicle with sensors that do not err."""
     from dataclasses import replace
     return replace(vehicle, acc_noise_rms_mps2=0.0, gyro_noise_rms_radps=0.0, range_noise_rms_m=0.0,
-                   flow_noise_mps=(0.0, 0.0, 0.0))
+                   flow_noise_mps=(0.0, 0.0), range_drift_rms=0.0)
 
 
 HOVER = """

@@ -6,7 +6,8 @@ from scipy.signal import welch
 
 from airtouch.logs import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM
-from airtouch.simulation import controller, flight, radio, scenario, sensors
+from airtouch.simulation import flight, radio, scenario, sensors
+from airtouch.simulation.firmware import controller
 from airtouch.simulation.plant import from_vehicle
 
 SWEEP = """
@@ -132,33 +133,41 @@ def test_flow_scale_slows_the_drone_down_over_the_platform(sweep):
     edges = true_edges(log)
     before = log["vx_mps"][edges[0].sample - 100:edges[0].sample].mean()
     settled = slice(edges[0].sample + 300, edges[0].sample + 400)
-    assert before == pytest.approx(0.3, rel=0.05)
+    assert before == pytest.approx(0.3, rel=0.08)  # the velocity loop's integral takes 25 s to settle
     true_height = (log["z_m"] - 0.7)[settled].mean()
     scale = 1 + 0.1 * (0.78 / true_height - 1)
-    assert log["vx_mps"][settled].mean() == pytest.approx(0.3 / scale, rel=0.1)
+    # slower by what the velocity loop's integral has gathered while it braked
+    assert log["vx_mps"][settled].mean() == pytest.approx(0.3 / scale, rel=0.2)
 
 
-@pytest.mark.parametrize(("name", "field"), [("rate", "rate_gain"), ("attitude", "attitude_gain")])
-def test_controller_gain_scales_the_loops(vehicle, name, field):
+def commanded(vehicle, gains, *, attitude=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0)):
+    """The firmware's controller, once, with a plant's gains: its state after a level, resting estimate."""
+    plant, state = from_vehicle(vehicle), np.zeros(1, controller.STATE)[0]
+    setpoint = np.zeros(1, controller.SETPOINT)[0]
+    for field, value in gains.items():
+        plant[field] = value
+    tilted = any(attitude)
+    setpoint["mode"] = [1 + (not tilted)] * 2 + [1, tilted, tilted, 1]
+    if tilted:
+        setpoint["mode"][:2] = 0
+    setpoint["attitude"], setpoint["velocity"], setpoint["position"] = attitude, velocity, position
+    zero = np.zeros(3)
+    state["mode"] = setpoint["mode"]
+    controller.run(plant[0]["firmware"], plant[0], state, setpoint, 0, zero, zero, zero, zero)
+    return state
+
+
+@pytest.mark.parametrize("field", ["rate_gain", "attitude_gain"])
+def test_controller_gain_scales_the_loops(vehicle, field):
     def turn(gain):
-        plant = from_vehicle(vehicle)
-        plant[field] = gain
-        memory, pwm = np.zeros(controller.SIZE), np.zeros(4)
-        memory[controller.DESIRED], memory[controller.THRUST] = 0.5, 40000.0
-        controller.attitude_loop(plant[0], memory, 0.0, 0.0, 0.0, np.zeros(3), pwm)
-        return pwm[2] + pwm[3] - pwm[0] - pwm[1]
-    assert turn(2.0) == pytest.approx(2.0 * turn(1.0), rel=1e-6)
+        return commanded(vehicle, {field: gain}, attitude=(0.5, 0.0, 0.0))["command"][0]
+    assert turn(2.0) == pytest.approx(2.0 * turn(1.0), abs=2.0)  # commands are whole numbers
 
 
 def test_position_and_height_gain_scale_the_outer_loops(vehicle):
     def wanted(**gains):
-        plant = from_vehicle(vehicle)
-        for field, value in gains.items():
-            plant[field] = value
-        memory, row = np.zeros(controller.SIZE), np.zeros(controller.SETPOINT_SIZE)
-        row[controller.VX], row[controller.Z] = 0.1, 0.05
-        controller.position_loop(plant[0], memory, row, np.zeros(3), np.zeros(3), 0.0)
-        return memory[controller.DESIRED + 1], memory[controller.THRUST] - plant[0]["thrust_base"]
+        state = commanded(vehicle, gains, velocity=(0.1, 0.0, 0.0), position=(0.0, 0.0, 0.05))
+        return state["attitude"][1], state["thrust"] - from_vehicle(vehicle)[0]["thrust_base"]
     pitch, thrust = wanted()
     assert wanted(position_gain=2.0) == pytest.approx((2 * pitch, thrust))
     assert wanted(height_gain=2.0)[1] == pytest.approx(4 * thrust, rel=0.05)  # two loops in series

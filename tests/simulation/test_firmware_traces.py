@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
-from airtouch.simulation.firmware import controller, kalman, mixer, range_module, settings
+from airtouch.simulation.firmware import controller, estimator, kalman, mixer, range_module, settings
 from airtouch.simulation.plant import from_vehicle
 
 FOLDER = Path(__file__).parents[3] / "shared" / "firmware"
@@ -43,22 +43,22 @@ def test_estimator(name):
     acc = np.stack([t[f"acc_{a}_g"] for a in "xyz"], axis=1) * G
     gyro = np.radians(np.stack([t[f"gyro_{a}_dps"] for a in "xyz"], axis=1))
     got = np.full((len(rows), 19), np.nan)
-    for tick in range(max(rows) + 1):
+    reading = np.zeros(1, estimator.READING)[0]
+    flying = False
+    for tick in range(max(rows) + 1):  # what the simulator's loop calls at every tick
         i = rows.get(tick)
         event = t["event"][i] if i is not None else ""
-        if tick % 10 == 0 and tick:
-            assert event == "P"
-            kalman.predict(firmware, est, 0.01, bool(t["flying"][i]), G)
-        if tick:
-            kalman.process_noise(firmware, est, 0.001)
-        block = blocks[tick // 10]
-        kalman.take_imu(est, acc[block], gyro[block])
+        assert (event == "P") == (tick > 0 and tick % 10 == 0)
+        reading["distance"] = reading["forward"] = np.nan
+        if event == "P":
+            flying = bool(t["flying"][i])
         if event == "T":
-            kalman.correct_range(firmware, est, t["tof_m"][i], t["tof_std_m"][i])
+            reading["distance"], reading["distance_std"] = t["tof_m"][i], t["tof_std_m"][i]
         if event == "F":
-            kalman.correct_flow(firmware, est, t["flow_dx"][i], t["flow_dy"][i], t["flow_dt_s"][i],
-                                t["flow_std"][i], 0.0)
-        kalman.finalize(est)
+            reading["forward"], reading["left"], reading["dt"], reading["std"] = (
+                t["flow_dx"][i], t["flow_dy"][i], t["flow_dt_s"][i], t["flow_std"][i])
+        block = blocks[tick // 10]
+        estimator.tick(firmware, est, tick, flying, G, acc[block], gyro[block], reading)
         if i is not None:
             got[i] = [*est["x"], *est["v"], *est["q"], *np.diag(est["p"])]
     names = ["x_m", "y_m", "z_m", *(f"v{a}_body_mps" for a in "xyz"), *(f"q{a}" for a in "wxyz")]

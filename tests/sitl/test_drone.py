@@ -160,7 +160,7 @@ def test_the_flight_is_recorded(tmp_path):
 
 def test_the_app_finds_what_the_detector_finds_in_the_log(bench):
     """What flies, fed by the estimator, against `best` on the recorded flight."""
-    craft = bench("paper-4cm", flight=1, ai_deck=False)
+    craft = bench("paper-4cm", flight=4, ai_deck=False)
     plan, rows, edges = craft.server.plan, [], []
     height, end = plan.values["cruise"], plan.world.box[0][2] + 1.0
 

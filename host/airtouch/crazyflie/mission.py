@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation import controller as c
+from airtouch.simulation import setpoint as c
 from airtouch.simulation import scenario
 from airtouch.simulation.mission import RATE_HZ
 

@@ -13,12 +13,14 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flight import PERIOD_S
+from airtouch.simulation.firmware import battery_compensation, settings
 
 DEGREES = 180.0 / np.pi
 FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequency (500 Hz controller)
 AXES = ("thrust", "roll", "pitch")
 YAW_HZ = 1.0  #: usual bandwidth of a yaw loop, which AXES leave out
-OUTER_S = 0.01  #: period of the firmware's position loop and of its flow readings
+OUTER_S = 0.01  #: period of the firmware's position loop and of its estimator's predictions
+IMU_S = 0.001  #: between samples of the IMU
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,11 @@ class Controller:
     period_s: float = PERIOD_S
     lowpass_hz: float = 0.0
     on_error: bool = False  #: derivative acts on the error, angle loop included
+    hold_s: float = 0.0  #: the estimator's attitude, velocity and height are renewed so often; 0: at every run
+    chip_hz: float = 0.0  #: bandwidth of the gyro itself, 0 for all
+    range_gains: tuple[float, float] = (0.0, 0.0)  #: of a reading of the down range, to height and (1/s) climb
+    range_s: float = 0.025  #: period of these readings
+    acc_hz: float = 0.0  #: low-pass of the acceleration that the climb is integrated from, 0 for none
 
 
 def newtons_per_pwm(row: Any) -> float:
@@ -49,22 +56,59 @@ def newtons_per_pwm(row: Any) -> float:
     return float(np.sqrt(max(c1 * c1 + 4.0 * c2 * (each - c0), 1e-30)))
 
 
-def firmware(row: Any, axis: str) -> Controller:
-    """crazyflie-firmware's gains (simulation.controller), whose commands are PWM."""
+def newtons_per_command(row: Any) -> float:
+    """Slope of a motor's thrust over the command that the firmware's battery compensation turns into PWM, N."""
+    c0, c1, c2 = (float(c) for c in row["thrust_curve"])
     slope = newtons_per_pwm(row)
+    hover = (slope - c1) / (2.0 * c2) if c2 else (
+        float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"]))) - c0) / c1
+    return slope * battery_compensation.slope(row["firmware"], row, hover)
+
+
+def firmware(row: Any, axis: str) -> Controller:
+    """crazyflie-firmware's gains (simulation.firmware), with battery compensation where it is on."""
+    slope, loops = newtons_per_command(row), row["firmware"]["loops"]
+    periods = row["firmware"]["periods"]
+    hold = 0.001 * float(periods["prediction_ms"])
     if axis == "thrust":
-        gain = 25.0 * float(row["thrust_scale"]) * slope
-        return Controller(gain, 2.0, integral=15.0 / 25.0, angle_integral=0.25)
-    gain = 0.5 * 250.0 * DEGREES * float(row["rate_scale"]) * slope
-    return Controller(gain, 6.0, 25.0 / DEGREES, 2.5 / 250.0, 500.0 / 250.0, 0.5, 1.0 / 25.0,
-                      float(row["step"]), float(row["gyro_lowpass"]), float(row["derivative_on_error"]) > 0.5)
+        climb, height = loops[settings.VELOCITY_Z], loops[settings.POSITION_Z]
+        gain = float(climb["p"]) * float(row["thrust_scale"]) * slope
+        return Controller(gain, float(height["p"]), integral=_share(climb["i"], climb["p"]),
+                          angle_integral=_share(height["i"], height["p"]), hold_s=hold,
+                          range_gains=_range_gains(row["firmware"]), range_s=0.001 * float(periods["range_ms"]),
+                          acc_hz=float(row["firmware"]["filters"]["acc_hz"]))
+    i = AXES.index(axis) - 1
+    rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
+    speed = loops[settings.VELOCITY_Y if i == 0 else settings.VELOCITY_X]
+    gain = 0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope
+    return Controller(gain, float(angle["p"]), float(speed["p"]) / DEGREES, _share(rate["d"], rate["p"]),
+                      _share(rate["i"], rate["p"]), _share(angle["i"], angle["p"]), _share(speed["i"], speed["p"]),
+                      0.001 * float(periods["attitude_ms"]), float(row["gyro_lowpass"]),
+                      bool(row["firmware"]["controller"]["derivative_on_error"]), hold, float(row["gyro_bandwidth"]))
+
+
+def _range_gains(release: Any) -> tuple[float, float]:
+    """Steady gains of the firmware's Kalman filter from a near down range reading to height and climb (1/s)."""
+    period, variance = 0.001 * float(release["periods"]["range_ms"]), float(release["range"]["std_m"]) ** 2
+    noise = 1000.0 * period * (0.001 * float(release["kalman"]["noise_acc_z_mps2"])) ** 2
+    ahead, p, gains = np.array([[1.0, period], [0.0, 1.0]]), np.eye(2), np.zeros(2)
+    for _ in range(400):
+        p = ahead @ p @ ahead.T + np.diag([0.0, noise])
+        gains = p[:, 0] / (p[0, 0] + variance)
+        p = p - np.outer(gains, p[0])
+    return float(gains[0]), float(gains[1])
+
+
+def _share(part: Any, of: Any) -> float:
+    return float(part) / float(of)
 
 
 def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
 
     Sources, roll and pitch: white rate, white angle, velocity falling with the frequency,
-    torque; thrust: white climb, climb falling with the frequency, its square, force.
+    torque; thrust: white climb, climb falling with the frequency, its square, force, white error of the down
+    range, the same drifting from reading to reading.
     row: plant row of `simulation.flight.prepare`, effects in it.
     """
     return _with_aliases(_sources(c, row, axis, f), _aliases(c, row, axis, f))
@@ -72,12 +116,9 @@ def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 
 def _aliases(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """What of the first source's noise folds into the log, noise to command, complex (folds, bins)."""
-    folds = FOLDS[1:] if c.period_s < 0.5 * PERIOD_S else ()
-    f = np.maximum(np.abs(f + np.array(folds).reshape(-1, 1) / PERIOD_S), 0.05)
-    s = 2j * np.pi * f
-    plant, rate, angle, _, filtered, whole = _parts(c, row, axis, f, s)
-    size = 1.0 / (1.0 + plant * whole)
-    return rate * size if axis == "thrust" else -(rate + angle / s) * filtered * size
+    if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
+        return np.zeros((0, len(f)))
+    return _transfers(c, row, axis, np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05))[0][0]
 
 
 def _with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
@@ -136,28 +177,40 @@ def torque_per_command(row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 
 
 def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Plant, and the controller's rate (climb), angle (height), velocity paths, its filter, and all together."""
+    """Plant; the controller's rate (climb), angle (height) and velocity paths, each of the measured rate (climb)
+
+    and its integrals; and all together.
+    """
     hold = np.sinc(f * c.period_s) * np.exp(-0.5 * s * c.period_s)
     motor = np.exp(-s * float(row["actuator_delay"])) * hold * 0.5 * (
         1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
-    late = _delayed(s, float(row["sensor_delay"]), float(row["step"]) if c.lowpass_hz else 0.0)
+    late = _delayed(s, float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0)
     lift = 4.0 * float(np.mean(row["gain"]))
+    renewed = _renewed(c, s)
     if axis == "thrust":
         k = float(row["height_gain"])
-        climb = k * c.gain * (1.0 + c.integral / s)
-        height = climb * c.angle * k * (1.0 + c.angle_integral / s)
-        return lift / float(row["mass"]) * motor / s, climb, height, 0.0 * s, late, (climb + height / s) * late
+        late = late * renewed / _butterworth(s, c.acc_hz)
+        climb = k * c.gain * (1.0 + c.integral / s) * late
+        height = climb * c.angle * k * (1.0 + c.angle_integral / s) / s
+        return lift / float(row["mass"]) * motor / s, climb, height, 0.0 * s, climb + height
     i = AXES.index(axis) - 1
     arm = float(np.mean(np.abs(row["rotor_y" if i == 0 else "rotor_x"])))
     k = c.gain * float(row["rate_gain"])
     change = c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
-    rate = k * (1.0 + c.integral / s + change)
+    filtered = late / _butterworth(s, c.lowpass_hz) / _butterworth(s, c.chip_hz)
+    rate = k * (1.0 + c.integral / s + change) * filtered
     angle = k * (1.0 + c.integral / s + (change if c.on_error else 0.0)) * c.angle * float(row["attitude_gain"])
     angle = angle * (1.0 + c.angle_integral / s)
     velocity = angle * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
-    filtered = late / _butterworth(s, c.lowpass_hz)
-    whole = (rate + angle / s) * filtered + velocity * float(row["gravity"]) / s ** 2 * late
-    return lift * arm / float(row["inertia"][i]) * motor / s, rate, angle, velocity, filtered, whole
+    angle, velocity = angle * filtered * renewed / s, velocity * renewed * float(row["gravity"]) / s ** 2 * late
+    return (lift * arm / float(row["inertia"][i]) * motor / s, rate, angle, velocity, rate + angle + velocity)
+
+
+def _renewed(c: Controller, s: np.ndarray) -> np.ndarray:
+    """What the estimator's period does to its attitude, velocity and height: they hold between two predictions."""
+    runs = round(c.hold_s / c.period_s) if c.lowpass_hz else 1
+    held = sum(np.exp(-s * k * c.period_s) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
+    return held * np.exp(-0.5 * s * IMU_S) if c.hold_s else held
 
 
 def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -170,32 +223,71 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     f = np.maximum(f, 0.05)
     if axis == "thrust":
         s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-        plant, rate, angle, velocity, filtered, whole = _parts(c, row, axis, f, s)
+        plant, climb, _, _, whole = _parts(c, row, axis, f, s)
         size = 1.0 / (1.0 + plant * whole)
-        climbs = np.abs((rate + angle / s) * size) ** 2
-        return np.array([np.abs(rate * size) ** 2, climbs / low ** 2, climbs / low ** 4,
-                         np.abs(whole / s * size) ** 2])
+        climbs = np.abs(whole * size) ** 2
+        sources = [np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4, np.abs(whole / s * size) ** 2]
+        if c.range_gains[0]:
+            sources += _range_errors(c, row, f, size)
+        return np.array(sources)
     return np.abs(_transfers(c, row, axis, f)[0]) ** 2
 
 
 def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration."""
     s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-    plant, rate, angle, velocity, filtered, whole = _parts(c, row, axis, f, s)
+    plant, rate, angle, velocity, whole = _parts(c, row, axis, f, s)
     size = 1.0 / (1.0 + plant * whole)
-    share = kicked = np.ones_like(s)
-    if c.on_error:  # set-points of the outer loop come as steps; the log takes the sample on which they do
+    k = c.gain * float(row["rate_gain"])
+    tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])
+    kick = np.ones_like(s)
+    if c.on_error:  # set-points of the outer loop and attitudes come as steps; the log takes the sample on which they do
         share = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
-        kicked = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * OUTER_S)) / c.period_s
-    outer = kicked / share - plant * whole * size
-    gyro, torque = -(rate + angle / s) * filtered * size, -whole / s * size
-    paths = np.array([velocity / low, velocity / low ** 2, angle / low ** 2])
-    seen = [] if c.lowpass_hz else [angle * size]
-    logged = np.array([gyro, *seen, *(outer * paths), torque])
-    turned = s * plant * np.array([gyro, *seen, *(size * paths), torque])
-    turned[0] += _difference(f)
-    turned[-1] += 1.0
+        kick = (1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * OUTER_S)) / c.period_s) / share
+        tilt = tilt * share / (1.0 + c.integral / s)
+    speed = tilt * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
+    tilt = tilt * (1.0 + c.angle_integral / s)
+    seen = [] if c.lowpass_hz else [tilt]
+    outer = [*seen, speed / low, speed / low ** 2, tilt / low ** 2]
+    direct = np.array([-(rate + angle), *outer, 0.0 * s])
+    stepped = np.array([-(rate + kick * angle), *(kick * np.array(outer)), 0.0 * s])
+    turned = plant * direct * size  # rate
+    turned[-1] = size / s
+    logged = stepped - (rate + kick * (angle + velocity)) * turned
+    turned = s * turned
+    turned[0] += _difference(f) / _butterworth(s, c.chip_hz)
     return logged, turned
+
+
+def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
+    """Power (bins,) of the logged command for white errors of the down range, and for drifting ones; aliases in it.
+
+    size: of the closed loop over the open one at f.
+    """
+    white, drifting = np.zeros(len(f)), np.zeros(len(f))
+    for k in FOLDS:
+        g = f + k / PERIOD_S
+        power = np.abs(_ranged(c, row, g) * (1.0 if k else size)) ** 2
+        white += power
+        drifting += power / (4.0 * np.sin(np.pi * g * c.range_s) ** 2 + (0.6 * np.pi * c.range_s) ** 2)
+    return [white, drifting]
+
+
+def _ranged(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
+    """Command for an error of the down range of 1 m at f (Hz), through the estimator's height and climb.
+
+    Between two readings T apart the estimate moves on its own: X = (1 - (1 - K H) F / z)^-1 K.
+    """
+    s = 2j * np.pi * f
+    a, b, t = *c.range_gains, c.range_s
+    z = np.exp(-s * t)
+    # (1 - K H) F = [[1 - a, (1 - a) t], [-b, 1 - b t]]
+    m00, m01, m10, m11 = 1.0 - z * (1.0 - a), -z * (1.0 - a) * t, z * b, 1.0 - z * (1.0 - b * t)
+    det = m00 * m11 - m01 * m10
+    height, climb = (m11 * a - m01 * b) / det, (m00 * b - m10 * a) / det
+    k = float(row["height_gain"])
+    gain = k * c.gain * (1.0 + c.integral / s)
+    return np.sinc(f * t) * gain * (climb + c.angle * k * (1.0 + c.angle_integral / s) * height)
 
 
 def _delayed(s: np.ndarray, delay: float, step: float) -> np.ndarray:

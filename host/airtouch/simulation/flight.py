@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.logs.flight_log import COLUMNS, FlightLog
-from airtouch.simulation import controller, loop
+from airtouch.simulation import loop, setpoint
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
 from airtouch.simulation.radio import received, rounded
@@ -59,6 +59,7 @@ def choose(plan: FlightPlan, effects: Chosen = (), without: Sequence[str] = ()) 
 def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
              name: str) -> FlightLog | Diverged:
     """Fly a drawn flight with these effects."""
+    vehicle = plan.flown_by(vehicle)
     stepper = Stepper(plan, vehicle, seed, flight, active)
     plant = stepper.plant
     table = np.empty((len(plan.setpoints), loop.COLUMNS))
@@ -67,7 +68,7 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     ending, rows = stepper.fly(plan.setpoints, table)
     if ending != loop.OK:
         return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / 100.0)
-    climb = plan.setpoints[:, controller.Z].max() - plan.setpoints[0, controller.Z]
+    climb = plan.setpoints[:, setpoint.Z].max() - plan.setpoints[0, setpoint.Z]
     if np.ptp(table[:, loop.PLACE + 2]) < 0.5 * climb:
         return Diverged(name, seed, flight, "it did not take off", len(table) / 100.0)
     rng = np.random.default_rng([seed, flight, 7])
@@ -76,7 +77,8 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     meta = {
         "source": f"{name}_{seed}_{flight:06d}", "format": "simulated", "sample_period_s": 0.01,
         "acc_frame": "body",
-        "vehicle": vehicle.name, "scenario": name, "seed": seed, "flight": flight, "condition": plan.values,
+        "vehicle": vehicle.name, "firmware": vehicle.firmware, "range_module": vehicle.range_module,
+        "scenario": name, "seed": seed, "flight": flight, "condition": plan.values,
         "effects": [[a.effect.name, dict(a.values)] for a in active], "warnings": [],
     }
     return FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, meta)

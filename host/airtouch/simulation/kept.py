@@ -1,4 +1,4 @@
-"""What a flight keeps from one step to the next, as one flat vector that compiled code slices.
+"""What a flight keeps from one step to the next: one record that compiled code reads and writes by name.
 
 With it a flight can be flown a few rows at a time (`loop.fly` continues where it stopped),
 with the same numbers as in one call.
@@ -9,59 +9,72 @@ import math
 import numpy as np
 from numba import float64, from_dtype, int64, types
 
-from airtouch.simulation import contact, controller, estimator, rigid_body, sensors, world
+from airtouch.simulation import autopilot, contact, imu, ranging, rigid_body, setpoint, world
+from airtouch.simulation import signals as at
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import MEMORY
+from airtouch.simulation.firmware import controller, estimator, kalman, range_module
 from airtouch.simulation.plant import DTYPE
 from airtouch.simulation.random_stream import STREAM, normal
 from airtouch.simulation.sensors import RING
 
 SLOTS = 16  #: effects with a wrench that may be on at once
-#: scalars, at the start of the vector
-(STEP, GROUND, CHARGE, VOLTS, DOWN, TOP, NEXT_RANGE, NEXT_RANGES, FLYING, CHANGED) = range(10)
-_SIZES = (10, 13, 4, 6, 13, SLOTS * MEMORY, controller.SIZE, estimator.SIZE, 4, 8, 4, 4, RING * 6, RING * 4,
-          5, 5, 6, 6, 3, 3, 4, 130)
-(STATE, SPEED, FORCE, SLOPE, EFFECTS, PID, ESTIMATE, PWM, FLICKER, GAIN, PHASE, SENSED, COMMANDED,
- ACC_FILTER, GYRO_FILTER, ACC_MEMORY, GYRO_MEMORY, ACC_RMS, DRIFT, RANGES, SCRATCH, SIZE) = (
-    sum(_SIZES[:i + 1]) for i in range(len(_SIZES)))
-
+_F, _I = np.float64, np.int64
+_FILTERS = ("acc_log", "acc_filter", "gyro_chip", "gyro_filter")  #: coefficients of the IMU's low-passes
+_PASTS = ("acc_log_past", "acc_past", "gyro_chip_past", "gyro_past")  #: and their memories
+MEMORY_DTYPE = np.dtype([
+    ("step", _I),
+    # the body: position, velocity, attitude, rates; rotor speeds; effects' force and torque; slope of the state
+    ("state", _F, (13,)), ("speed", _F, (4,)), ("force", _F, (6,)), ("slope", _F, (13,)), ("ground", _F),
+    ("charge", _F), ("volts", _F), ("effects", _F, (SLOTS, MEMORY)),
+    # motors: their command and its delay line, noise, phase, thrust of each over nominal
+    ("pwm", _F, (4,)), ("commands", _F, (RING, 4)), ("flicker", _F, (8,)), ("phase", _F, (4,)), ("gain", _F, (4,)),
+    # the IMU: true motion at the last step and now, samples as logged and as filtered, what the firmware has
+    ("motion", _F, (6,)), ("now", _F, (6,)), ("acc", _F, (3,)), ("gyro", _F, (3,)), ("imu", _F, (imu.RING, 6)),
+    ("seen_acc", _F, (3,)), ("seen_gyro", _F, (3,)), ("acc_rms", _F, (3,)), ("gyro_rms", _F, (3,)),
+    *((name, _F, (5,)) for name in _FILTERS), *((name, _F, (3, 2)) for name in _PASTS),
+    # ranging: measurements not yet handed over, what is below, the last reading's offset, flow noise, walls
+    ("looks", _I), ("distances", _F, (ranging.RANGES,)), ("tops", _F, (ranging.RANGES,)),
+    ("kicks", _F, (ranging.RANGES,)), ("flows", _F, (ranging.FLOWS, 2)), ("top", _F), ("changed", _F), ("rose", _F),
+    ("down", _F), ("offset", _F), ("drift", _F, (3,)), ("ranges", _F, (4,)),
+    # the firmware: its own state, and what it hands from part to part
+    ("est", kalman.STATE), ("module", range_module.STATE), ("pid", controller.STATE),
+    ("setpoint", controller.SETPOINT), ("reading", estimator.READING), ("thrust_tick", _I), ("supply", _F),
+    ("angles", _F, (3,)), ("velocity", _F, (3,)), ("degrees", _F, (3,)), ("rates", _F, (3,)),
+    ("quaternion", _F, (4,)),
+    # working space
+    ("target", _F, (4,)), ("middle", _F, (13,)), ("middle_speed", _F, (4,)), ("motor_normals", _F, (4,)),
+    ("imu_normals", _F, (6,)), ("other_normals", _F, (4,)), ("world_force", _F, (3,)), ("patch", _F, (7,)),
+    ("signals", _F, (at.COUNT,))])
 
 _BEGIN = types.void(from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1],
-                    float64[::1], STREAM, float64[::1])
+                    float64[::1], STREAM, from_dtype(MEMORY_DTYPE)[::1])
+
+
+def memory() -> np.ndarray:
+    """A memory (1,) of MEMORY_DTYPE, all zero as `begin` expects it."""
+    return np.zeros(1, MEMORY_DTYPE)
 
 
 @jit(_BEGIN)
-def begin(plant_array, corners, first, surface, box, setpoint, stream, kept):
-    """Stand the vehicle on what is below the first set-point (8,): fills kept (SIZE,)."""
-    plant = plant_array[0]
-    h = plant.step
-    for i in range(SIZE):
-        kept[i] = 0.0
-    state, est, pid = kept[STATE:SPEED], kept[ESTIMATE:PWM], kept[PID:ESTIMATE]
+def begin(plant_array, corners, first, surface, box, row, stream, memory_array):
+    """Stand the vehicle on what is below the first set-point row (8,): fills a memory (1,) that is all zero."""
+    plant, memory = plant_array[0], memory_array[0]
+    state = memory.state
     leg = plant.range_below_rotors + plant.leg_below_range
-    acc_filter, gyro_filter = kept[ACC_FILTER:GYRO_FILTER], kept[GYRO_FILTER:ACC_MEMORY]
-    sensors.lowpass_coefficients(plant.acc_lowpass, h, acc_filter)
-    sensors.lowpass_coefficients(plant.gyro_lowpass, h, gyro_filter)
-    gain = sensors.noise_gain(acc_filter)
-    for i in range(3):
-        kept[ACC_RMS + i] = plant.acc_noise[i] / gain
-    state[0], state[1] = setpoint[controller.X], setpoint[controller.Y]
-    ground = world.top_at(corners, first, surface, box, state[0], state[1])
-    state[2] = ground + leg - contact.SINK_M
-    yaw = setpoint[controller.YAW]
+    state[0], state[1] = row[setpoint.X], row[setpoint.Y]
+    memory.ground = world.top_at(corners, first, surface, box, state[0], state[1])
+    state[2] = memory.ground + leg - contact.SINK_M
+    yaw = row[setpoint.YAW]
     state[6], state[9] = math.cos(yaw / 2), math.sin(yaw / 2)
     for i in range(4):
-        kept[PHASE + i] = 6.283185307179586 * i * 0.381966 + normal(stream)
-        kept[GAIN + i] = plant.gain[i]
-        kept[RANGES + i] = np.nan
-    est[0], est[1], est[2] = 0.005 * normal(stream), 0.005 * normal(stream), yaw
-    est[6], est[7], est[8] = state[0], state[1], state[2] - plant.range_below_rotors
-    controller.reset(pid, math.degrees(yaw))
-    kept[FORCE + 2] = plant.mass * plant.gravity
-    for i in range(3):
-        at = ACC_MEMORY + 2 * i
-        sensors.settle(acc_filter, kept[at:at + 2], plant.gravity if i == 2 else 0.0)
-    kept[GROUND], kept[TOP], kept[CHARGE] = ground, ground, plant.battery_charge
-    kept[VOLTS], kept[DOWN], kept[CHANGED] = plant.nominal_voltage, 0.01, -1e3
-    rigid_body.derivative(plant, state, kept[SPEED:FORCE], 0.0, 0.0, kept[FORCE:SLOPE],
-                          kept[SLOPE:EFFECTS])
+        memory.phase[i] = 6.283185307179586 * i * 0.381966 + normal(stream)
+        memory.gain[i] = plant.gain[i]
+        memory.ranges[i] = np.nan
+    memory.force[2] = plant.mass * plant.gravity
+    memory.top, memory.charge, memory.volts = memory.ground, plant.battery_charge, plant.nominal_voltage
+    memory.down, memory.changed = 0.01, -ranging.LAST
+    roll, pitch = 0.005 * normal(stream), 0.005 * normal(stream)
+    imu.begin(plant, memory)
+    autopilot.begin(plant, memory, roll, pitch, yaw)
+    rigid_body.derivative(plant, state, memory.speed, 0.0, 0.0, memory.force, memory.slope)

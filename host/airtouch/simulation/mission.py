@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation import controller as c
+from airtouch.simulation import setpoint as c
 from airtouch.simulation.world import World, first_below, top_at
 
 RATE_HZ = 100

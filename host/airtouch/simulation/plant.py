@@ -1,13 +1,14 @@
 """Everything that one flight's equations need, as one record that compiled code reads by name.
 
-A vehicle gives the nominal values, effects change them. Defaults of the controller are
-the firmware's documented ones (crazyflie-firmware, platform_defaults_cf2.h).
+A vehicle gives the nominal values, effects change them. `firmware` holds the settings of the release that flies
+(simulation.firmware.settings).
 """
 
 import functools
 
 import numpy as np
 
+from airtouch.simulation.firmware import settings
 from airtouch.vehicle import Vehicle
 
 _F = np.float64
@@ -48,40 +49,49 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("gyro_bias", 3, 0.0, "rad/s"),
     ("acc_range", 1, 235.0, "m/s^2, saturation: 24 g"),
     ("gyro_range", 1, 34.9, "rad/s, saturation: 2000 deg/s"),
-    ("acc_lowpass", 1, 30.0, "Hz, of what the controller and the log get; 0: none"),
-    ("gyro_lowpass", 1, 80.0, "Hz, of what the controller gets; 0: none"),
+    ("acc_lowpass", 1, 30.0, "Hz, of what the log gets; 0: none"),
+    ("gyro_bandwidth", 1, 116.0, "Hz, of the gyro chip's samples; 0: all"),
+    ("gyro_lowpass", 1, 80.0, "Hz, of what the firmware makes of them; 0: none"),
     ("vibration", 1, 0.0, "m/s^2, amplitude of the rotors' 1/rev line on the accelerometer"),
     ("vibration_gyro", 1, 0.05, "rad/s per m/s^2"),
     ("range_noise", 1, 0.002, "m rms"),
     ("range_below_rotors", 1, 0.025, "m, down range sensor below the rotor discs"),
+    ("range_delay", 1, 0.0, "s, from a down range measurement to log and estimator, whole ms"),
+    ("range_bias", 1, 0.0, "m, error of a down range reading at no distance"),
+    ("range_bias_fade", 1, 0.05, "m, distance over which that dies out"),
+    ("range_drift", 1, 0.0, "1, rms over the distance, error of the down range that comes and goes"),
+    ("range_drift_time", 1, 0.5, "s, its correlation time"),
+    ("range_dip", 1, 0.0, "m, error of the down range just after a higher surface came below"),
+    ("range_dip_time", 1, 0.2, "s, in which that dies out"),
     ("leg_below_range", 1, 0.006, "m, end of the legs below the down range sensor"),
-    ("flow_noise", 3, 0.02, "m/s rms, error of the measured velocity forward, left and up"),
+    ("flow_noise", 2, 0.02, "m/s rms at 1 m, error of the velocity that optical flow shows, forward and left"),
     ("flow_noise_time", 1, 0.05, "s, its correlation time"),
-    ("flow_share", 1, 0.0, "how far optical flow is scaled by the estimated height, not the true distance"),
+    ("flow_focus", 1, 0.08, "m, least distance of optical flow; closer, its picture scales no further"),
+    ("flow_delay", 1, 0.0, "s, of optical flow"),
+    ("flow_share", 1, 0.0, "how far optical flow follows the true distance, not the height that the firmware has"),
     ("flow_transient", 1, 0.0, "the same, more, just after what is below has changed"),
     ("flow_transient_time", 1, 0.2, "s, how long that lasts"),
-    ("range_residual", 1, 0.0, "m, platform compensation's error over the platform"),
+    ("range_residual", 1, 0.0, "m, range module's error over a platform"),
     ("range_kick", 1, 0.0, "m, error of the one reading on which an edge is noticed"),
     ("sensor_delay", 1, 0.0, "s, from IMU to controller"),
     ("time_jitter", 1, 0.0, "s rms, on logged time"),
     ("packet_loss", 1, 0.0, "share of logged samples lost"),
     ("loss_burst", 1, 1.0, "samples lost in a row, mean"),
-    ("compensate_battery", 1, 0.0, "1: the firmware's battery compensation is on"),
-    ("thrust_base", 1, 36000.0, "PWM"),
-    ("thrust_min", 1, 20000.0, "PWM"),
-    ("thrust_scale", 1, 1000.0, "PWM per unit of the vertical velocity controller"),
+    ("thrust_base", 1, 36000.0, "command in hover, of 65535"),
+    ("thrust_min", 1, 20000.0, "least command in flight, of 65535"),
+    ("thrust_scale", 1, 1000.0, "command per unit of the climb loop's output"),
     ("rate_scale", 1, 1.0, "of the rate gains, to another vehicle's authority"),
-    ("derivative_on_error", 1, 0.0, "1: rate derivative acts on the error (firmware before 2024)"),
     ("rate_gain", 1, 1.0, "times the rate loop's gains"),
     ("attitude_gain", 1, 1.0, "times the attitude loop's gains"),
     ("position_gain", 1, 1.0, "times the horizontal position and velocity gains"),
     ("height_gain", 1, 1.0, "times the vertical position and velocity gains"),
-    ("tilt_limit", 1, 20.0, "degrees"),
-    ("step", 1, 0.002, "s, of physics and attitude controller"),
+    ("step", 1, 0.002, "s, of physics and attitude controller; the firmware's estimator runs every millisecond"),
 )
-DTYPE = np.dtype([(name, _F) if n == 1 else (name, _F, (n,)) for name, n, _, _ in FIELDS])
+DTYPE = np.dtype([*((name, _F) if n == 1 else (name, _F, (n,)) for name, n, _, _ in FIELDS),
+                  ("firmware", settings.DTYPE)])
 ROTOR_SIGN_X = np.array([1.0, -1.0, -1.0, 1.0])
 ROTOR_SIGN_Y = np.array([-1.0, -1.0, 1.0, 1.0])
+OWN_PLATFORM = "cf2"  #: whose gains and battery compensation stand in the firmwares' files
 DEFAULT_THRUST_PER_SPEED2 = 2.1e-8  #: N/(rad/s)^2, Crazyflie: 0.089 N at 19,700 rpm
 
 
@@ -118,16 +128,37 @@ def _nominal(vehicle: Vehicle) -> np.ndarray:
     row["acc_noise"] = vehicle.acc_noise_rms_mps2 * np.array(vehicle.acc_noise_ratio)
     row["gyro_noise"] = vehicle.gyro_noise_rms_radps * np.array(vehicle.gyro_noise_ratio)
     row["flow_noise"], row["flow_noise_time"] = vehicle.flow_noise_mps, vehicle.flow_noise_time_s
-    row["range_noise"] = vehicle.range_noise_rms_m
+    row["gyro_bandwidth"] = vehicle.gyro_bandwidth_hz
+    row["range_noise"], row["range_drift"] = vehicle.range_noise_rms_m, vehicle.range_drift_rms
+    row["range_drift_time"] = vehicle.range_drift_time_s
     row["acc_lowpass"] = vehicle.acc_lowpass_hz
-    hover = hover_pwm(vehicle)
-    row["thrust_base"] = vehicle.thrust_base_pwm or 0.9 * hover
-    row["thrust_min"] = min(20000.0, 0.5 * hover)
-    row["derivative_on_error"] = vehicle.derivative_on_error
-    row["compensate_battery"] = vehicle.battery_compensation
-    row["rate_scale"] = _authority(REFERENCE) / _authority(vehicle)
-    row["thrust_scale"] = 1000.0 * _lift_slope(REFERENCE) / _lift_slope(vehicle)
+    _firmware(row, vehicle)
     return plant
+
+
+def _firmware(row: np.ndarray, vehicle: Vehicle) -> None:
+    """The settings of the vehicle's firmware, and what scales its loops to the vehicle.
+
+    On a Crazyflie 2 (platform cf2) they fly as they are. Other vehicles get gains of the same loops without battery
+    compensation; their thrust curve stands for the compensation of other platforms of the firmware.
+    """
+    release = settings.load(vehicle.firmware)[0]
+    row["firmware"] = release
+    flown, hover = row["firmware"], hover_pwm(vehicle)
+    if vehicle.range_module != settings.OWN_MODULE:
+        flown["range_module"]["kind"] = settings.RANGE_MODULES.index(vehicle.range_module)
+    row["gyro_lowpass"] = release["filters"]["gyro_hz"]
+    if vehicle.platform == OWN_PLATFORM:
+        for name in ("thrust_base", "thrust_min", "thrust_scale"):
+            row[name] = release["controller"][name]
+    else:
+        kind = settings.OF_VEHICLE if vehicle.platform else settings.NO_COMPENSATION
+        flown["battery_compensation"]["kind"] = kind
+        row["thrust_base"], row["thrust_min"] = 0.9 * hover, min(20000.0, 0.5 * hover)
+        row["rate_scale"] = _authority(REFERENCE) / _authority(vehicle)
+        row["thrust_scale"] = release["controller"]["thrust_scale"] * _lift_slope(REFERENCE) / _lift_slope(vehicle)
+    if vehicle.thrust_base_pwm:
+        row["thrust_base"] = vehicle.thrust_base_pwm
 
 
 def hover_pwm(vehicle: Vehicle) -> float:
@@ -160,7 +191,7 @@ def _lift_slope(vehicle: Vehicle) -> float:
     return _slope(vehicle) / vehicle.mass_kg
 
 
-#: The firmware's gains are tuned for this vehicle; others get them scaled to the same loops.
+#: Vehicles of another platform get the firmware's gains scaled to the loops of this one.
 REFERENCE = Vehicle(
     name="reference", mass_kg=0.0319, arm_m=0.046, inertia_kg_m2=(1.68e-5, 1.68e-5, 2.98e-5),
     thrust_of_pwm_n=(5.485e-4, 1.0326e-6, 2.1303e-11), yaw_torque_over_thrust_m=0.0072,

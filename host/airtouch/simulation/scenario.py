@@ -4,7 +4,7 @@ import math
 import tomllib
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,10 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.simulation import effects, mission, world
 from airtouch.simulation.expressions import draw
+from airtouch.simulation.firmware.settings import DEFAULT
+from airtouch.vehicle import RANGE_MODULES, Vehicle, check_firmware
 
-KEYS = {"name", "summary", "values", "world", "platform", "mission", "effects"}
+KEYS = {"name", "summary", "firmware", "range_module", "values", "world", "platform", "mission", "effects"}
 DEFAULT_ROOM_M = (-10.0, 10.0, -10.0, 10.0)
 CIRCLE_CORNERS = 24
 
@@ -31,13 +33,23 @@ class Scenario:
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """One flight with every value drawn: set-points (rows, 8), world, room (4,), effects."""
+    """One flight with every value drawn: set-points (rows, 8), world, room (4,), effects.
+
+    firmware, range_module: what flies instead of the vehicle's own; "" where the scenario says nothing.
+    """
 
     setpoints: np.ndarray
     world: world.World
     room: np.ndarray
     effects: list[tuple[str, dict[str, float]]]
     values: dict[str, Any]
+    firmware: str = ""
+    range_module: str = ""
+
+    def flown_by(self, vehicle: Vehicle) -> Vehicle:
+        """The vehicle with the firmware and the range module of this flight."""
+        return replace(vehicle, firmware=self.firmware or vehicle.firmware,
+                       range_module=self.range_module or vehicle.range_module)
 
 
 def names() -> list[str]:
@@ -71,6 +83,10 @@ def parse(text: str, source: str) -> Scenario:
     unknown = sorted(set(table) - KEYS)
     if unknown:
         raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(sorted(KEYS))}")
+    for key in ("firmware", "range_module"):
+        if not isinstance(table.get(key, ""), str):
+            raise AirTouchError(f"{source}: {key} must be a text in quotes")
+    check_firmware(table.get("firmware", DEFAULT), table.get("range_module", RANGE_MODULES[0]), source)
     if "mission" not in table:
         raise AirTouchError(f"{source}: no [mission]")
     scenario = Scenario(str(table.get("name", Path(source).stem)), str(table.get("summary", "")), table)
@@ -104,7 +120,7 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
     room = np.array(ground.get("room_m", DEFAULT_ROOM_M), dtype=np.float64)
     if room.shape != (4,):
         raise AirTouchError(f"{source}: room_m needs four numbers: x from, to, y from, to")
-    return FlightPlan(rows, built, room, chosen, values)
+    return FlightPlan(rows, built, room, chosen, values, table.get("firmware", ""), table.get("range_module", ""))
 
 
 def _platform(table: Mapping[str, Any], where: str) -> world.Platform:

@@ -5,10 +5,8 @@ import math
 from airtouch.simulation.compiled import jit
 
 MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
-RANGE_PERIOD_S = 0.025
-MULTIRANGER_PERIOD_S = 0.1
 CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
-RING = 64  #: rows of a delay line, a power of two: delays of up to 63 steps
+RING = 64  #: rows of the commands' delay line, a power of two: delays of up to 63 steps
 CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
 
 
@@ -59,13 +57,14 @@ def noise_gain(b):
 
 @jit
 def delayed(ring, at, steps, column):
-    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (RING, columns)."""
+    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (a power of two, columns)."""
     whole = int(steps)
     part = steps - whole
-    now = ring[(at - whole) & (RING - 1), column]
+    mask = ring.shape[0] - 1
+    now = ring[(at - whole) & mask, column]
     if part == 0.0:
         return now
-    return now + part * (ring[(at - whole - 1) & (RING - 1), column] - now)
+    return now + part * (ring[(at - whole - 1) & mask, column] - now)
 
 
 @jit

@@ -43,12 +43,13 @@ def prepare(vehicle: Vehicle, active: Sequence[Active]) -> tuple[np.ndarray, lis
 class Stepper:
     """One flight's plant, world, effects and random numbers, and what it keeps between rows.
 
-    `plant` (1,) and `memory` (kept.SIZE,) may be looked at and changed between calls.
+    `plant` (1,) and `memory` (1,) of kept.MEMORY_DTYPE may be looked at and changed between calls.
     """
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int,
                  active: Sequence[Active]) -> None:
         """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself."""
+        vehicle = plan.flown_by(vehicle)
         if hover_pwm(vehicle) > MOST_HOVER_PWM:
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
                                 f"{hover_pwm(vehicle):.0f}")
@@ -65,11 +66,12 @@ class Stepper:
             seen[a.effect.name] = seen.get(a.effect.name, 0) + 1
             self.effect_streams[i] = stream(seed, flight, f"{a.effect.name}/{seen[a.effect.name]}")
         self.streams = np.array([stream(seed, flight, n) for n in ("motors", "imu", "ranging", "start")])
-        self.memory = np.zeros(kept.SIZE)
+        self.memory = kept.memory()
 
     def begin(self, setpoint: np.ndarray) -> None:
         """Stand on what is below the set-point (8,), motors off."""
         w = self.world
+        self.memory[:] = 0
         kept.begin(self.plant, w.corners, w.first, w.surface, w.box, setpoint, self.streams[3], self.memory)
 
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:

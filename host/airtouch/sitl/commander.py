@@ -1,7 +1,7 @@
 """Whose set-points count: high-level planner, low-level packets, and the watchdog.
 
 As crazyflie-firmware 2026.08 (commander.c, crtp_commander_generic.c, crtp_commander_rpyt.c, supervisor.c).
-A set-point here is one row of the simulator (simulation.controller): mode, place, velocity,
+A set-point here is one row of the simulator (simulation.setpoint): mode, place, velocity,
 yaw and motors. Packets that give rates (yaw rate, climb) are integrated row by row.
 """
 
@@ -10,7 +10,7 @@ import struct
 
 import numpy as np
 
-from airtouch.simulation import controller as c
+from airtouch.simulation import setpoint as c
 from airtouch.sitl.planner import Planner
 
 PERIOD_S = 0.01

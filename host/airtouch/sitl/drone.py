@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.simulation import controller, kept, loop
+from airtouch.simulation import loop, setpoint
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.simulation.stepper import Stepper
 from airtouch.simulation.effects import Active
@@ -32,9 +32,9 @@ class Drone:
                  ai_deck: bool) -> None:
         self._stepper = Stepper(plan, vehicle, seed, flight, active)
         self._start = plan.setpoints[0].copy()
-        self._start[controller.MOTORS] = 0.0
+        self._start[setpoint.MOTORS] = 0.0
         self._table = np.zeros((1, loop.COLUMNS))
-        self._setpoint = np.zeros((1, controller.SETPOINT_SIZE))
+        self._setpoint = np.zeros((1, setpoint.SETPOINT_SIZE))
         self.commander, self.app = Commander(), App(ai_deck, vehicle)
         self.ticks = 0
         self.row = self._table[0]
@@ -59,7 +59,8 @@ class Drone:
     @property
     def estimate(self) -> np.ndarray:
         """roll, pitch, yaw (rad), velocity (m/s), position (m over the floor)."""
-        return self._stepper.memory[kept.ESTIMATE:kept.ESTIMATE + 9]
+        memory = self._stepper.memory[0]
+        return np.concatenate([memory["angles"], memory["velocity"], memory["est"]["x"]])
 
     @property
     def is_flying(self) -> bool:
@@ -69,7 +70,7 @@ class Drone:
     @property
     def motors_on(self) -> bool:
         """Whether they turn now."""
-        return self.setpoint[controller.MOTORS] > 0.5
+        return self.setpoint[setpoint.MOTORS] > 0.5
 
     @property
     def height_over_floor(self) -> float:
@@ -114,7 +115,8 @@ class Drone:
     def drain(self) -> None:
         """From now on the battery is nearly empty."""
         self._stepper.plant[0]["battery_strength"] = 1.0
-        self._stepper.memory[kept.CHARGE] = min(NEARLY_EMPTY, self._stepper.memory[kept.CHARGE])
+        memory = self._stepper.memory[0]
+        memory["charge"] = min(NEARLY_EMPTY, memory["charge"])
 
     def step(self) -> str:
         """Fly 10 ms. Returns the kind of the edge that the app reports, "none" mostly."""
@@ -124,7 +126,7 @@ class Drone:
             self.messages.append("SUP: Locked, reboot required")
         if self.state != PRE_FLIGHT or self.emergency:
             self.commander.planner.stop()
-            self.setpoint[controller.MOTORS] = 0.0
+            self.setpoint[setpoint.MOTORS] = 0.0
         ending, _ = self._stepper.fly(self._setpoint, self._table)
         if ending != loop.OK:
             self._end(ending)
@@ -142,18 +144,19 @@ class Drone:
             self.messages.append(f"AIRTOUCH: Edge {int(self.app.read('edge'))}")
         return edge
 
-    def _begin(self, setpoint: np.ndarray) -> None:
-        charge, fresh = self._stepper.memory[kept.CHARGE], self.ticks == 0
-        self._stepper.begin(setpoint)
+    def _begin(self, row: np.ndarray) -> None:
+        memory, fresh = self._stepper.memory[0], self.ticks == 0
+        charge = memory["charge"].item()
+        self._stepper.begin(row)
         if not fresh:
-            self._stepper.memory[kept.CHARGE] = charge
+            memory["charge"] = charge
 
     def _end(self, ending: int) -> None:
         """What the simulator cannot fly on: the drone lies where it came down."""
         place = self._start.copy()
         if ending in (loop.STRUCK, loop.UPSET) and np.isfinite(self.row).all():
-            place[controller.X], place[controller.Y] = self.row[loop.PLACE:loop.PLACE + 2]
-            place[controller.YAW] = self.row[loop.ANGLES + 2]
+            place[setpoint.X], place[setpoint.Y] = self.row[loop.PLACE:loop.PLACE + 2]
+            place[setpoint.YAW] = self.row[loop.ANGLES + 2]
         if ending != loop.STRUCK or self.motors_on:
             self.state = CRASHED
             self.messages.append("SUP: Crashed, recovery required")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from airtouch.simulation import controller, loop
+from airtouch.simulation import loop, setpoint
 from airtouch.simulation.battery import CHARGE, OPEN_CIRCUIT_V
 from airtouch.sitl import app
 from airtouch.sitl.drone import BATTERY, LOW_POWER, Drone
@@ -59,8 +59,8 @@ def log_variables(drone: Drone) -> Variables:
         lambda d, i: 1000.0 * (1, -1, 1)[i] * d.row[loop.GYRO + i])
     add("stabilizer", "roll pitch yaw", "float", lambda d, i: math.degrees((1, -1, 1)[i] * d.estimate[i]))
     add("stabilizer", "thrust", "float", lambda d, i: float(np.mean(d.row[loop.PWM:loop.PWM + 4])))
-    add("ctrltarget", "x y z", "float", lambda d, i: d.setpoint[controller.X + i])
-    add("ctrltarget", "vx vy", "float", lambda d, i: d.setpoint[controller.VX + i])
+    add("ctrltarget", "x y z", "float", lambda d, i: d.setpoint[setpoint.X + i])
+    add("ctrltarget", "vx vy", "float", lambda d, i: d.setpoint[setpoint.VX + i])
     add("kalman", "stateX stateY stateZ", "float", lambda d, i: d.estimate[6 + i])
     add("kalman", "varX varY varZ", "float", lambda d, i: 1e-4)
     add("kalman", "varPX varPY varPZ", "float", lambda d, i: 1e-3)

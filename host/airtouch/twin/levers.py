@@ -52,7 +52,7 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
         Lever("motor_lag", "factor", 1.0, 0.4, 2.0, 0.1, "1"),
         Lever("actuator_delay", "delay", 0.004, 0.0, 0.03, 0.002, "s"),
         Lever(VEHICLE, "yaw_torque_over_thrust_m", yaw, 0.3 * yaw, 3 * yaw, 0.15 * yaw, "m"),
-        Lever("controller_gain", "rate", 0.8, 0.3, 2.0, 0.1, "1"),
+        Lever("controller_gain", "rate", 1.0, 0.3, 2.0, 0.1, "1"),
         Lever("controller_gain", "attitude", 1.0, 0.4, 2.0, 0.1, "1"),
         Lever("controller_gain", "position", 1.0, 0.4, 2.0, 0.1, "1"),
         Lever("controller_gain", "height", 1.0, 0.4, 2.0, 0.1, "1"),
@@ -67,7 +67,8 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
           for i in range(3)),
         *(Lever(VEHICLE, f"gyro_noise_ratio.{i}", vehicle.gyro_noise_ratio[i], 0.05, 6.0, 0.1, f"of {gyro:g} rad/s")
           for i in range(3)),
-        *(Lever(VEHICLE, f"flow_noise_mps.{i}", flow[i], 0.0, 0.3, 0.01, "m/s") for i in range(3)),
+        *(Lever(VEHICLE, f"flow_noise_mps.{i}", flow[i], 0.0, 0.4, 0.015, "m/s") for i in range(2)),
+        Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "of the distance"),
         Lever("ground_effect", "strength", 1.0, 0.0, 3.0, 0.15, "1"),
         Lever("ground_effect", "fade", 0.0875, 0.03, 0.3, 0.01, "m"),
         Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1"),

@@ -1,6 +1,7 @@
 """PWM that gives a commanded thrust at the present battery voltage."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +9,8 @@ from airtouch.simulation import motors
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.firmware.mixer import MOST
 from airtouch.simulation.firmware.settings import CUBIC, NO_COMPENSATION, OF_VEHICLE, QUADRATIC
+
+GRID = np.arange(10000.0, 65001.0, 2500.0)  #: commands at which `slope` looks
 
 
 @jit
@@ -55,4 +58,11 @@ def apply(settings, plant, volts, commands):
             commands[i] = compensate(settings, plant, volts, commands[i])
 
 
-__all__ = ["CUBIC", "apply", "compensate", "cubic_root", "smoothed"]
+def slope(settings: Any, plant: Any, pwm: float) -> float:
+    """PWM that one more count of a motor's command gives at the nominal voltage, where the PWM is `pwm`."""
+    volts = float(plant["nominal_voltage"])
+    out = np.array([compensate(settings, plant, volts, command) for command in GRID])
+    return float(np.interp(pwm, out, np.gradient(out, GRID)))
+
+
+__all__ = ["CUBIC", "apply", "compensate", "cubic_root", "slope", "smoothed"]

@@ -24,6 +24,7 @@ LOOPS = ("rate_roll", "rate_pitch", "rate_yaw", "roll", "pitch", "yaw", "velocit
 (RATE_ROLL, RATE_PITCH, RATE_YAW, ROLL, PITCH, YAW, VELOCITY_X, VELOCITY_Y, VELOCITY_Z, POSITION_X,
  POSITION_Y, POSITION_Z) = range(12)
 RANGE_MODULES = ("none", "platform", "map")
+OWN_MODULE = "firmware"  #: of a vehicle or scenario: the range module that its firmware has
 COMPENSATIONS = ("none", "quadratic", "cubic", "vehicle")
 (NO_MODULE, PLATFORM, MAP), (NO_COMPENSATION, QUADRATIC, CUBIC, OF_VEHICLE) = range(3), range(4)
 
@@ -74,7 +75,7 @@ KEYS: dict[str, dict[str, tuple[Any, tuple[str, ...] | None, str]]] = {
         "least_height_m": (_F, None, "least height that the model divides by")},
     "range_module": {
         "kind": (_I, RANGE_MODULES, "none; platform: a fixed height is added after a large drop; "
-                                    "map: the height of what is below is known to range and flow"),
+                                    "map: the true height of what is below is added"),
         "threshold_m": (_F, None, "a drop by more sets the flag, a rise by more clears it"),
         "height_m": (_F, None, "what is added while the flag is set"),
         "step_m": (_F, None, "a reading that differs more from the last one passed is held back"),
