@@ -96,7 +96,7 @@ def test_lower_rate_gain_is_found_and_is_no_latency(study):
 
 
 def test_range_step_is_found_at_edges(study):
-    flights = flown("paper-mixed", 4, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
+    flights = flown("paper-mixed", 8, {"range_step": {"residual": 0.02, "kick": 0.05}}, seed=2)
     gain, values = found(study, flights, "range_step")
     assert gain > 12.0
     assert values["kick"] == pytest.approx(0.05, rel=0.3)

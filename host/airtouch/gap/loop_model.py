@@ -116,12 +116,9 @@ def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 
 def _aliases(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """What of the first source's noise folds into the log, noise to command, complex (folds, bins)."""
-    folds = FOLDS[1:] if c.period_s < 0.5 * PERIOD_S else ()
-    f = np.maximum(np.abs(f + np.array(folds).reshape(-1, 1) / PERIOD_S), 0.05)
-    s = 2j * np.pi * f
-    plant, rate, angle, _, filtered, whole = _parts(c, row, axis, f, s)
-    size = 1.0 / (1.0 + plant * whole)
-    return rate * size if axis == "thrust" else -(rate + angle / s) * filtered * size
+    if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
+        return np.zeros((0, len(f)))
+    return _transfers(c, row, axis, np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05))[0][0]
 
 
 def _with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:

@@ -9,8 +9,6 @@ import os
 from pathlib import Path
 
 
-
-
 def _drop_stale_machine_code() -> None:
     """Remove cached machine code when any source of this package has changed.
 
