@@ -1,9 +1,9 @@
 """Choose the `best` detector's decoder settings from cross-validated models.
 
-First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, then
+First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, by fold or by day, then
 `python tools/choose_decoder.py DIR_0 DIR_1 ...`. Each flight is decoded from the logits of the model that
-never saw it, once for each folder. Prints the settings that are best over all folds,
-and an honest figure for choosing them: each fold scored with the settings best on the other four.
+never saw it, once for each folder; with --silence SENSOR from the log without that sensor. Prints the settings that are
+best over all folds, and an honest figure for choosing them: each fold scored with the settings best on the others.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from rich.progress import track
 
 from airtouch import kernels, logs
 from airtouch.cli.flights import find_flights
-from airtouch.detector import best, dataset
+from airtouch.detector import best, dataset, sensors
 from airtouch.detector.score import SAMPLE_PERIOD_S, TOLERANCE_S, match
 from airtouch.detector.stream.recipe import STRIDE
 from airtouch.reference.edge_decoder import DecoderConfig
@@ -28,22 +28,28 @@ FALSE_M = 0.02  #: what one false edge a minute costs, metres of mean error
 class Flight:
     """One flight: logits and airborne at each step, true edges, what turns seconds into metres, fold."""
 
-    def __init__(self, path: Path, condition: dataset.Condition, model) -> None:  # noqa: ANN001
+    def __init__(self, path: Path, speed: float, fold: int, model, silent: tuple[str, ...]) -> None:  # noqa: ANN001
         log = logs.read(path)
-        events = best.flight_events(log, model)
-        self.name, self.fold, self.speed = path.name, condition.fold, condition.speed_mps
+        events = best.flight_events(sensors.without(log, silent), model)
+        self.name, self.fold, self.speed = path.name, fold, speed
         self.logits, self.airborne = events.logits[events.ready], events.airborne[events.ready]
         self.edges = [e.sample for e in logs.true_edges(log)]
         self.minutes = float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60
 
 
-def flights_of(folder: Path, out: Path) -> list[Flight]:
-    """Every flight with the model of its own fold in `out`."""
-    models = {}
-    for path in sorted(out.glob("best_fold*.npz")):
-        models.setdefault(int(path.name.split("_fold")[1].split("_")[0]), best.load(path))
-    return [Flight(f.path, f.condition, models[f.condition.fold])
-            for f in track(dataset.collect([folder]), "logits")]
+def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[Flight]:
+    """Every flight with the model of its own fold in `out`, by what `airtouch crossval` wrote of that fold."""
+    files = {file.path.name: file for file in dataset.collect([folder])}
+    entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
+    if len({entry["fold"] for entry in entries}) != len(entries):
+        raise SystemExit(f"{out}: folds of more than one cross-validation; give a folder with one")
+    found = []
+    for entry in track(entries, "logits"):
+        model = best.load(out / entry["model"])
+        for name in (score["file"] for score in entry["per_flight"]):
+            file = files[name]
+            found.append(Flight(file.path, file.condition.speed_mps, entry["fold"], model, silent))
+    return found
 
 
 def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
@@ -103,8 +109,10 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="settings tried in each of three rounds")
     parser.add_argument("--hold", type=int, default=best.DECODER.hold_steps,
                         help="steps after its crossing at which an edge is reported (default: as shipped)")
+    parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
+                        help="decode the flights without this sensor")
     options = parser.parse_args()
-    flights = [flight for out in options.out for flight in flights_of(find_flights(), out)]
+    flights = [flight for out in options.out for flight in flights_of(find_flights(), out, tuple(options.silence))]
     rng = np.random.default_rng(0)
     tried: list[DecoderConfig] = [best.DECODER]
     found = [outcomes(flights, best.DECODER)]
@@ -126,7 +134,7 @@ def main() -> None:
         lag = lag_of([found[choice][k] for k in others])
         for k in set(range(len(flights))) - set(others):
             nested[k] = (found[choice][k][0] - lag, found[choice][k][1])
-    print("each fold with the settings best on the other four:", _text(figures(flights, nested, 0.0)))
+    print("each fold with the settings best on the others:", _text(figures(flights, nested, 0.0)))
 
 
 def show(title: str, flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> None:

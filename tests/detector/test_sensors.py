@@ -1,5 +1,7 @@
 """The streaming detector on logs that lack a sensor."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_flight import SMALL, made_flight
@@ -9,6 +11,12 @@ from airtouch.detector import best, evaluate, sensors
 from airtouch.detector.stream import batches
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO
+
+
+@pytest.fixture(scope="module")
+def small():
+    pytest.importorskip("tensorflow")
+    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
 
 
 @pytest.mark.parametrize("sensor", sensors.SENSORS)
@@ -91,3 +99,32 @@ def test_landings_and_take_offs_are_in_the_crops():
     last = np.mean(starts + recipe.crop >= len(flight.x) - 1)
     first = np.mean(starts <= np.argmax(flight.airborne) - batches.AHEAD)
     assert 0.10 < last < 0.25 and 0.10 < first < 0.25
+
+
+@pytest.mark.parametrize("sensor", sensors.SENSORS)
+def test_sample_by_sample_is_the_same_as_at_once(sensor):
+    from airtouch.crazyflie.host_detector import HostDetector
+
+    log = sensors.without(made_flight(4, 1500), (sensor,))
+    pieces = HostDetector(missing=sensors.missing(log))
+    for first in range(0, len(log), 7):
+        pieces.next({name: values[first:first + 7] for name, values in log.columns.items()})
+    whole = best.run(log)
+    assert np.array_equal(pieces.trace(log).probability, whole.probability) and pieces.trace(log).edges == whole.edges
+    with pytest.raises(AirTouchError, match="no column"):
+        HostDetector().next(log.columns)
+
+
+def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
+    deaf = {**small.metadata["decoder"], "entry_score": 99.0, "exit_score": 99.0, "late_entry": 99.0, "late_exit": -99.0}
+    keen = {**deaf, "entry_score": -9.0, "exit_score": -9.0}
+    model = replace(small, metadata={**small.metadata, "decoder": deaf, "decoder_without": {"motors": keen}})
+    model.save(tmp_path / "m.npz")
+    model = best.load(tmp_path / "m.npz")
+    log = made_flight(4)
+    assert not best.run(log, model).edges and best.run(sensors.without(log, ("motors",)), model).edges
+    assert not best.run(sensors.without(log, ("acceleration",)), model).edges
+    wrong = replace(small, metadata={**small.metadata, "decoder_without": {"motors": {"entry_score": "high"}}})
+    wrong.save(tmp_path / "w.npz")
+    with pytest.raises(AirTouchError, match="not numbers"):
+        best.load(tmp_path / "w.npz")

@@ -12,6 +12,7 @@ from airtouch.cli.flights import need_flights
 from airtouch.detector import crossval, dataset, evaluate, sensors
 from airtouch.detector import folds as folds_of
 from airtouch.detector import free_air as free_air_flights
+from airtouch.logs.flight_log import FlightLog
 
 
 @click.command(name="crossval")
@@ -58,7 +59,7 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     files = dataset.collect(flights or [need_flights()], speed)
     split = folds_of.only(files, without) if without else folds_of.by_day(files) if by == "day" else None
     options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}
-    air = free_air_flights.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True)) if free_air else ()
+    air = _free_air(free_air)
     scores, folds, left_out = crossval.crossval(
         detector, files, out, folds=split, seed=seed, options=options, physical_filter=physical_filter,
         silenced=silence, free_air=air, tell=lambda line: click.echo(line, err=True))
@@ -88,6 +89,12 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     show.left_out(left_out, len(scores))
     if left_out:
         sys.exit(2)
+
+
+def _free_air(folders: tuple[Path, ...]) -> list[FlightLog]:
+    if not folders:
+        return []
+    return free_air_flights.read(folders, lambda line: click.echo(f"left out of free air: {line}", err=True))
 
 
 def note(ledger: Path, title: str, result: dict) -> None:

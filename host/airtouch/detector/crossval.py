@@ -53,8 +53,10 @@ def crossval(
     readable, left_out = readable_flights(files, evaluate.spare_of(detector))
     scores: list[FlightScore] = []
     entries: list[dict[str, Any]] = []
-    shown = {**(options or {}), **({"free_air": [training_set.flight_hash(log) for log in free_air]} if free_air else {})}
-    given = {**(options or {}), **({"free_air": free_air} if free_air else {})}
+    shown, given = dict(options or {}), dict(options or {})
+    if free_air:
+        shown["free_air"] = [training_set.flight_hash(log) for log in free_air]
+        given["free_air"] = free_air
     for fold, members in folds.items():
         held = {f.path for f in members}
         test = [f for f in members if f.path in readable]
@@ -72,7 +74,8 @@ def crossval(
                 model = detector.retune(model, train, False)
             results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], silenced), detector, model).score
                        for f in test]
-            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
+            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model),
+                     "parameters": detector.parameters(model),
                      "seconds": round(time.monotonic() - started, 1),
                      "per_flight": [s.as_dict() for s in results]}
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)

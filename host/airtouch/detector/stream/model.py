@@ -1,6 +1,7 @@
 """A trained streaming network as one file: float and int8 weights, decoder settings, how it came about."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
@@ -39,9 +40,21 @@ class StreamModel:
     @property
     def decoder(self) -> DecoderConfig:
         """The decoder's settings."""
+        return self._settings(self.metadata.get("decoder"))
+
+    def decoder_without(self, missing: Sequence[str]) -> DecoderConfig:
+        """The decoder's settings for a log that lacks these sensors, `decoder` where there are none of their own."""
+        own = self.metadata.get("decoder_without", {})
+        for sensor in missing:
+            if sensor in own:
+                return self._settings(own[sensor])
+        return self.decoder
+
+    @staticmethod
+    def _settings(table: object) -> DecoderConfig:
         try:
-            return DecoderConfig(**self.metadata["decoder"])
-        except (KeyError, TypeError):
+            return DecoderConfig(**table)
+        except TypeError:
             raise AirTouchError(f"the model's decoder settings are not those of this version; {archive.REMEDY}") from None
 
     @property
@@ -124,7 +137,10 @@ def _recipe(table: object, source: str) -> Recipe:
 
 
 def _check_metadata(model: StreamModel, source: str) -> None:
-    lag = model.metadata.get("lag_s")
-    settings = asdict(model.decoder).values()
+    lag, own = model.metadata.get("lag_s"), model.metadata.get("decoder_without", {})
+    if not isinstance(own, dict):
+        raise AirTouchError(f"{source}: decoder settings are not a table; {archive.REMEDY}")
+    configs = [model.decoder, *(model.decoder_without((sensor,)) for sensor in own)]
+    settings = [value for config in configs for value in asdict(config).values()]
     if not all(isinstance(v, (int, float)) and np.isfinite(v) for v in (lag, *settings)):
         raise AirTouchError(f"{source}: decoder settings or lag are not numbers; {archive.REMEDY}")
