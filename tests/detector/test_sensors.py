@@ -1,13 +1,15 @@
 """The streaming detector on logs that lack a sensor."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from made_flight import SMALL, made_flight
 
 from airtouch import logs
-from airtouch.detector import best, evaluate, sensors
+from airtouch.detector import best, evaluate, sensor_note, sensors
+from airtouch.detector.dataset import Condition, FlightFile
 from airtouch.detector.stream import batches
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO
@@ -128,3 +130,24 @@ def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
     wrong.save(tmp_path / "w.npz")
     with pytest.raises(AirTouchError, match="not numbers"):
         best.load(tmp_path / "w.npz")
+
+
+def test_a_log_without_a_sensor_is_served_by_the_spare_and_scored_with_its_lag(small):
+    spare = replace(small, metadata={**small.metadata, "lag_s": small.metadata["lag_s"] + 0.2})
+    model = replace(small, spares={"motors": spare})
+    log, file = made_flight(0), FlightFile(Path("f.csv"), Condition(speed_mps=0.3))
+    assert best.model_for(model, log) is model
+    deaf = sensors.without(log, ("motors",))
+    assert best.model_for(model, deaf) is spare
+    with_it = evaluate.evaluate_flight(file, deaf, best, model).score
+    alone = evaluate.evaluate_flight(file, deaf, best, spare).score
+    assert with_it.as_dict() == alone.as_dict()
+
+
+def test_the_note_has_the_measured_figures():
+    whole, without = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
+    text = sensor_note.note(("acceleration",))
+    assert text.index(f"{without['missed']:.1%} missed of {without['edges']}") < text.index(f"{whole['missed']:.1%} missed of")
+    assert "\n" not in text
+    assert not sensor_note.note(())
+    assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}

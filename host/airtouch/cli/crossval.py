@@ -29,6 +29,7 @@ from airtouch.logs.flight_log import FlightLog
               "a model of all others.")
 @click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
               help="best: take this sensor from the flights that are scored.")
+@click.option("--silence-training", is_flag=True, help="With --silence: from the flights trained on, too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: train on the flights of this folder too; nothing there is an edge. May be repeated.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
@@ -45,8 +46,9 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--ledger", type=click.Path(path_type=Path),
               help="Append a line to this file: how often the folds were looked at.")
 def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epochs: int | None, steps: int | None,
-            by: str, without: str | None, silence: tuple[str, ...], free_air: tuple[Path, ...], speed: float | None,
-            seed: int, random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
+            by: str, without: str | None, silence: tuple[str, ...],
+            silence_training: bool, free_air: tuple[Path, ...], speed: float | None, seed: int,
+            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
             ledger: Path | None) -> None:
     """Cross-validate a detector over FLIGHTS, folders with a manifest.csv, split by flight.
 
@@ -62,7 +64,7 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     air = _free_air(free_air)
     scores, folds, left_out = crossval.crossval(
         detector, files, out, folds=split, seed=seed, options=options, physical_filter=physical_filter,
-        silenced=silence, free_air=air, tell=lambda line: click.echo(line, err=True))
+        silenced=silence, silent_training=silence_training, free_air=air, tell=lambda line: click.echo(line, err=True))
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     title = ", ".join([detector, *([] if physical_filter else ["physical filter off"]),

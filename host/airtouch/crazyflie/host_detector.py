@@ -22,7 +22,7 @@ class HostDetector:
 
     def __init__(self, model: StreamModel | None = None, missing: tuple[str, ...] = ()) -> None:
         """missing: the sensors, one at most, that no row will have (`detector.sensors.missing`)."""
-        self.model = model or best.load(None)
+        self.model = (model or best.load(None)).serving(missing)
         self.lag_s = best.lag_s(self.model)
         self._missing = missing
         self._decoder = self.model.decoder_without(missing)

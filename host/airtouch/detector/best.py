@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airtouch import __version__, kernels, logs
-from airtouch.detector import evaluate, sensors, training_set, tuning
+from airtouch.detector import evaluate, sensor_note, sensors, training_set, tuning
 from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.detector.channels import nine_channels
 from airtouch.detector.stream import model as model_file
@@ -32,8 +32,15 @@ from airtouch.reference.edge_decoder import DecoderConfig
 #: Chosen once over the five folds, by tools/choose_decoder.py with models of three seeds (host/docs/looks.md).
 DECODER = DecoderConfig(over_share=0.3, entry_score=2.3, exit_score=1.1, late_entry=3.0, late_exit=-4.0,
                         smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20)
-#: The same for a log that lacks a sensor, whose logits are less sure.
-DECODER_WITHOUT: dict[str, DecoderConfig] = {}
+#: Decoder settings for a log that lacks a sensor, whose logits are less sure; chosen like DECODER, with `--silence`.
+DECODER_WITHOUT = {
+    "acceleration": DecoderConfig(over_share=0.5, entry_score=1.89, exit_score=3.78, late_entry=1.48, late_exit=-2.74,
+                                  smooth_gain=0.08, dwell_steps=30, arm_steps=100, look_back=50, hold_steps=20),
+    "rates": DecoderConfig(over_share=0.5, entry_score=2.72, exit_score=-0.11, late_entry=1.44, late_exit=-4.22,
+                           smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20),
+    "motors": DecoderConfig(over_share=0.3, entry_score=2.76, exit_score=2.55, late_entry=0.46, late_exit=-1.89,
+                            smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20),
+}
 #: rms timing error of held-out flights with these settings, three seeds (printed by the same tool); for maps.
 TIMING_SIGMA_S = 0.10
 #: Changes to a model's recipe where training goes on from it.
@@ -50,9 +57,14 @@ def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
 
     Raises AirTouchError, naming columns, where more than one of acceleration, rates and motors is missing.
     """
-    model = model or load(None)
+    model = model_for(model, log)
     events = flight_events(log, model)
     return trace_of(log, model, events.logits, events.edge, events.airborne)
+
+
+def model_for(model: StreamModel | None, log: FlightLog) -> StreamModel:
+    """The model that serves this log: the shipped one has others for logs that lack a sensor."""
+    return (model or load(None)).serving(sensors.missing(log))
 
 
 def run_float(log: FlightLog, model: StreamModel) -> Trace:
@@ -75,7 +87,7 @@ def trace_of(log: FlightLog, model: StreamModel, logits: np.ndarray, edge: np.nd
         kind = int(edge[i])
         edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
     signals = {"logits": logits} if absent else {"channels": nine_channels(log), "logits": logits}
-    return Trace(np.where(airborne, over, 0.0), edges, signals, f"no {absent[0]} in this log" if absent else "")
+    return Trace(np.where(airborne, over, 0.0), edges, signals, sensor_note.note(absent))
 
 
 def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:

@@ -85,6 +85,8 @@ def truth(log: FlightLog) -> list[logs.Edge] | None:
 
 def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model: Any) -> Result:
     """Run the detector on one flight and score it."""
+    if hasattr(detector, "model_for"):
+        model = detector.model_for(model, log)
     return result_of(file, log, detector.run(log, model), detector, model)
 
 

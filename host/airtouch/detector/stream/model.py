@@ -1,8 +1,9 @@
 """A trained streaming network as one file: float and int8 weights, decoder settings, how it came about."""
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,23 +20,32 @@ from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.stream_int8 import StreamNetwork
 
 FORMAT = 1
+SHIPPED = "best.npz"
+#: the shipped models for logs that lack a sensor
+SPARES = {"acceleration": "best_without_acceleration.npz"}
 KIND = {"format": FORMAT, "network": "stream"}
 _INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
 #: what a model's file means that does not say so, because it is older
-_BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air": 0.0}
+_BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air_share": 0.0}
 _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 
 
 @dataclass(frozen=True)
 class StreamModel:
     """weights: float32 arrays (`Recipe.weight_shapes`); int8: what flies; tflite: the same over one window;
-    metadata: plain JSON: decoder, lag_s, flights, seed, command, ..."""
+    metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by its
+    name, in files of their own."""
 
     recipe: Recipe
     weights: dict[str, np.ndarray]
     int8: StreamNetwork
     tflite: bytes
     metadata: dict[str, Any]
+    spares: Mapping[str, "StreamModel"] = field(default_factory=dict)
+
+    def serving(self, missing: Sequence[str]) -> "StreamModel":
+        """The model for a log that lacks these sensors: a spare where there is one, else this one."""
+        return next((self.spares[sensor] for sensor in missing if sensor in self.spares), self)
 
     @property
     def decoder(self) -> DecoderConfig:
@@ -85,11 +95,17 @@ class StreamModel:
 
 
 def load(path: str | Path | None = None) -> StreamModel:
-    """A model from its file, the shipped one for None. Raises AirTouchError, one line, for anything else."""
+    """A model from its file, the shipped one with its spares for None. Raises AirTouchError, one line, for anything else."""
     if path is None:
-        with resources.as_file(resources.files("airtouch") / "models" / "best.npz") as shipped:
-            return load(shipped)
+        spares = {sensor: _shipped(name) for sensor, name in SPARES.items()}
+        return replace(_shipped(SHIPPED), spares=spares)
     return parse(archive.read(Path(path)), str(path))
+
+
+@cache
+def _shipped(name: str) -> StreamModel:
+    with resources.as_file(resources.files("airtouch") / "models" / name) as path:
+        return load(path)
 
 
 def parse(data: bytes, source: str) -> StreamModel:
