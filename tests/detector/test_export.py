@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from objects import compiled
 from small_model import random_model
 
 from airtouch.detector import best, export, model_file, paper_stream
@@ -97,12 +98,13 @@ def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path,
     if compiler is None:
         pytest.skip("no C compiler")
     (tmp_path / "main.c").write_text(main)
-    flags = ["-std=c11", "-Os", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
-             "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    subprocess.run([compiler, *flags, f"-I{KERNELS}", f"-I{FIRMWARE}", f"-I{MODEL}",
-                    str(tmp_path / "main.c"), *map(str, sorted(KERNELS.glob("*.c"))),
-                    *map(str, sorted(FIRMWARE.glob("*.c"))), *map(str, sorted(MODEL.glob("*.c"))), "-lm",
-                    "-o", str(tmp_path / "golden")], check=True)
+    sanitizers = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    flags = ["-std=c11", "-Os", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", *sanitizers,
+             *(f"-I{folder}" for folder in (KERNELS, FIRMWARE, MODEL))]
+    sources = [path for folder in (KERNELS, FIRMWARE, MODEL) for path in sorted(folder.glob("*.c"))]
+    made, error = compiled(compiler, flags, sources)
+    assert not error, error
+    subprocess.run([compiler, *flags, str(tmp_path / "main.c"), *made, "-lm", "-o", str(tmp_path / "golden")], check=True)
     assert subprocess.run([str(tmp_path / "golden")]).returncode == 0
 
 

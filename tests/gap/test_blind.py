@@ -19,21 +19,21 @@ CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_of
 
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory):
-    """A set of 13 flights, diagnosed and scored."""
+    """A set of 10 flights, diagnosed and scored."""
     folder = tmp_path_factory.mktemp("blind") / "set"
     patch = pytest.MonkeyPatch()
     patch.setattr(blind, "strengths", lambda *_: CLEAR)
-    found = blind_run.run(folder, 13, seed=3, workers=2, unknown=3)
+    found = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
     patch.undo()
     return folder, found
 
 
 def test_diagnosis_names_clear_effects(checked):
     _, found = checked
-    assert found["diagnosed"] == 13 and found["top_1"]["n"] == 5 and found["false_alarms"]["n"] == 5
-    assert found["top_1"]["hits"] >= 4 and found["top_3"]["hits"] == 5
+    assert found["diagnosed"] == 10 and found["top_1"]["n"] == 4 and found["false_alarms"]["n"] == 4
+    assert found["top_1"]["hits"] >= 3 and found["top_3"]["hits"] == 4  # by chance, of 24 names: 3 in 10,000
     assert found["false_alarms"]["hits"] <= 1
-    assert found["pairs_one_right"]["hits"] == 3
+    assert found["pairs_one_right"]["hits"] == 2
     assert found["parameters"]["error"]["value"] < 0.25
     assert found["shrink"]["right"]["value"] > 0.75 and found["shrink"]["wrong"]["value"] < 0.25
 
@@ -41,7 +41,7 @@ def test_diagnosis_names_clear_effects(checked):
 def test_flights_say_nothing_of_their_effect(checked):
     folder, _ = checked
     kept = {p.name.split(".")[0] for p in folder.glob("*.gz")}
-    assert kept == {f"cal_{i}" for i in range(6)} | {f"flight_{i:04d}" for i in range(13)}
+    assert kept == {f"cal_{i}" for i in range(6)} | {f"flight_{i:04d}" for i in range(10)}
     for path in folder.glob("*.csv.gz"):
         log = logs.read(path)
         assert not {"effects", "seed", "scenario", "flight"} & set(log.meta) and not log.meta.get("condition"), path
@@ -54,7 +54,7 @@ def test_the_seal(checked, tmp_path):
     folder, _ = checked
     key = blind.key_of(folder)
     again = blind.score(folder, folder / "answers")  # the same answers may be scored once more
-    assert again["top_1"]["n"] == 5
+    assert again["top_1"]["n"] == 4
     other = tmp_path / "other.json"
     other.write_text(json.dumps({"cases": [{"flights": ["flight_0000"], "verdict": "none",
                                             "ranking": [{"name": "none", "probability": 1.0}], "effects": []}]}))

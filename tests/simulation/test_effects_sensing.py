@@ -171,3 +171,45 @@ def test_position_and_height_gain_scale_the_outer_loops(vehicle):
     pitch, thrust = wanted()
     assert wanted(position_gain=2.0) == pytest.approx((2 * pitch, thrust))
     assert wanted(height_gain=2.0)[1] == pytest.approx(4 * thrust, rel=0.05)  # two loops in series
+
+
+def test_range_bias_is_the_error_of_the_down_range(sweep):
+    """Over the floor nothing, over the platform near exp(-d / fade), with the true height from the position."""
+    bias = {"near": -0.03, "fade": 0.04, "dip": 0.0, "delay": 0.0}
+    log = sweep({"range_bias": bias})
+    entry, leave = true_edges(log)[:2]
+    true = log["z_m"] - np.where((np.arange(len(log)) > entry.sample) & (np.arange(len(log)) < leave.sample), 0.7, 0.0)
+    error = log["zrange_m"] - true
+    over, free = slice(entry.sample + 30, leave.sample - 10), slice(entry.sample - 300, entry.sample - 50)
+    expected = np.maximum(-0.03 * np.exp(-true[over] / 0.04), -true[over])
+    assert np.abs(error[over] - expected).mean() < 0.003
+    assert np.abs(error[free]).mean() < 0.003
+
+
+def test_range_dip_dies_out_after_the_entry(sweep):
+    dips = {"near": 0.0, "dip": -0.04, "time": 0.2, "delay": 0.0}
+    log = sweep({"range_bias": dips})
+    entry, leave = true_edges(log)[:2]
+    since = np.arange(5, 60)
+    error = log["zrange_m"][entry.sample + since] - (log["z_m"][entry.sample + since] - 0.7)
+    expected = np.maximum(-0.04 * np.exp(-0.01 * since / 0.2), -(log["z_m"][entry.sample + since] - 0.7))
+    assert np.corrcoef(error, expected)[0, 1] > 0.95
+    assert np.abs(error - expected).mean() < 0.006
+    after = slice(leave.sample + 10, leave.sample + 60)
+    assert np.abs(log["zrange_m"][after] - log["z_m"][after]).mean() < 0.01  # none at an exit
+
+
+def test_range_delay_makes_the_log_late(sweep):
+    def late(delay):
+        log = sweep({"range_bias": {"near": 0.0, "dip": 0.0, "delay": delay}})
+        entry = true_edges(log)[0].sample
+        return log["x_m"][entry]
+    assert late(0.1) - late(0.0) == pytest.approx(0.1 * 0.3, abs=0.015)
+
+
+def test_flow_latency_is_the_plants_delay(quiet):
+    plant = from_vehicle(quiet)
+    from airtouch.simulation import effects
+    (active,) = effects.activate({"flow_latency": {"delay": 0.06}})
+    active.effect.settings(plant[0], active.values)
+    assert plant["flow_delay"] == 0.06

@@ -13,7 +13,7 @@ GAP_LIST = {
     "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load", "imu_bias", "imu_noise",
     "vibration",
     "sensor_latency", "actuator_delay", "time_jitter", "packet_loss", "range_step", "flow_scale",
-    "controller_gain",
+    "controller_gain", "range_bias", "flow_latency",
 }
 SHORT = """
 name = "short"

@@ -18,8 +18,8 @@ def vehicle():
 @pytest.fixture(scope="session")
 def fly_course(vehicle):
     """fly_course(course, effects, number) -> a log that ended well, or None."""
-    def flown(course, effects=PLAIN, number=0, seed=3, craft=vehicle):
-        log = fly(missions.one(course, effects), craft, seed, number)
+    def flown(course, effects=PLAIN, number=0, seed=3, craft=vehicle, height_m=0.0):
+        log = fly(missions.one(course, effects, height_m=height_m), craft, seed, number)
         return None if isinstance(log, Diverged) else log
     return flown
 

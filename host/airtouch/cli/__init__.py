@@ -24,6 +24,7 @@ COMMANDS = {
     "flash": ("flash", "Check a firmware image and flash it."),
     "sitl": ("sitl", "Fly without a drone: a virtual Crazyflie that cflib connects to."),
     "twin": ("twin", "Fit the simulator to recorded flights of one drone."),
+    "adapt": ("adapt", "Train a detector for the drone that flew some flights."),
     "gap": ("gap", "Diagnose the gap between real flights and the simulator."),
     "dataset": ("dataset", "Fetch the authors' public flights."),
     "demo": ("demo", "Run the whole pipeline and write an HTML report."),

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from airtouch.cli.progress import Bar
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 
@@ -57,7 +58,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
 
     _check_free(out, resume, force)
     craft = vehicles.load(vehicle)
-    with _bar("reading") as bar:
+    with Bar("reading") as bar:
         recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
     for _, reason in recorded.left_out:
         click.echo(f"airtouch: {reason}", err=True)
@@ -65,13 +66,13 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     aim = fit.target(recorded.courses, recorded.features)
     listed = levers.default(craft)
     workers = workers or available_cores()
-    with _bar("fitting") as bar:
+    with Bar("fitting") as bar:
         state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers,
                         kept=out / FIT, progress=lambda done, total, now: bar(done, total, _misfit(now)))
     files.write(out, craft, listed, state.values, recorded.courses, force=True)
-    with _bar("flying the twin") as bar:
+    with Bar("flying the twin") as bar:
         flown, lost = compare.flown(recorded.courses, craft, listed, state.values, seed, progress=bar)
-    with _bar("telling apart") as bar:
+    with Bar("telling apart") as bar:
         phases: list[str] = []
         found = compare.compare(recorded, aim, flown, lost, seed, lambda name: (phases.append(name), bar(len(phases), 6, name)))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
@@ -109,25 +110,3 @@ def _summary(found: Any, listed: Any, state: Any, recorded: Any, typed: str) -> 
                       "difference": g.difference, "scatters": g.scatters, "flights": g.flights} for g in found.gaps],
             "levers": {lever.name: float(v) for lever, v in zip(listed, state.values, strict=True)},
             "history": state.history}
-
-
-class _bar:
-    """A progress bar on stderr: call it with (done, total[, note])."""
-
-    def __init__(self, name: str) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-        self.progress = Progress(TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                                 TextColumn("{task.fields[note]}"), console=Console(stderr=True))
-        self.task = self.progress.add_task(name, total=None, note="")
-
-    def __enter__(self) -> "_bar":
-        self.progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.progress.stop()
-
-    def __call__(self, done: int, total: int, note: str = "") -> None:
-        self.progress.update(self.task, completed=done, total=total, note=note)

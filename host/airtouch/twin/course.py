@@ -32,7 +32,8 @@ AROUND_S = (0.5, 1.0)  #: an edge's phase begins and ends this far from it
 class Course:
     """One flight. Times in s, heights in m as the down range shows them, samples of the log.
 
-    cruise_m: level height before the platform. clearance_m: median height over the platform. climb_s: from
+    cruise_m: level height before the platform. clearance_m: median height over the platform. before_m, entered_m: just
+    before and just after the entry. climb_s: from
     the motors' start to level flight; hover_s: to the velocity step; before_s: to the entry; over_s: to the
     exit; stop_s: to the end of the forward flight; after_s: from the exit to the landing. speed_mps: of the velocity step; speed_from: "stated",
     "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated.
@@ -41,6 +42,8 @@ class Course:
     source: str
     cruise_m: float
     clearance_m: float
+    before_m: float
+    entered_m: float
     climb_s: float
     hover_s: float
     before_s: float
@@ -110,7 +113,8 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     speed = speed_mps if speed_mps is not None else measured
     over = (leave.sample - entry.sample) / RATE_HZ
     clearance = float(np.median(down[entry.sample + min(20, int(30 * over)):leave.sample - 3]))
-    return Course(log.source, cruise, clearance, (level - start) / RATE_HZ, (step - level) / RATE_HZ,
+    before = float(np.median(down[max(entry.sample - 30, level):entry.sample - 4]))
+    return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ, (step - level) / RATE_HZ,
                   (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
                   (landing - leave.sample) / RATE_HZ, speed,
                   "stated" if speed_mps is not None else how, angle_deg or 0.0, start, level, step,

@@ -30,12 +30,16 @@ GROUPS = ("trim", "spectrum", "coherency", "over", "entry", "exit")
 
 @dataclass(frozen=True)
 class Feature:
-    """One number of a flight. group: of GROUPS. least: scatter that is taken at least, in `unit`."""
+    """One number of a flight. group: of GROUPS. least: scatter that is taken at least, in `unit`.
+
+    paired: it belongs to the course, so that `least` is its scatter however much the courses differ.
+    """
 
     name: str
     group: str
     unit: str
     least: float
+    paired: bool = False
 
 
 def height_class(clearance_m: float) -> str | None:
@@ -46,7 +50,8 @@ def height_class(clearance_m: float) -> str | None:
 @functools.cache
 def names() -> tuple[Feature, ...]:
     """What `features` returns, in its order."""
-    out = [Feature("hover PWM", "trim", "PWM", 300.0), Feature("hover PWM slope", "trim", "PWM/s", 5.0)]
+    out = [Feature("hover PWM", "trim", "PWM", 300.0), Feature("hover PWM slope", "trim", "PWM/s", 5.0),
+           Feature("height before the entry", "trim", "cm", 1.0, paired=True)]
     out += [Feature(f"trim {NAMES[k]}", "trim", "PWM", 100.0) for k in (ch.ROLL, ch.PITCH, ch.YAW)]
     out += [Feature(f"{NAMES[k]} {a:g}-{b:g} Hz", "spectrum", "dB", 1.0) for k in range(ch.DOWN) for a, b in BANDS_HZ]
     out += [Feature(f"{NAMES[i]} with {NAMES[k]} {a:g}-{b:g} Hz {part}", "coherency", "1", 0.08)
@@ -84,7 +89,7 @@ def _trims(log: FlightLog, free: np.ndarray, course: Course) -> np.ndarray:
     pwm = log.stack(PWM)[course.free]
     mean = np.nanmean(pwm, axis=1)
     slope = np.polyfit(np.arange(len(mean)) / RATE_HZ, np.nan_to_num(mean, nan=np.nanmean(mean)), 1)[0]
-    return np.r_[mean.mean(), slope, np.median(free[:, [ch.ROLL, ch.PITCH, ch.YAW]], axis=0)]
+    return np.r_[mean.mean(), slope, 100.0 * course.before_m, np.median(free[:, [ch.ROLL, ch.PITCH, ch.YAW]], axis=0)]
 
 
 def _blocks(x: np.ndarray, length: int, step: int) -> np.ndarray | None:

@@ -27,9 +27,10 @@ def vehicle_text(vehicle: Vehicle) -> str:
     return tomli_w.dumps(values)
 
 
-def scenario_text(courses: Sequence[Course], effects: Mapping[str, Any], name: str) -> str:
+def scenario_text(courses: Sequence[Course], effects: Mapping[str, Any], name: str,
+                  height_m: float = 0.0) -> str:
     """A scenario as TOML: each flight draws one of the courses."""
-    return tomli_w.dumps(missions.table(courses, effects, name))
+    return tomli_w.dumps(missions.table(courses, effects, name, height_m))
 
 
 def write(out: Path, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, courses: Sequence[Course],
@@ -37,7 +38,8 @@ def write(out: Path, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarr
     """Write both files into a folder; each is read back as a check. Raises AirTouchError where one exists."""
     craft = replace(lever_set.craft(vehicle, levers, values), name=name)
     texts = {VEHICLE: vehicle_text(craft),
-             SCENARIO: scenario_text(courses, lever_set.table(levers, values, fixed), name)}
+             SCENARIO: scenario_text(courses, lever_set.table(levers, values, fixed), name,
+                                     lever_set.height(levers, values))}
     vehicles.parse(texts[VEHICLE], VEHICLE)
     scenario.parse(texts[SCENARIO], SCENARIO)
     for file, text in texts.items():

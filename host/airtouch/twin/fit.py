@@ -64,7 +64,8 @@ def target(courses: Sequence[Course], features: np.ndarray) -> Target:
     for k, feature in enumerate(listed):
         values = features[np.isfinite(features[:, k]), k]
         if len(values) >= FEWEST:
-            scatter[k] = max(1.4826 * np.median(np.abs(values - np.median(values))), feature.least)
+            spread = 0.0 if feature.paired else 1.4826 * np.median(np.abs(values - np.median(values)))
+            scatter[k] = max(spread, feature.least)
     return Target(list(courses), features, scatter)
 
 

@@ -10,7 +10,7 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import effects as registry
 from airtouch.vehicle import Vehicle
 
-VEHICLE = "vehicle"
+VEHICLE, MISSION = "vehicle", "mission"
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"
 
@@ -19,7 +19,7 @@ TRIM_UNIT = "thrust loss"
 class Lever:
     """One number of the simulator.
 
-    of: an effect, "vehicle" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
+    of: an effect, "vehicle", "mission" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
     axis), or a direction of ROTOR_SIGNS. step: a change that a round tries. spread: half width over which
     each flight draws it, None where all flights have the same.
     """
@@ -41,25 +41,26 @@ class Lever:
 
 def default(vehicle: Vehicle) -> tuple[Lever, ...]:
     """The levers of a fit, started from a vehicle and plain effects."""
-    gyro = vehicle.gyro_noise_rms_radps
-    acc = vehicle.acc_noise_rms_mps2
-    flow = vehicle.flow_noise_mps
+    gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
     yaw = vehicle.yaw_torque_over_thrust_m
     return (
+        Lever(MISSION, "height", 0.0, -0.1, 0.1, 0.01, "m"),
         Lever("thrust_coefficient", "loss", 0.0, -0.3, 0.3, 0.02, "1", 0.03),
         *(Lever("trim", key, 0.0, -0.15, 0.15, 0.01, TRIM_UNIT, 0.02) for key in ROTOR_SIGNS),
         Lever("battery_sag", "capacity", 0.6, 0.2, 2.0, 0.1, "1"),
+        Lever("battery_sag", "charge", 0.7, 0.3, 1.0, 0.1, "1", 0.2),
         Lever("motor_lag", "factor", 1.0, 0.4, 2.0, 0.1, "1"),
         Lever("actuator_delay", "delay", 0.004, 0.0, 0.03, 0.002, "s"),
         Lever(VEHICLE, "yaw_torque_over_thrust_m", yaw, 0.3 * yaw, 3 * yaw, 0.15 * yaw, "m"),
-        Lever("controller_gain", "rate", 1.0, 0.3, 2.0, 0.1, "1"),
-        Lever("controller_gain", "attitude", 1.0, 0.4, 2.0, 0.1, "1"),
-        Lever("controller_gain", "position", 1.0, 0.4, 2.0, 0.1, "1"),
-        Lever("controller_gain", "height", 1.0, 0.4, 2.0, 0.1, "1"),
+        *(Lever(VEHICLE, f"inertia_kg_m2.{i}", value, 0.5 * value, 2.0 * value, 0.06 * value, "kg m²")
+          for i, value in enumerate(vehicle.inertia_kg_m2)),
         Lever("motor_noise", "rms", 0.006, 0.0, 0.05, 0.0015, "1"),
-        Lever("motor_noise", "time", 0.5, 0.05, 3.0, 0.15, "s"),
+        Lever("motor_noise", "time", 0.8, 0.05, 3.0, 0.15, "s"),
         Lever("motor_noise", "fast", 0.005, 0.0, 0.05, 0.0015, "1"),
+        Lever("motor_noise", "fast_time", 0.005, 0.002, 0.1, 0.002, "s"),
         Lever("gust", "rms", 0.1, 0.0, 1.0, 0.03, "m/s"),
+        Lever("gust", "lever", 0.0, -0.1, 0.1, 0.01, "m"),
+        Lever("gust", "shear", 0.0, 0.0, 5.0, 0.5, "1"),
         Lever("rotor_drag", "horizontal", 0.0147, 0.0, 0.08, 0.004, "N s/m"),
         Lever("blade_flapping", "tilt", 0.01, 0.0, 0.1, 0.01, "rad s/m"),
         Lever("blade_flapping", "hub", 0.02, 0.0, 0.1, 0.02, "m"),
@@ -67,9 +68,11 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
           for i in range(3)),
         *(Lever(VEHICLE, f"gyro_noise_ratio.{i}", vehicle.gyro_noise_ratio[i], 0.05, 6.0, 0.1, f"of {gyro:g} rad/s")
           for i in range(3)),
-        *(Lever(VEHICLE, f"flow_noise_mps.{i}", flow[i], 0.0, 0.4, 0.015, "m/s") for i in range(2)),
-        Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "of the distance"),
-        Lever("ground_effect", "strength", 1.0, 0.0, 3.0, 0.15, "1"),
+        *(Lever(VEHICLE, f"flow_noise_mps.{i}", vehicle.flow_noise_mps[i], 0.0, 0.5, 0.015, "m/s") for i in range(2)),
+        Lever(VEHICLE, "flow_noise_time_s", vehicle.flow_noise_time_s, 0.02, 3.0, 0.1, "s"),
+        Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "1"),
+        Lever(VEHICLE, "range_drift_time_s", vehicle.range_drift_time_s, 0.05, 3.0, 0.1, "s"),
+        Lever("ground_effect", "strength", 1.45, 0.0, 3.0, 0.15, "1"),
         Lever("ground_effect", "fade", 0.0875, 0.03, 0.3, 0.01, "m"),
         Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1"),
         Lever("ground_effect", "turbulence", 0.6, 0.0, 3.0, 0.1, "1"),
@@ -78,9 +81,15 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
         Lever("ground_effect", "pitch", 0.8, 0.0, 2.0, 0.1, "1"),
         Lever("ground_effect", "swirl", 0.004, 0.0, 0.05, 0.001, "m"),
         Lever("flow_scale", "share", 0.0, -0.1, 1.0, 0.03, "1"),
-        Lever("flow_scale", "transient", 0.1, -1.0, 1.0, 0.05, "1"),
-        Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.01, "m", 0.01),
-        Lever("range_step", "kick", 0.0, -0.2, 0.2, 0.015, "m", 0.02),
+        Lever("flow_scale", "transient", 0.0, -1.0, 1.0, 0.05, "1"),
+        Lever("flow_scale", "focus", 0.08, 0.01, 0.3, 0.008, "m"),
+        Lever("flow_latency", "delay", 0.02, 0.0, 0.2, 0.008, "s"),
+        Lever("range_bias", "near", -0.02, -0.1, 0.1, 0.008, "m"),
+        Lever("range_bias", "fade", 0.03, 0.01, 0.2, 0.006, "m"),
+        Lever("range_bias", "dip", -0.01, -0.1, 0.1, 0.006, "m"),
+        Lever("range_bias", "time", 0.15, 0.03, 1.0, 0.02, "s"),
+        Lever("range_bias", "delay", 0.025, 0.0, 0.15, 0.008, "s"),
+        Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.008, "m", 0.01),
     )
 
 
@@ -110,6 +119,11 @@ def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float]) ->
     return replace(vehicle, **changes)
 
 
+def height(levers: Sequence[Lever], values: Sequence[float]) -> float:
+    """What the set height of a mission is raised by, m."""
+    return float(sum(v for lever, v in zip(levers, values, strict=True) if lever.name == f"{MISSION}.height"))
+
+
 def table(levers: Sequence[Lever], values: Sequence[float], fixed: Mapping[str, Any] | None = None,
           spread: bool = True) -> dict[str, Any]:
     """The effects of a scenario with the levers set; `fixed` are effects that no lever moves.
@@ -125,7 +139,7 @@ def table(levers: Sequence[Lever], values: Sequence[float], fixed: Mapping[str, 
         if lever.of == "trim":
             trims += np.array(ROTOR_SIGNS[lever.key]) * float(value)
             width = max(width, lever.spread or 0.0)
-        elif lever.of != VEHICLE:
+        elif lever.of not in (VEHICLE, MISSION):
             out.setdefault(lever.of, {})[lever.key] = _node(lever, float(value), spread)
     for name, given in out.items():
         known = {p.name for p in registry.get(name).parameters} | {"preset"}
@@ -139,9 +153,11 @@ def table(levers: Sequence[Lever], values: Sequence[float], fixed: Mapping[str, 
 
 
 def _node(lever: Lever, value: float, spread: bool) -> Any:
-    return _range(value, lever.spread if spread and lever.spread else 0.0)
+    return _range(value, lever.spread if spread and lever.spread else 0.0, lever.low, lever.high)
 
 
-def _range(middle: float, half: float) -> Any:
+def _range(middle: float, half: float, least: float = -1.0, most: float = 1.0) -> Any:
     middle = round(float(middle), 6)
-    return {"low": round(middle - half, 6), "high": round(middle + half, 6)} if half > 0.0 else middle
+    if half <= 0.0:
+        return middle
+    return {"low": round(max(middle - half, least), 6), "high": round(min(middle + half, most), 6)}

@@ -1,9 +1,13 @@
 """The recorded courses as a scenario: hover, velocity step, platform, stop, landing."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from airtouch.logs.segments import LEVEL_PART
+from airtouch.simulation import effects as registry
 from airtouch.simulation.scenario import Scenario
 from airtouch.twin.course import RISE_S, Course
 
@@ -12,35 +16,54 @@ WIDTH_M = 4.0  #: of the platform, across the path
 LEAST_BEFORE_M = 0.05  #: from the velocity step to the edge
 LEAST_STOP_M = 0.35  #: flown on after the platform, so that drift does not keep a flight over it
 WAIT_S = 0.5
+LEAST_CLEARANCE_M = 0.012  #: true distance at an entry; the legs end 6 mm below the sensor
+SETTLED_S = 0.15  #: after an entry, when the reading just after it is taken
 LAND_MPS = 0.2  #: of the firmware's landing
 #: what a flight draws together, from one recorded course
-KEYS = ("cruise", "clearance", "speed", "angle", "climb", "hover", "before", "length", "stop", "after")
+KEYS = ("cruise", "clearance", "top", "speed", "angle", "climb", "hover", "before", "length", "stop", "after")
 
 
-def drawn(course: Course) -> dict[str, float]:
+def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: float = 0.0) -> dict[str, float]:
     """The values (KEYS) with which the simulator flies a course: m, s, m/s, degrees.
 
-    The edges are put where the recorded flight, at its speed and with the same rise, crossed them.
+    The edges are put where the recorded flight, at its speed and with the same rise, crossed them. The
+    platform's height follows from the readings on both sides of the entry, less the error that `effects`
+    give the down range. height_m: added to the set height, for a simulator that flies higher than it is told.
     """
+    clearance = max(true_distance(course.entered_m, (effects or {}).get("range_bias", {})), LEAST_CLEARANCE_M)
     before = max(course.speed_mps * (course.before_s - 0.5 * RISE_S), LEAST_BEFORE_M)
-    values = {"cruise": course.cruise_m, "clearance": course.clearance_m, "speed": course.speed_mps,
-              "angle": course.angle_deg, "climb": max(course.climb_s / LEVEL_PART, 1.0), "hover": max(course.hover_s, 0.5),
-              "before": before, "length": course.speed_mps * course.over_s,
+    height = course.cruise_m + height_m
+    top = max(min(course.before_m - clearance, height - 0.5 * LEAST_CLEARANCE_M), 0.01)
+    values = {"cruise": height, "clearance": clearance, "top": top,
+              "speed": course.speed_mps, "angle": course.angle_deg, "climb": max(course.climb_s / LEVEL_PART, 1.0),
+              "hover": max(course.hover_s, 0.5), "before": before, "length": course.speed_mps * course.over_s,
               "stop": max(course.speed_mps * course.stop_s, LEAST_STOP_M),
               "after": max(course.after_s - course.stop_s, 0.1)}
     return {name: round(float(value), 4) for name, value in values.items()}
 
 
-def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME) -> dict[str, Any]:
+def true_distance(reading_m: float, bias: Mapping[str, float]) -> float:
+    """The distance that a down range reading just after an entry stands for, m, with the effect `range_bias`."""
+    values = registry.get("range_bias").values(bias) if bias else dict.fromkeys(("near", "dip"), 0.0)
+    if not values["near"] and not values["dip"]:
+        return reading_m
+    reading = reading_m - values["dip"] * math.exp(-SETTLED_S / values["time"])
+    distances = np.linspace(0.0, 0.5, 2001)
+    shown = distances + values["near"] * np.exp(-distances / values["fade"])
+    return float(np.interp(reading, np.maximum.accumulate(shown), distances))
+
+
+def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME,
+          height_m: float = 0.0) -> dict[str, Any]:
     """A scenario's table: each flight draws one of the courses and flies it with these effects."""
     return {
         "name": name,
         "summary": f"{len(courses)} recorded courses, flown again.",
-        "values": {"course": {"choice": [drawn(c) for c in courses]}},
+        "values": {"course": {"choice": [drawn(c, effects, height_m) for c in courses]}},
         "platform": [{
             "shape": "rectangle", "size_m": ["= length * cos(angle)", WIDTH_M],
             "centre_m": ["= before + 0.5 * length", 0.0], "angle_deg": "= angle",
-            "top_m": "= max(cruise - clearance, 0.01)", "material": "acrylic"}],
+            "top_m": "= top", "material": "acrylic"}],
         "mission": {"control": "velocity", "step": [
             {"do": "wait", "time_s": WAIT_S},
             {"do": "take-off", "height_m": "= cruise", "time_s": "= climb"},
@@ -51,6 +74,6 @@ def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAM
         "effects": dict(effects)}
 
 
-def one(course: Course, effects: Mapping[str, Any], name: str = NAME) -> Scenario:
+def one(course: Course, effects: Mapping[str, Any], name: str = NAME, height_m: float = 0.0) -> Scenario:
     """A scenario of one course."""
-    return Scenario(name, "", table([course], effects, name))
+    return Scenario(name, "", table([course], effects, name, height_m))

@@ -20,7 +20,7 @@ NAMES = (
     "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise",
     "thrust_coefficient", "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load",
     "imu_bias", "imu_noise", "vibration", "sensor_latency", "actuator_delay", "time_jitter",
-    "packet_loss", "range_step", "flow_scale", "controller_gain",
+    "packet_loss", "range_step", "range_bias", "flow_scale", "flow_latency", "controller_gain",
 )
 EFFECTS: dict[str, Effect] = {
     name: importlib.import_module(f"airtouch.simulation.effects.{name}").EFFECT for name in NAMES}

@@ -7,6 +7,7 @@ def settings(plant, v):
     plant["flow_share"] = v["share"]
     plant["flow_transient"] = v["transient"]
     plant["flow_transient_time"] = v["time"]
+    plant["flow_focus"] = v["focus"]
 
 
 EFFECT = Effect(
@@ -17,5 +18,7 @@ EFFECT = Effect(
                "focus, sees too little", "authors' flights speed up over the platform and brake at its end"),
      Parameter("transient", "1", 0.0, -1.0, 1.0, 0.0, "the same, added where what is below has just changed",
                "authors' flights: brake at 0.5 to 0.7 m/s^2 after entry"),
-     Parameter("time", "s", 0.2, 0.02, 5.0, None, "in which that dies out")),
+     Parameter("time", "s", 0.2, 0.02, 5.0, None, "in which that dies out"),
+     Parameter("focus", "m", 0.08, 0.01, 0.3, 0.08, "least distance to which the picture scales",
+               "PMW3901: working range from 80 mm")),
     settings=settings)

@@ -1,0 +1,144 @@
+"""`airtouch adapt`: a detector for the drone that flew some flights."""
+
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.cli.progress import Bar
+from airtouch.cli.scores import check_free
+from airtouch.errors import AirTouchError
+
+ROUNDS, BATCH = 8, 160  #: of a twin that is fitted on the way
+MORE = 5  #: flights that the outlook is given for
+
+
+@click.command(name="adapt")
+@click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), default=Path("mine.npz"), show_default=True, help="Model file to write.")
+@click.option("--twin", "twin_folder", type=click.Path(path_type=Path, file_okay=False),
+              help="Folder of `airtouch twin`; one is fitted to the flights if left out.")
+@click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
+              help="Weights to start from: shipped, scratch, or a model file.")
+@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
+              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes every bit of the result on one machine.")
+@click.option("--force", is_flag=True, help="Replace the model file.")
+def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, origin: str, speed: float | None,
+            folds: tuple[int, ...], hold_out: bool, seed: int, force: bool) -> None:
+    """Train a detector for the drone that flew FLIGHTS: logs, or folders (the clean flights of a manifest.csv).
+
+    \b
+    airtouch adapt my-flights --out mine.npz
+    airtouch evaluate new-flights --model mine.npz
+    airtouch export mine.npz --out model
+
+    It starts from the shipped weights, trains in the twin, and then on the flights themselves: their down range
+    labels them. Flights without down range are used with the edges that the twin's detector finds. Four flights or
+    more over a platform are held out in turn to say what to expect. What is done is kept beside --out, in a
+    folder that ends in .adapt: the same command goes on after a stop.
+    """
+    from airtouch.detector import best, dataset, summary
+    from airtouch.twin import adapt
+
+    started = time.monotonic()
+    check_free(out, force)
+    start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
+    files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
+    usable, left_out = adapt.readable(files)
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    if not usable:
+        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, "
+                            "with acceleration, gyro and motors logged at 100 Hz")
+    labelled = [f for f in usable if f.labelled]
+    work = out.with_suffix(".adapt")
+    scene, craft, where = _twin(twin_folder, [f.file.path for f in labelled], speed, work / "twin", seed)
+    click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; {where}")
+    typed = shlex.join(["airtouch", *sys.argv[1:]])
+    with Stages() as stages:
+        found = adapt.adapt(usable, scene, craft, work, start=start, seed=seed, hold_out=hold_out, progress=stages,
+                            command=typed)
+    found.model.save(out, force)
+    _say(found, adapt, summary, len(labelled), hold_out)
+    click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
+
+
+def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Path, seed: int) -> tuple[Any, Any, str]:
+    """(scenario, vehicle, in words) of a twin: its folder's, one fitted now, or the simulator as it is."""
+    from airtouch import vehicle as vehicles
+    from airtouch.simulation import scenario
+    from airtouch.twin import files, fit, levers
+    from airtouch.twin import flights as recordings
+
+    if folder is not None:
+        return (scenario.load(folder / files.SCENARIO), vehicles.load(folder / files.VEHICLE), f"twin of {folder}")
+    craft = vehicles.load()
+    if len(paths) < recordings.FEWEST:
+        return (scenario.load("paper-mixed"), craft,
+                f"no twin: it needs {recordings.FEWEST} flights over a platform with down range; simulator as it is")
+    recorded = recordings.recorded(paths, speed_mps=speed)
+    kept.mkdir(parents=True, exist_ok=True)
+    listed = levers.default(craft)
+    with Bar("fitting a twin") as bar:
+        state = fit.fit(fit.target(recorded.courses, recorded.features), craft, listed, rounds=ROUNDS, flights=BATCH,
+                        seed=seed, kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
+    made = files.write(kept, craft, listed, state.values, recorded.courses, force=True)
+    return scenario.load(made[1]), vehicles.load(made[0]), f"twin fitted to {len(recorded.courses)} of them"
+
+
+def _say(found: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:
+    """What to expect, in sentences."""
+    rows = {"twin only": found.twin_only, "held out, half of the others": found.held_out_half,
+            "held out, all others": found.held_out}
+    for name, scores in rows.items():
+        if scores:
+            click.echo(f"{name}: {in_words(summary.summarise(scores))}")
+    if any(s.in_training for s in found.twin_only):
+        click.echo("the weights it started from have seen some of these flights: these figures are too good; "
+                   "--from scratch measures without them")
+    if not hold_out or not found.held_out:
+        click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.FEWEST} are needed to say "
+                   "what to expect")
+        return
+    ahead = adapt.outlook(found, labelled, MORE)
+    if ahead:
+        click.echo(f"the next {MORE} flights: {ahead['now_m']:.3f} m would become about {ahead['then_m']:.3f} m "
+                   f"(from {ahead['half_m']:.3f} m with half of the flights; a guess, see the intervals)")
+
+
+def in_words(table: dict[str, Any]) -> str:
+    """Error, missed and false edges with intervals and sample size."""
+    def cell(name: str, scale: float, form: str) -> str:
+        if table[name] is None:
+            return "-"
+        ends = table["intervals"].get(name)
+        said = format(scale * table[name], form)
+        return said + (f" ({format(scale * ends[0], form)} to {format(scale * ends[1], form)})" if ends else "")
+
+    return (f"error {cell('mean_abs_error_m', 1, '.3f')} m, missed {cell('missed', 100, '.1f')} %, false "
+            f"{cell('false_per_minute', 1, '.2f')} a minute; {table['flights']} flights, {table['edges']} edges, "
+            "95 % by flight")
+
+
+class Stages:
+    """One progress bar a stage: call it with (stage, done, total, note)."""
+
+    def __enter__(self) -> "Stages":
+        self.name, self.bar = "", None
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self.bar is not None:
+            self.bar.__exit__(*error)
+
+    def __call__(self, stage: str, done: int, total: int, note: str) -> None:
+        if stage != self.name:
+            self.__exit__(None, None, None)
+            self.name, self.bar = stage, Bar(stage).__enter__()
+        self.bar(done, total, note)

@@ -1,0 +1,22 @@
+"""The down range reads wrong near a surface, wrong just after an entry, and late."""
+
+from airtouch.simulation.effects.effect import Effect, Parameter
+
+
+def settings(plant, v):
+    plant["range_bias"], plant["range_bias_fade"] = v["near"], v["fade"]
+    plant["range_dip"], plant["range_dip_time"] = v["dip"], v["time"]
+    plant["range_delay"] = v["delay"]
+
+
+EFFECT = Effect(
+    "range_bias", "the down range reads wrong near a surface, too little just after an entry, and late",
+    (Parameter("near", "m", -0.02, -0.2, 0.2, 0.0, "error at no distance",
+               "authors' flights: readings of 0 to 1 cm where their lift says 3 cm"),
+     Parameter("fade", "m", 0.03, 0.005, 0.5, None, "distance over which that error dies out"),
+     Parameter("dip", "m", -0.03, -0.2, 0.2, 0.0, "error just after a higher surface came below",
+               "authors' low flights: 0.1 cm at 0.1 s after the entry, 2.2 cm at 0.3 s, 5 cm at 0.5 s"),
+     Parameter("time", "s", 0.15, 0.02, 2.0, None, "in which that dies out"),
+     Parameter("delay", "s", 0.0, 0.0, 0.3, 0.0, "of each reading, in log and estimator; whole milliseconds",
+               "VL53L1x: 25 ms of ranging, read every 25 ms")),
+    settings=settings)

@@ -1,0 +1,186 @@
+"""A detector for the drone that flew some flights: trained in its twin, then on the flights themselves.
+
+Flights whose down range shows edges label themselves. Those without get the edges that the detector of the
+twin finds (pseudo-labels). What to expect is measured on flights held out.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector import best, evaluate, simulated, summary
+from airtouch.detector.dataset import FlightFile
+from airtouch.detector.score import FlightScore
+from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.training_set import flight_hash
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.scenario import Scenario
+from airtouch.vehicle import Vehicle
+
+SIMULATED = 60  #: flights of the twin to train on
+TWIN_STEPS = {"shipped": 400, "scratch": 1500}  #: training steps in the twin, from given weights and from none
+TUNE_STEPS = 300  #: on the flights themselves
+MIXED = 12  #: simulated flights beside the recorded ones in that, at least
+FOLDS = 4
+FEWEST = 4  #: labelled flights for a hold-out
+#: progress(stage, done, total, note)
+Progress = Callable[[str, int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A log and its file's condition (speed, fold)."""
+
+    file: FlightFile
+    log: FlightLog
+
+    @property
+    def labelled(self) -> bool:
+        """Whether its down range shows edges."""
+        return bool(evaluate.truth(self.log))
+
+
+@dataclass(frozen=True)
+class Adapted:
+    """model; scores of held-out flights with all others and with half of them in training (both may be empty)."""
+
+    model: StreamModel
+    held_out: list[FlightScore]
+    held_out_half: list[FlightScore]
+    twin_only: list[FlightScore]
+
+
+def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,
+          start: StreamModel | None, seed: int = 0, hold_out: bool = True, progress: Progress | None = None,
+          command: str = "airtouch adapt") -> Adapted:
+    """A detector from flights and their twin. Same arguments, same bits.
+
+    start: weights to go on from, None for none. work: a folder in which each finished stage is kept, so that the
+    same call goes on after a stop. twin_only: all labelled flights scored by the detector that has seen the twin only.
+    Raises AirTouchError where nothing crosses an edge.
+    """
+    work.mkdir(parents=True, exist_ok=True)
+    key = _key(flights, scene, vehicle, start, seed)
+    flown, what = simulated.training_flights(SIMULATED, scene, vehicle=vehicle, seed=seed, progress=progress)
+    twin = _model(work / f"twin_{key}.npz", lambda: best.fit(
+        flown, seed, start=start, steps=TWIN_STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"),
+        command=command))
+    labelled = [f for f in flights if f.labelled]
+    twin_only = _scores(work / f"twin_{key}.json", labelled, twin)
+    held, half = [], []
+    if hold_out and len(labelled) >= FEWEST:
+        held, half = _hold_out(flights, labelled, flown, twin, work, key, seed, progress, command)
+    model = _model(work / f"all_{key}.npz", lambda: tune(twin, flights, flown, seed, _named(progress, "all flights"), command))
+    known = {"twin": what, "labelled": len(labelled), "pseudo_labelled": len(flights) - len(labelled)}
+    return Adapted(replace(model, metadata={**model.metadata, "adapted": known}), held, half, twin_only)
+
+
+def tune(twin: StreamModel, flights: Sequence[Flight], flown: Sequence[FlightLog], seed: int,
+         progress: Progress | None, command: str) -> StreamModel:
+    """The twin's detector trained further on flights, as many simulated ones beside them; itself without flights."""
+    logs = [f.log for f in flights]
+    if not logs:
+        return twin
+    labels: list[Any] = [None if f.labelled else label
+                         for f, label in zip(flights, best.pseudo_labels(logs, twin), strict=True)]
+    beside = list(flown[:max(MIXED, len(logs))])
+    return best.fit([*logs, *beside], seed, start=twin, pseudo_labels=[*labels, *([None] * len(beside))],
+                    steps=TUNE_STEPS, progress=progress, command=command)
+
+
+def _hold_out(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Sequence[FlightLog], twin: StreamModel,
+              work: Path, key: str, seed: int, progress: Progress | None, command: str,
+              ) -> tuple[list[FlightScore], list[FlightScore]]:
+    order = np.random.default_rng([seed, 7]).permutation(len(labelled))
+    others = [f for f in flights if not f.labelled]
+    folds = min(FOLDS, len(labelled))
+    held: list[FlightScore] = []
+    half: list[FlightScore] = []
+    for k in range(folds):
+        test = [labelled[i] for i in order[k::folds]]
+        train = [labelled[i] for j, i in enumerate(order) if j % folds != k]
+        for share, into in ((1, held), (2, half)):
+            some = train[:max(len(train) // share, 1)]
+            path = work / f"fold{k}_{share}_{key}"
+            name = f"hold-out {k + 1}/{folds}" + (" (half)" if share == 2 else "")
+            model = _model(path.with_suffix(".npz"),
+                           lambda: tune(twin, [*some, *others], flown, seed, _named(progress, name), command))
+            into += _scores(path.with_suffix(".json"), test, model)
+    return held, half
+
+
+def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:
+    """What `more` flights would bring: the mean error now and then, metres, and the exponent p of error ~ flights^-p.
+
+    From the error with all and with half of the training flights; p is kept within 0 and 1. None without hold-out.
+    """
+    if not adapted.held_out or not adapted.held_out_half:
+        return None
+    now, before = (summary.summarise(s)["mean_abs_error_m"] for s in (adapted.held_out, adapted.held_out_half))
+    if not now or not before:
+        return None
+    exponent = float(np.clip(np.log2(before / now), 0.0, 1.0))
+    return {"now_m": now, "half_m": before, "then_m": now * ((labelled + more) / labelled) ** -exponent,
+            "exponent": exponent}
+
+
+def _model(path: Path, make: Callable[[], StreamModel]) -> StreamModel:
+    if path.is_file():
+        return best.load(path)
+    model = make()
+    model.save(path, force=True)
+    return model
+
+
+def _scores(path: Path, flights: Sequence[Flight], model: StreamModel) -> list[FlightScore]:
+    if path.is_file():
+        return [FlightScore.from_dict(s) for s in json.loads(path.read_text())]
+    scores = [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]
+    write_bytes(json.dumps([s.as_dict() for s in scores], allow_nan=False).encode(), path, force=True)
+    return scores
+
+
+def _named(progress: Progress | None, name: str) -> Progress | None:
+    if progress is None:
+        return None
+    return lambda stage, done, total, note: progress(f"{name}: {stage}", done, total, note)
+
+
+def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: StreamModel | None, seed: int) -> str:
+    """Digits that change with anything the result depends on."""
+    total = hashlib.sha256(repr((scene.table, vehicle, seed, SIMULATED, TWIN_STEPS, TUNE_STEPS, MIXED)).encode())
+    for flight in flights:
+        total.update(f"{flight_hash(flight.log)} {flight.labelled} {flight.file.condition}".encode())
+    if start is not None:
+        for name in sorted(start.weights):
+            total.update(np.asarray(start.weights[name]).tobytes())
+    return total.hexdigest()[:12]
+
+
+def readable(files: Sequence[FlightFile], speed_mps: float = 0.3) -> tuple[list[Flight], list[tuple[str, str]]]:
+    """(flights that can be used, those left out with the reason). Speeds that nothing states are read off the log."""
+    from airtouch import logs
+    from airtouch.twin.course import course
+
+    usable, left_out = [], []
+    for file in files:
+        try:
+            log = logs.read(file.path)
+            evaluate.check(log)
+            speed = file.condition.speed_mps
+            if speed is None and evaluate.truth(log):
+                try:
+                    speed = course(log).speed_mps
+                except AirTouchError:
+                    speed = speed_mps
+            usable.append(Flight(FlightFile(file.path, replace(file.condition, speed_mps=speed or speed_mps)), log))
+        except AirTouchError as error:
+            left_out.append((str(file.path), str(error)))
+    return usable, left_out

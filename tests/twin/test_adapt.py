@@ -1,0 +1,125 @@
+"""`airtouch adapt`: stages, resuming, hold-out by flight, outlook. Training is cut to a few steps."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli import airtouch
+from airtouch.detector import best
+from airtouch.detector.dataset import Condition, FlightFile
+from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import scenario
+from airtouch.twin import adapt
+from twin_courses import PLAIN
+
+pytest.importorskip("tensorflow")
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Stages of a few seconds."""
+    for name, value in (("SIMULATED", 4), ("TWIN_STEPS", {"shipped": 5, "scratch": 5}), ("TUNE_STEPS", 5), ("MIXED", 2)):
+        monkeypatch.setattr(adapt, name, value)
+
+
+def flights_of(made, count, down=True):
+    def of(log):
+        return log if down else FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
+    return [adapt.Flight(FlightFile(Path(f"{i}.csv"), Condition(speed_mps=0.3)), of(log))
+            for i, (_, log, _) in enumerate(made[:count])]
+
+
+def write(folder, flights):
+    folder.mkdir()
+    for i, flight in enumerate(flights):
+        logs.write(flight.log, folder / f"flight_{i}.csv.gz")
+    return folder
+
+
+@pytest.mark.slow
+def test_command_trains_says_and_goes_on(made, quick, tmp_path, monkeypatch):
+    """Five flights: every one is held out once; a second call trains nothing again; nothing is overwritten."""
+    folder = write(tmp_path / "flights", flights_of(made, 5))
+    twin = tmp_path / "twin"
+    twin.mkdir()
+    from airtouch import vehicle
+    from airtouch.twin import files, levers
+    from airtouch.twin.course import course
+    craft = vehicle.load()
+    files.write(twin, craft, (), levers.starts(()), [course(log) for _, log, _ in made[:5]], PLAIN)
+    asked = ["adapt", str(folder), "--twin", str(twin), "--out", str(tmp_path / "mine.npz")]
+    first = CliRunner().invoke(airtouch, asked)
+    assert first.exit_code == 0, first.output + str(first.exception)
+    assert "5 flights that their down range labels" in first.output
+    assert "held out, all others: error" in first.output and "5 flights, 10 edges" in first.output
+    again = CliRunner().invoke(airtouch, asked)
+    assert again.exit_code != 0 and "--force" in str(again.exception)
+    monkeypatch.setattr(best, "fit", lambda *_, **__: pytest.fail("trained again"))
+    resumed = CliRunner().invoke(airtouch, [*asked, "--force"])
+    assert resumed.exit_code == 0, resumed.output + str(resumed.exception)
+    model = best.load(tmp_path / "mine.npz")
+    assert model.metadata["adapted"]["labelled"] == 5
+    assert best.run(made[0][1], model).probability.shape == (len(made[0][1]),)
+
+
+@pytest.mark.slow
+def test_flights_without_down_range_are_used_by_pseudo_labels(made, quick, tmp_path, monkeypatch):
+    seen = []
+    fit = best.fit
+    monkeypatch.setattr(best, "fit", lambda flights, seed, **o: seen.append(o.get("pseudo_labels")) or fit(flights, seed, **o))
+    flights = [*flights_of(made, 2), *flights_of(made, 5, down=False)[2:]]
+    scene = scenario.load("paper-low")
+    found = adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None))
+    assert not found.held_out  # two labelled flights are too few
+    assert [label is None for label in seen[-1][:5]] == [True, True, False, False, False]
+    assert found.model.metadata["adapted"]["pseudo_labelled"] == 3
+
+
+def adapt_vehicle():
+    from airtouch import vehicle
+    return vehicle.load()
+
+
+def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypatch):
+    """Each held-out flight is scored once, by a model whose training flights lack it."""
+    scored = []
+    monkeypatch.setattr(adapt, "tune", lambda twin, flights, *_: frozenset(str(f.file.path) for f in flights))
+    monkeypatch.setattr(adapt, "_model", lambda path, make: make())
+    monkeypatch.setattr(adapt, "_scores", lambda path, flights, model: scored.append(
+        ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
+    flights = flights_of(made, 8)
+    held, half = adapt._hold_out(flights, flights, [], None, tmp_path, "key", 0, None, "")
+    assert sorted(held) == sorted(half) == sorted(str(f.file.path) for f in flights)
+    for test, train in scored:
+        assert not test & train and train
+    sizes = [len(train) for _, train in scored]
+    assert max(sizes[1::2]) <= min(sizes[0::2]) // 2 + 1
+
+
+def score(error_m):
+    edges = (EdgeScore("entry", 100, 100, "entry", 0.1, error_m), EdgeScore("exit", 200, 200, "exit", 0.1, error_m))
+    return FlightScore("a", Condition(speed_mps=0.3), edges, (), 2, 20.0)
+
+
+def test_outlook_is_a_power_law_that_never_promises_worse_or_a_miracle():
+    def of(now, before):
+        return adapt.outlook(adapt.Adapted(None, [score(now)] * 4, [score(before)] * 4, []), 10, 5)
+    assert of(0.02, 0.04)["then_m"] == pytest.approx(0.02 * 10 / 15)  # halved by twice the flights: exponent 1
+    assert of(0.02, 0.02 * 2**0.5)["then_m"] == pytest.approx(0.02 * (10 / 15) ** 0.5)
+    assert of(0.02, 0.01)["then_m"] == pytest.approx(0.02)
+    assert of(0.02, 0.2)["exponent"] == 1.0
+    assert adapt.outlook(adapt.Adapted(None, [], [], []), 10) is None
+
+
+def test_readable_takes_the_speed_from_the_log(made, tmp_path):
+    _, log, _ = made[0]
+    logs.write(log, tmp_path / "good.csv.gz")
+    logs.write(replace(log, columns={k: v[:50] for k, v in log.columns.items()}), tmp_path / "short.csv.gz")
+    usable, left_out = adapt.readable([FlightFile(tmp_path / n, Condition()) for n in ("good.csv.gz", "short.csv.gz")])
+    assert len(usable) == 1 and len(left_out) == 1
+    assert usable[0].file.condition.speed_mps == pytest.approx(np.hypot(log["vx_mps"], log["vy_mps"])[-800:].max(), abs=0.3)
