@@ -1,9 +1,9 @@
 """Choose the `best` detector's decoder settings from cross-validated models.
 
-First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, then
+First `airtouch crossval --detector best --seed S --out DIR_S` for some seeds, by fold or by day, then
 `python tools/choose_decoder.py DIR_0 DIR_1 ...`. Each flight is decoded from the logits of the model that
-never saw it, once for each folder. Prints the settings that are best over all folds,
-and an honest figure for choosing them: each fold scored with the settings best on the other four.
+never saw it, once for each folder; with --silence SENSOR from the log without that sensor. Prints the settings that are
+best over all folds, and an honest figure for choosing them: each fold scored with the settings best on the others.
 """
 
 import argparse
@@ -15,10 +15,12 @@ import numpy as np
 from rich.progress import track
 
 from airtouch import kernels, logs
+from airtouch.cli import scores as show_scores
 from airtouch.cli.flights import find_flights
-from airtouch.detector import best, dataset
-from airtouch.detector.score import SAMPLE_PERIOD_S, TOLERANCE_S, match
+from airtouch.detector import best, dataset, evaluate, sensors
+from airtouch.detector.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.stream.recipe import STRIDE
+from airtouch.detector.trace import Detection
 from airtouch.reference.edge_decoder import DecoderConfig
 
 MISS_M = 0.3  #: what a missed edge costs, as if it were found so far off
@@ -28,22 +30,30 @@ FALSE_M = 0.02  #: what one false edge a minute costs, metres of mean error
 class Flight:
     """One flight: logits and airborne at each step, true edges, what turns seconds into metres, fold."""
 
-    def __init__(self, path: Path, condition: dataset.Condition, model) -> None:  # noqa: ANN001
-        log = logs.read(path)
-        events = best.flight_events(log, model)
-        self.name, self.fold, self.speed = path.name, condition.fold, condition.speed_mps
+    def __init__(self, file: dataset.FlightFile, fold: int, model, silent: tuple[str, ...]) -> None:  # noqa: ANN001
+        log = logs.read(file.path)
+        events = best.flight_events(sensors.without(log, silent), model)
+        self.file, self.fold, self.speed = file, fold, file.condition.speed_mps
+        self.true, self.flying = logs.true_edges(log), logs.airborne(log)
+        self.over = np.where(events.airborne, 1.0 / (1.0 + np.exp(-events.logits[:, 0].astype(float))), 0.0)
         self.logits, self.airborne = events.logits[events.ready], events.airborne[events.ready]
-        self.edges = [e.sample for e in logs.true_edges(log)]
+        self.edges = [e.sample for e in self.true]
         self.minutes = float(events.airborne.sum()) * SAMPLE_PERIOD_S / 60
 
 
-def flights_of(folder: Path, out: Path) -> list[Flight]:
-    """Every flight with the model of its own fold in `out`."""
-    models = {}
-    for path in sorted(out.glob("best_fold*.npz")):
-        models.setdefault(int(path.name.split("_fold")[1].split("_")[0]), best.load(path))
-    return [Flight(f.path, f.condition, models[f.condition.fold])
-            for f in track(dataset.collect([folder]), "logits")]
+def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[Flight]:
+    """Every flight with the model of its own fold in `out`, by what `airtouch crossval` wrote of that fold."""
+    files = {file.path.name: file for file in dataset.collect([folder])}
+    entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
+    if len({entry["fold"] for entry in entries}) != len(entries):
+        raise SystemExit(f"{out}: folds of more than one cross-validation; give a folder with one")
+    found = []
+    for entry in track(entries, "logits"):
+        model = best.load(out / entry["model"])
+        for name in (score["file"] for score in entry["per_flight"]):
+            file = files[name]
+            found.append(Flight(file, entry["fold"], model, silent))
+    return found
 
 
 def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
@@ -55,6 +65,14 @@ def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndar
         delays = np.array([(at[j] - flight.edges[i]) * SAMPLE_PERIOD_S for i, j in pairs])
         found.append((delays, len(at) - len(pairs)))
     return found
+
+
+def score(flight: Flight, config: DecoderConfig, lag: float) -> FlightScore:
+    """The flight's score, as `airtouch evaluate` has it, with these settings and this lag."""
+    edges = kernels.edge_decoder(flight.logits, flight.airborne, config)
+    detections = [Detection(int(i) * STRIDE, best.KINDS[int(edges[i])]) for i in np.flatnonzero(edges)]
+    return score_flight(flight.file.path.name, flight.file.condition, flight.true, flight.flying, flight.over,
+                        detections, lag)
 
 
 def figures(flights: list[Flight], found: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
@@ -79,20 +97,16 @@ def cost(flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> float:
     return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
 
 
-def candidates(count: int, rng: np.random.Generator, hold: int,
-               around: list[DecoderConfig] | None = None) -> list[DecoderConfig]:
-    """Random settings; near the given ones where there are any."""
+def candidates(count: int, rng: np.random.Generator, hold: int) -> list[DecoderConfig]:
+    """Random settings, drawn without a look at any flight."""
     found = []
     for _ in range(count):
-        base = around[rng.integers(len(around))] if around else DecoderConfig(
-            entry_score=rng.uniform(-2, 3.5), exit_score=rng.uniform(-2, 3.5), late_entry=rng.uniform(0, 4.5),
-            late_exit=rng.uniform(-4.5, 0))
-        drift = {name: getattr(base, name) + rng.normal(0, 0.3)
-                 for name in ("entry_score", "exit_score", "late_entry", "late_exit")}
-        found.append(replace(base, **{k: round(float(v), 2) for k, v in drift.items()}, arm_steps=100,
-                             over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
-                             smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
-                             dwell_steps=int(rng.choice([20, 30, 40])), look_back=50, hold_steps=hold))
+        scores = {"entry_score": rng.uniform(-1, 4), "exit_score": rng.uniform(-1, 4),
+                  "late_entry": rng.uniform(-0.5, 4.5), "late_exit": rng.uniform(-4.5, 0)}
+        found.append(DecoderConfig(**{name: round(float(value), 2) for name, value in scores.items()}, arm_steps=100,
+                                   over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
+                                   smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
+                                   dwell_steps=int(rng.choice([20, 30, 40])), look_back=50, hold_steps=hold))
     return found
 
 
@@ -100,33 +114,33 @@ def main() -> None:
     """Search, then print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, nargs="+", help="folders of `airtouch crossval --detector best --out`")
-    parser.add_argument("--count", type=int, default=300, help="settings tried in each of three rounds")
+    parser.add_argument("--count", type=int, default=1000, help="settings tried")
     parser.add_argument("--hold", type=int, default=best.DECODER.hold_steps,
                         help="steps after its crossing at which an edge is reported (default: as shipped)")
+    parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
+                        help="decode the flights without this sensor")
+    parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/sensor_figures.py")
     options = parser.parse_args()
-    flights = [flight for out in options.out for flight in flights_of(find_flights(), out)]
-    rng = np.random.default_rng(0)
-    tried: list[DecoderConfig] = [best.DECODER]
-    found = [outcomes(flights, best.DECODER)]
-    for _ in range(3):
-        order = np.argsort([cost(flights, f) for f in found])[:20]
-        new = candidates(options.count, rng, options.hold, [tried[i] for i in order] if len(tried) > 1 else None)
-        tried += new
-        found += [outcomes(flights, config) for config in track(new, "settings")]
-    show("as shipped", flights, found[0])
+    flights = [flight for out in options.out for flight in flights_of(find_flights(), out, tuple(options.silence))]
+    tried = candidates(options.count, np.random.default_rng(0), options.hold)
+    found = [outcomes(flights, config) for config in track(tried, "settings")]
+    show("as shipped", flights, outcomes(flights, best.DECODER))
     show("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
     winner = int(np.argmin([cost(flights, f) for f in found]))
     show("one setting, best over all folds", flights, found[winner])
     print(json.dumps(asdict(tried[winner])))
-    nested: list[tuple[np.ndarray, int]] = [None] * len(flights)
+    nested: list[FlightScore] = []
     for fold in {flight.fold for flight in flights}:
         others = [k for k, flight in enumerate(flights) if flight.fold != fold]
         some = [flights[k] for k in others]
         choice = int(np.argmin([cost(some, [f[k] for k in others]) for f in found]))
         lag = lag_of([found[choice][k] for k in others])
-        for k in set(range(len(flights))) - set(others):
-            nested[k] = (found[choice][k][0] - lag, found[choice][k][1])
-    print("each fold with the settings best on the other four:", _text(figures(flights, nested, 0.0)))
+        nested += [score(flight, tried[choice], lag) for flight in flights if flight.fold == fold]
+    result = evaluate.as_json("best", nested, [], lag_of(found[winner]), asdict(tried[winner]))
+    show_scores.console().print(show_scores.table({"best": result, **result["by_height"]},
+                                                  "each fold with the settings best on the others"))
+    if options.json:
+        show_scores.write_json(options.json, result, force=True)
 
 
 def show(title: str, flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> None:

@@ -72,7 +72,7 @@ def test_pseudo_labels_are_the_detections_without_the_lag(small):
 def test_free_air_is_drawn_and_has_no_goals():
     from airtouch.detector.stream import batches
 
-    recipe = best.Recipe(batch=16, crop=64, warm_up=16, free_air=0.5, edge_share=1.0)
+    recipe = best.Recipe(batch=16, crop=64, warm_up=16, free_air_share=0.5, edge_share=1.0)
     flight = batches.flight_of(made_flight(0), recipe)
     calm = batches.flight_of(made_flight(1), recipe, ())
     assert not calm.goals.any() and not len(calm.edges)

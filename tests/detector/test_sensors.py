@@ -1,14 +1,24 @@
 """The streaming detector on logs that lack a sensor."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from made_flight import SMALL, made_flight
 
 from airtouch import logs
-from airtouch.detector import best, evaluate, sensors
+from airtouch.detector import best, evaluate, sensor_note, sensors
+from airtouch.detector.dataset import Condition, FlightFile
 from airtouch.detector.stream import batches
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO
+
+
+@pytest.fixture(scope="module")
+def small():
+    pytest.importorskip("tensorflow")
+    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
 
 
 @pytest.mark.parametrize("sensor", sensors.SENSORS)
@@ -91,3 +101,53 @@ def test_landings_and_take_offs_are_in_the_crops():
     last = np.mean(starts + recipe.crop >= len(flight.x) - 1)
     first = np.mean(starts <= np.argmax(flight.airborne) - batches.AHEAD)
     assert 0.10 < last < 0.25 and 0.10 < first < 0.25
+
+
+@pytest.mark.parametrize("sensor", sensors.SENSORS)
+def test_sample_by_sample_is_the_same_as_at_once(sensor):
+    from airtouch.crazyflie.host_detector import HostDetector
+
+    log = sensors.without(made_flight(4, 1500), (sensor,))
+    pieces = HostDetector(missing=sensors.missing(log))
+    for first in range(0, len(log), 7):
+        pieces.next({name: values[first:first + 7] for name, values in log.columns.items()})
+    whole = best.run(log)
+    assert np.array_equal(pieces.trace(log).probability, whole.probability) and pieces.trace(log).edges == whole.edges
+    with pytest.raises(AirTouchError, match="no column"):
+        HostDetector().next(log.columns)
+
+
+def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
+    deaf = {**small.metadata["decoder"], "entry_score": 99.0, "exit_score": 99.0, "late_entry": 99.0, "late_exit": -99.0}
+    keen = {**deaf, "entry_score": -9.0, "exit_score": -9.0}
+    model = replace(small, metadata={**small.metadata, "decoder": deaf, "decoder_without": {"motors": keen}})
+    model.save(tmp_path / "m.npz")
+    model = best.load(tmp_path / "m.npz")
+    log = made_flight(4)
+    assert not best.run(log, model).edges and best.run(sensors.without(log, ("motors",)), model).edges
+    assert not best.run(sensors.without(log, ("acceleration",)), model).edges
+    wrong = replace(small, metadata={**small.metadata, "decoder_without": {"motors": {"entry_score": "high"}}})
+    wrong.save(tmp_path / "w.npz")
+    with pytest.raises(AirTouchError, match="not numbers"):
+        best.load(tmp_path / "w.npz")
+
+
+def test_a_log_without_a_sensor_is_served_by_the_spare_and_scored_with_its_lag(small):
+    spare = replace(small, metadata={**small.metadata, "lag_s": small.metadata["lag_s"] + 0.2})
+    model = replace(small, spares={"motors": spare})
+    log, file = made_flight(0), FlightFile(Path("f.csv"), Condition(speed_mps=0.3))
+    assert best.model_for(model, log) is model
+    deaf = sensors.without(log, ("motors",))
+    assert best.model_for(model, deaf) is spare
+    with_it = evaluate.evaluate_flight(file, deaf, best, model).score
+    alone = evaluate.evaluate_flight(file, deaf, best, spare).score
+    assert with_it.as_dict() == alone.as_dict()
+
+
+def test_the_note_has_the_measured_figures():
+    whole, without = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
+    text = sensor_note.note(("acceleration",))
+    assert text.index(f"{without['missed']:.1%} missed of {without['edges']}") < text.index(f"{whole['missed']:.1%} missed of")
+    assert "\n" not in text
+    assert not sensor_note.note(())
+    assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}

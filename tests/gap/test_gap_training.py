@@ -120,7 +120,7 @@ def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
     def force(values):
         return replay.wrench_of(Active(effects.get("ground_effect"), values), signals, 3)
 
-    part = replace(_unsteady(), values={**_unsteady().values, "turbulence": 0.25})
+    part = replace(_unsteady("ground_effect"), values={**_unsteady("ground_effect").values, "turbulence": 0.25})
     named = Found("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
                                                                           "turbulence": 0.0}.items()})
     made = {k: q.value for k, q in _with_random_part(named, part).parameters.items()}

@@ -1,5 +1,7 @@
 """The session, sample by sample, against the whole flight in one call."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from airtouch.detector import best
 from airtouch.kernels.stream_session import StreamSession
 
 MODEL = best.load(None)
+KEEN = replace(MODEL.decoder, entry_score=-9.0, exit_score=-9.0, over_share=0.0)  # so that noise has edges
 RNG = np.random.default_rng(0)
 SAMPLES = 2000
 ACC = RNG.normal(0.0, 1.0, (SAMPLES, 3)) + (0.0, 0.0, 9.81)
@@ -20,8 +23,8 @@ ACC[50:60], PWM[300:303] = np.nan, np.inf
 @settings(max_examples=25)
 @given(st.lists(st.integers(0, SAMPLES), max_size=8))
 def test_pieces_of_any_size_give_the_events_of_the_whole(cuts):
-    whole = kernels.stream_detector(ACC, GYRO, PWM, MODEL.int8, MODEL.recipe.motion, MODEL.decoder)
-    session = StreamSession(MODEL.int8, MODEL.recipe.motion, MODEL.decoder)
+    whole = kernels.stream_detector(ACC, GYRO, PWM, MODEL.int8, MODEL.recipe.motion, KEEN)
+    session = StreamSession(MODEL.int8, MODEL.recipe.motion, KEEN)
     bounds = [0, *sorted(cuts), SAMPLES]
     pieces = [session.next(ACC[a:b], GYRO[a:b], PWM[a:b]) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
     assert whole.edge.any()
@@ -30,7 +33,7 @@ def test_pieces_of_any_size_give_the_events_of_the_whole(cuts):
 
 
 def test_two_sessions_do_not_share_anything():
-    one, other = (StreamSession(MODEL.int8, MODEL.recipe.motion, MODEL.decoder) for _ in range(2))
+    one, other = (StreamSession(MODEL.int8, MODEL.recipe.motion, KEEN) for _ in range(2))
     first = one.next(ACC, GYRO, PWM)
     second = other.next(ACC, GYRO, PWM)
     np.testing.assert_array_equal(first.logits, second.logits)

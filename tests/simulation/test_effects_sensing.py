@@ -207,6 +207,16 @@ def test_range_delay_makes_the_log_late(sweep):
     assert late(0.1) - late(0.0) == pytest.approx(0.1 * 0.3, abs=0.015)
 
 
+def test_a_late_range_makes_no_kick_of_the_flow(sweep):
+    """Flow and range see the platform at once; only the reading is late: the motors' pitch stays as calm at the entry."""
+    def kick(delay):
+        log = sweep({"range_bias": {"near": 0.0, "dip": 0.0, "delay": delay}})
+        entry = true_edges(log)[0].sample
+        m1, m2, m3, m4 = (log[c][entry - 15:entry + 15] for c in PWM)
+        return np.abs(m1 + m4 - m2 - m3).max()
+    assert max(kick(0.012), kick(0.04)) < 1.5 * kick(0.0) + 500.0
+
+
 def test_flow_latency_is_the_plants_delay(quiet):
     plant = from_vehicle(quiet)
     from airtouch.simulation import effects

@@ -9,7 +9,7 @@ from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import true_edges
 from airtouch.simulation import effects, flight, kept, ranging, scenario, setpoint
-from airtouch.simulation.firmware import settings
+from airtouch.simulation.firmware import battery_compensation, settings
 from airtouch.simulation.stepper import Stepper
 
 PLATFORM = """
@@ -202,3 +202,11 @@ def test_on_a_crazyflie_the_firmware_flies_unscaled():
     assert row["firmware"]["battery_compensation"]["kind"] == settings.QUADRATIC
     other = flight.prepare(vehicles.load("quadrotor-450"), effects.activate(()))[0][0]
     assert other["firmware"]["battery_compensation"]["kind"] == settings.NO_COMPENSATION
+
+
+@pytest.mark.parametrize("firmware", settings.names())
+def test_slope_of_the_compensation_is_that_of_its_commands(vehicle, firmware):
+    row = flight.prepare(replace(vehicle, firmware=firmware), ())[0][0]
+    low, high = (battery_compensation.compensate(row["firmware"], row, 3.8, c) for c in (44000.0, 46000.0))
+    slope = battery_compensation.slope(row["firmware"], row, 0.5 * (low + high))
+    assert slope == pytest.approx((high - low) / 2000.0, rel=0.01) and 0.4 < slope < 0.7

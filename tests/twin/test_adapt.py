@@ -91,7 +91,7 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     monkeypatch.setattr(adapt, "tune", lambda twin, flights, *_: frozenset(str(f.file.path) for f in flights))
     monkeypatch.setattr(adapt, "_model", lambda path, make: make())
     monkeypatch.setattr(adapt, "_scores", lambda path, flights, model: scored.append(
-        ({str(f.file.path) for f in flights}, model)) or [f.file.path for f in flights])
+        ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
     flights = flights_of(made, 8)
     held, half = adapt._hold_out(flights, flights, [], None, tmp_path, "key", 0, None, "")
     assert sorted(held) == sorted(half) == sorted(str(f.file.path) for f in flights)

@@ -12,6 +12,7 @@ from airtouch.cli.flights import need_flights
 from airtouch.detector import crossval, dataset, evaluate, sensors
 from airtouch.detector import folds as folds_of
 from airtouch.detector import free_air as free_air_flights
+from airtouch.logs.flight_log import FlightLog
 
 
 @click.command(name="crossval")
@@ -28,6 +29,7 @@ from airtouch.detector import free_air as free_air_flights
               "a model of all others.")
 @click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
               help="best: take this sensor from the flights that are scored.")
+@click.option("--silence-training", is_flag=True, help="With --silence: from the flights trained on, too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: train on the flights of this folder too; nothing there is an edge. May be repeated.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
@@ -44,8 +46,9 @@ from airtouch.detector import free_air as free_air_flights
 @click.option("--ledger", type=click.Path(path_type=Path),
               help="Append a line to this file: how often the folds were looked at.")
 def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epochs: int | None, steps: int | None,
-            by: str, without: str | None, silence: tuple[str, ...], free_air: tuple[Path, ...], speed: float | None,
-            seed: int, random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
+            by: str, without: str | None, silence: tuple[str, ...],
+            silence_training: bool, free_air: tuple[Path, ...], speed: float | None, seed: int,
+            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
             ledger: Path | None) -> None:
     """Cross-validate a detector over FLIGHTS, folders with a manifest.csv, split by flight.
 
@@ -58,10 +61,10 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     files = dataset.collect(flights or [need_flights()], speed)
     split = folds_of.only(files, without) if without else folds_of.by_day(files) if by == "day" else None
     options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}
-    air = free_air_flights.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True)) if free_air else ()
+    air = _free_air(free_air)
     scores, folds, left_out = crossval.crossval(
         detector, files, out, folds=split, seed=seed, options=options, physical_filter=physical_filter,
-        silenced=silence, free_air=air, tell=lambda line: click.echo(line, err=True))
+        silenced=silence, silent_training=silence_training, free_air=air, tell=lambda line: click.echo(line, err=True))
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     title = ", ".join([detector, *([] if physical_filter else ["physical filter off"]),
@@ -88,6 +91,12 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     show.left_out(left_out, len(scores))
     if left_out:
         sys.exit(2)
+
+
+def _free_air(folders: tuple[Path, ...]) -> list[FlightLog]:
+    if not folders:
+        return []
+    return free_air_flights.read(folders, lambda line: click.echo(f"left out of free air: {line}", err=True))
 
 
 def note(ledger: Path, title: str, result: dict) -> None:

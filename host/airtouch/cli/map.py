@@ -52,6 +52,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
         module = registry.get(detector)
         evaluate.check(log, evaluate.spare_of(module))
         trained = module.load(model)
+        trained = module.model_for(trained, log) if hasattr(module, "model_for") else trained
         found, lag = module.run(log, trained).edges, module.lag_s(trained)
         model_sigma = getattr(trained, "metadata", {}).get("sigma_s", edge_map.ASSUMED_SIGMA_S)
     sigma_s = sigma or model_sigma

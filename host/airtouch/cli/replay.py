@@ -31,13 +31,13 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     from airtouch.crazyflie import board as boards
     from airtouch.crazyflie import replay
     from airtouch.crazyflie.host_detector import HostDetector
-    from airtouch.detector import best, dataset, evaluate
+    from airtouch.detector import best, dataset, evaluate, sensors
 
     files = dataset.collect([flight], flown_at)
     if len(files) != 1 or flight.is_dir():
         raise AirTouchError(f"{flight}: give one flight, not a folder")
-    log = evaluate.read_flight(files[0])
-    detector = HostDetector(best.load(model))
+    log = evaluate.read_flight(files[0], evaluate.spare_of(best))
+    detector = HostDetector(best.load(model), sensors.missing(log))
     board = boards.Board(flight.name, "best", detector.lag_s)
     with stopping(quiet=True) as stop, screen(bool(speed)) as (show, say):
         fed = replay.run(log, board, detector, speed=speed, speed_mps=files[0].condition.speed_mps, stop=stop,

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from airtouch import logs
 from airtouch.cli.flights import need_flights
 from airtouch.cli.scores import check_free
-from airtouch.detector import dataset, evaluate, registry
+from airtouch.detector import dataset, evaluate, registry, sensors
 from airtouch.detector import free_air as air
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
@@ -31,6 +31,8 @@ from airtouch.logs.flight_log import FlightLog
               help="best: go on from this model instead of from nothing; 300 steps unless --steps says otherwise.")
 @click.option("--labelled", type=click.IntRange(1), metavar="K",
               help="best: train on K of the flights only, drawn by --seed.")
+@click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
+              help="best: take this sensor from the flights, for a network that never has it.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: the flights of this folder too; nothing there is an edge. May be repeated.")
 @click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
@@ -46,7 +48,8 @@ from airtouch.logs.flight_log import FlightLog
               help="Fixes every bit of the result on one machine, simulated flights included.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
-            start: Path | None, labelled: int | None, free_air: tuple[Path, ...], sparsity: float | None,
+            start: Path | None, labelled: int | None, silence: tuple[str, ...],
+            free_air: tuple[Path, ...], sparsity: float | None,
             block: str | None, df_lambda: float | None, simulated: int | None,
             scenario: str | None, without: tuple[str, ...], seed: int, force: bool) -> None:
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
@@ -59,8 +62,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         raise click.UsageError("either FLIGHTS or --simulated, not both")
     if not simulated and (scenario or without):
         raise click.UsageError("--scenario and --without need --simulated N")
-    if detector != "best" and (start or labelled or free_air):
-        raise click.UsageError("--start, --labelled and --free-air are for --detector best")
+    if detector != "best" and (start or labelled or free_air or silence):
+        raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
     check_free(out, force)
     module = registry.get(detector)
     if detector == "baseline":
@@ -88,7 +91,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         if simulated:
             chosen, what = _simulate(simulated, scenario, without, seed, progress)
             failures = 0
-        model = module.fit(chosen, seed=seed, progress=progress, command=_command(), **options)
+        model = module.fit([sensors.without(log, silence) for log in chosen], seed=seed, progress=progress, command=_command(), **options)
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)

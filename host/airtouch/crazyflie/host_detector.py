@@ -4,13 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from airtouch.detector import best
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector import best, sensors
 from airtouch.detector.stream.model import StreamModel
 from airtouch.detector.stream.recipe import STRIDE
 from airtouch.detector.trace import Detection, Trace
 from airtouch.kernels.stream_session import StreamSession
-from airtouch.logs.flight_log import GYRO, PWM, FlightLog
+from airtouch.logs.flight_log import FlightLog
 
 MOST_FILLED = 100  #: samples of a gap that are given to the detector as missing
 
@@ -21,10 +20,15 @@ class HostDetector:
     `next` takes rows, `trace` gives what `best.run` gives of all of them.
     """
 
-    def __init__(self, model: StreamModel | None = None) -> None:
-        self.model = model or best.load(None)
+    def __init__(self, model: StreamModel | None = None, missing: tuple[str, ...] = ()) -> None:
+        """missing: the sensors, one at most, that no row will have (`detector.sensors.missing`)."""
+        self.model = (model or best.load(None)).serving(missing)
         self.lag_s = best.lag_s(self.model)
-        self._session = StreamSession(self.model.int8, self.model.recipe.motion, self.model.decoder)
+        self._missing = missing
+        self._decoder = self.model.decoder_without(missing)
+        self._session = StreamSession(self.model.int8, sensors.silenced(self.model.recipe.motion, missing),
+                                      self._decoder)
+        self._rates = np.empty((0, 3))
         self._logits: list[np.ndarray] = []
         self._edge: list[np.ndarray] = []
         self._airborne: list[np.ndarray] = []
@@ -36,11 +40,15 @@ class HostDetector:
         Raises AirTouchError for missing columns.
         """
         log = FlightLog(dict(columns), {"source": "live"})
-        events = self._session.next(level_acceleration(log), log.stack(GYRO), log.stack(PWM))
+        for sensor in set(sensors.SENSORS) - set(self._missing):
+            log.require(*sensors.needed(log, sensor))
+        logged = sensors.signals(log, self._rates)
+        self._rates = np.vstack([self._rates, logged.gyro])[-sensors.FLYING_WINDOW - 1:]
+        events = self._session.next(logged.acc, logged.gyro, logged.pwm)
         self._logits.append(events.logits)
         self._edge.append(events.edge)
         self._airborne.append(events.airborne)
-        recent = (self.model.decoder.hold_steps + self.model.decoder.look_back) * STRIDE
+        recent = (self._decoder.hold_steps + self._decoder.look_back) * STRIDE
         found = []
         for i in np.flatnonzero(events.edge):
             past = np.concatenate(self._logits[-recent:])[-(recent + len(log)):]

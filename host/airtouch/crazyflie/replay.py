@@ -10,7 +10,7 @@ from airtouch.crazyflie.board import Board, Felt
 from airtouch.crazyflie.host_detector import HostDetector
 from airtouch.detector import best, evaluate
 from airtouch.detector.dataset import FlightFile
-from airtouch.detector.score import SAMPLE_PERIOD_S, score_flight
+from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.logs import airborne
 from airtouch.logs.flight_log import FlightLog
 
@@ -53,7 +53,4 @@ def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 
 
 def result(file: FlightFile, log: FlightLog, detector: HostDetector) -> evaluate.Result:
     """What `evaluate` says of the flight, from what the detector said step by step."""
-    trace = detector.trace(log)
-    score = score_flight(file.path.name, file.condition, evaluate.truth(log), airborne(log),
-                         trace.probability, trace.edges, best.lag_s(detector.model))
-    return evaluate.Result(log, trace, score)
+    return evaluate.result_of(file, log, detector.trace(log), best, detector.model)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airtouch import __version__, kernels, logs
-from airtouch.detector import evaluate, sensors, training_set, tuning
+from airtouch.detector import evaluate, sensor_note, sensors, training_set, tuning
 from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.detector.channels import nine_channels
 from airtouch.detector.stream import model as model_file
@@ -32,6 +32,15 @@ from airtouch.reference.edge_decoder import DecoderConfig
 #: Chosen once over the five folds, by tools/choose_decoder.py with models of three seeds (host/docs/looks.md).
 DECODER = DecoderConfig(over_share=0.3, entry_score=2.3, exit_score=1.1, late_entry=3.0, late_exit=-4.0,
                         smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20)
+#: Decoder settings for a log that lacks a sensor, whose logits are less sure; chosen like DECODER, with `--silence`.
+DECODER_WITHOUT = {
+    "acceleration": DecoderConfig(over_share=0.5, entry_score=1.89, exit_score=3.78, late_entry=1.48, late_exit=-2.74,
+                                  smooth_gain=0.08, dwell_steps=30, arm_steps=100, look_back=50, hold_steps=20),
+    "rates": DecoderConfig(over_share=0.5, entry_score=2.72, exit_score=-0.11, late_entry=1.44, late_exit=-4.22,
+                           smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20),
+    "motors": DecoderConfig(over_share=0.3, entry_score=2.76, exit_score=2.55, late_entry=0.46, late_exit=-1.89,
+                            smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20),
+}
 #: rms timing error of held-out flights with these settings, three seeds (printed by the same tool); for maps.
 TIMING_SIGMA_S = 0.10
 #: Changes to a model's recipe where training goes on from it.
@@ -48,9 +57,14 @@ def run(log: FlightLog, model: StreamModel | None = None) -> Trace:
 
     Raises AirTouchError, naming columns, where more than one of acceleration, rates and motors is missing.
     """
-    model = model or load(None)
+    model = model_for(model, log)
     events = flight_events(log, model)
     return trace_of(log, model, events.logits, events.edge, events.airborne)
+
+
+def model_for(model: StreamModel | None, log: FlightLog) -> StreamModel:
+    """The model that serves this log: the shipped one has others for logs that lack a sensor."""
+    return (model or load(None)).serving(sensors.missing(log))
 
 
 def run_float(log: FlightLog, model: StreamModel) -> Trace:
@@ -58,28 +72,30 @@ def run_float(log: FlightLog, model: StreamModel) -> Trace:
     x, airborne = channels_of(log, model.recipe.motion)
     steps = float_logits(model.weights, model.recipe, x)
     edge = np.zeros(len(log), dtype=np.uint8)
-    edge[::STRIDE] = kernels.edge_decoder(steps, airborne[::STRIDE], model.decoder)
+    edge[::STRIDE] = kernels.edge_decoder(steps, airborne[::STRIDE], model.decoder_without(sensors.missing(log)))
     return trace_of(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
 
 
 def trace_of(log: FlightLog, model: StreamModel, logits: np.ndarray, edge: np.ndarray, airborne: np.ndarray) -> Trace:
     """Edges with the highest probability of their crossing that led to them."""
     over, *crossing = (1.0 / (1.0 + np.exp(-logits.astype(np.float64)))).T
-    recent = (model.decoder.hold_steps + model.decoder.look_back) * STRIDE
-    edges = []
     absent = sensors.missing(log)
+    decoder = model.decoder_without(absent)
+    recent = (decoder.hold_steps + decoder.look_back) * STRIDE
+    edges = []
     for i in np.flatnonzero(edge):
         kind = int(edge[i])
         edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
     signals = {"logits": logits} if absent else {"channels": nine_channels(log), "logits": logits}
-    return Trace(np.where(airborne, over, 0.0), edges, signals, f"no {absent[0]} in this log" if absent else "")
+    return Trace(np.where(airborne, over, 0.0), edges, signals, sensor_note.note(absent))
 
 
 def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:
     """One flight through the C detector."""
     logged = sensors.signals(log)
     return kernels.stream_detector(logged.acc, logged.gyro, logged.pwm, model.int8,
-                                   sensors.silenced(model.recipe.motion, logged.missing), model.decoder)
+                                   sensors.silenced(model.recipe.motion, logged.missing),
+                                   model.decoder_without(logged.missing))
 
 
 def fit(
@@ -125,10 +141,10 @@ def fit(
                            free_air=[flight_of(log, recipe, ()) for log in free_air],
                            start=start.weights if start else None)
     int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in prepared], recipe))
-    decoder = decoder or (start.decoder if start else DECODER)
+    settings = _decoders(decoder, start)
     model = StreamModel(recipe, weights, int8, tflite, {
         "detector": "best", "version": __version__, "command": command, "seed": seed, "lag_s": 0.0,
-        "sigma_s": TIMING_SIGMA_S, "decoder": asdict(decoder), **training_set.of(flights, start),
+        "sigma_s": TIMING_SIGMA_S, **settings, **training_set.of(flights, start),
         "free_air": len(free_air)})
     found = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
              for log, edges in zip(flights, labels)]
@@ -144,6 +160,15 @@ def pseudo_labels(flights: Sequence[FlightLog], model: StreamModel) -> list[list
     return [None if evaluate.truth(log) is not None else
             [logs.Edge(max(edge.sample - lag, 0), edge.kind, np.nan, np.nan) for edge in run(log, model).edges]
             for log in flights]
+
+
+def _decoders(decoder: DecoderConfig | None, start: StreamModel | None) -> dict[str, Any]:
+    """Metadata: the decoder's settings with all sensors and without one; one given serves for all."""
+    if decoder is not None:
+        return {"decoder": asdict(decoder), "decoder_without": {}}
+    if start is not None:
+        return {name: start.metadata[name] for name in ("decoder", "decoder_without") if name in start.metadata}
+    return {"decoder": asdict(DECODER), "decoder_without": {name: asdict(c) for name, c in DECODER_WITHOUT.items()}}
 
 
 def _changed(recipe: Recipe, changes: dict[str, Any]) -> Recipe:

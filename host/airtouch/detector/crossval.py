@@ -33,6 +33,7 @@ def crossval(
     options: dict[str, Any] | None = None,
     physical_filter: bool = True,
     silenced: tuple[str, ...] = (),
+    silent_training: bool = False,
     free_air: Sequence[FlightLog] = (),
     detector: Detector | None = None,
     tell: Tell = lambda _: None,
@@ -42,7 +43,7 @@ def crossval(
     Finished folds are kept in `out` and not done again for the same flights, settings and version.
     folds: which flights are held out together (`detector.folds`), the manifest's folds if left out. options go to the
     detector's `fit`. physical_filter False chooses the decoding again without it. silenced: sensors that are taken
-    from the flights that are scored, not from those trained on. free_air: flights without edges to train on too.
+    from the flights that are scored; silent_training: from those trained on too. free_air: flights without edges to train on too.
     detector: one that is not registered, under the name given.
     """
     detector = detector or get(name)
@@ -53,12 +54,17 @@ def crossval(
     readable, left_out = readable_flights(files, evaluate.spare_of(detector))
     scores: list[FlightScore] = []
     entries: list[dict[str, Any]] = []
-    shown = {**(options or {}), **({"free_air": [training_set.flight_hash(log) for log in free_air]} if free_air else {})}
-    given = {**(options or {}), **({"free_air": free_air} if free_air else {})}
+    shown, given = dict(options or {}), dict(options or {})
+    if free_air:
+        shown["free_air"] = [training_set.flight_hash(log) for log in free_air]
+        given["free_air"] = free_air
+    if silent_training:
+        shown["silent"] = silenced
     for fold, members in folds.items():
         held = {f.path for f in members}
         test = [f for f in members if f.path in readable]
-        train = [readable[f.path] for f in files if f.path in readable and f.path not in held]
+        train = [sensors.without(readable[f.path], silenced if silent_training else ())
+                 for f in files if f.path in readable and f.path not in held]
         key = cache_key(name, files, members, seed, shown)
         variant = "".join(("" if physical_filter else "-unfiltered", *(f"-no-{sensor}" for sensor in silenced)))
         cache = out / f"{name}{variant}_fold{fold}_{key}.json"
@@ -72,7 +78,8 @@ def crossval(
                 model = detector.retune(model, train, False)
             results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], silenced), detector, model).score
                        for f in test]
-            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
+            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model),
+                     "parameters": detector.parameters(model),
                      "seconds": round(time.monotonic() - started, 1),
                      "per_flight": [s.as_dict() for s in results]}
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)

@@ -85,7 +85,13 @@ def truth(log: FlightLog) -> list[logs.Edge] | None:
 
 def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model: Any) -> Result:
     """Run the detector on one flight and score it."""
-    trace = detector.run(log, model)
+    if hasattr(detector, "model_for"):
+        model = detector.model_for(model, log)
+    return result_of(file, log, detector.run(log, model), detector, model)
+
+
+def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
+    """The score of a trace that the detector gave with this model."""
     score = score_flight(file.path.name, file.condition, truth(log), logs.airborne(log), trace.probability,
                          trace.edges, detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)

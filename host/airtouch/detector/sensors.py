@@ -33,24 +33,33 @@ class Signals:
     missing: tuple[str, ...]
 
 
+def needed(log: FlightLog, sensor: str) -> tuple[str, ...]:
+    """The columns of a sensor, as this log would have them."""
+    acceleration = ACC_WORLD if log.has(*ACC_WORLD) else ACC
+    return {ACCELERATION: acceleration, RATES: GYRO, MOTORS: PWM}[sensor]
+
+
 def missing(log: FlightLog) -> tuple[str, ...]:
     """The sensors, of SENSORS, whose columns the log lacks."""
-    logged = {ACCELERATION: log.has(*ACC) or log.has(*ACC_WORLD), RATES: log.has(*GYRO), MOTORS: log.has(*PWM)}
-    return tuple(sensor for sensor in SENSORS if not logged[sensor])
+    return tuple(sensor for sensor in SENSORS if not log.has(*needed(log, sensor)))
 
 
-def signals(log: FlightLog) -> Signals:
+def signals(log: FlightLog, rates_before: np.ndarray = np.empty((0, 3))) -> Signals:
     """The log's signals, with rest or level flight in place of one missing sensor.
 
+    rates_before: (k, 3) rates of the samples before, where the log is a piece of a flight; FLYING_WINDOW + 1 are enough.
     Raises AirTouchError, naming columns, where more than one sensor is missing.
     """
     absent = missing(log)
     if len(absent) > 1:
-        log.require(*(GYRO if RATES in absent else ()), *(PWM if MOTORS in absent else ACC))
+        log.require(*(name for sensor in absent for name in needed(log, sensor)))
     n = len(log)
     acc = np.tile([0.0, 0.0, GRAVITY_MPS2], (n, 1)) if ACCELERATION in absent else level_acceleration(log)
     gyro = np.zeros((n, 3)) if RATES in absent else log.stack(GYRO)
-    pwm = FLYING_PWM * np.tile(flying(gyro)[:, None], (1, 4)) if MOTORS in absent else log.stack(PWM)
+    if MOTORS in absent:
+        pwm = FLYING_PWM * np.tile(flying(np.vstack([rates_before, gyro]))[len(rates_before):, None], (1, 4))
+    else:
+        pwm = log.stack(PWM)
     return Signals(acc, gyro, pwm, absent)
 
 

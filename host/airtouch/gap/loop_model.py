@@ -7,6 +7,7 @@ gains are found from flights. Commands are in newtons per motor.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -68,15 +69,17 @@ def newtons_per_command(row: Any) -> float:
 def firmware(row: Any, axis: str) -> Controller:
     """crazyflie-firmware's gains (simulation.firmware), with battery compensation where it is on."""
     slope, loops = newtons_per_command(row), row["firmware"]["loops"]
-    periods = row["firmware"]["periods"]
-    hold = 0.001 * float(periods["prediction_ms"])
+    release = row["firmware"]
+    periods = release["periods"]
+    hold, reading = 0.001 * float(periods["prediction_ms"]), 0.001 * float(periods["range_ms"])
     if axis == "thrust":
         climb, height = loops[settings.VELOCITY_Z], loops[settings.POSITION_Z]
         gain = float(climb["p"]) * float(row["thrust_scale"]) * slope
         return Controller(gain, float(height["p"]), integral=_share(climb["i"], climb["p"]),
                           angle_integral=_share(height["i"], height["p"]), hold_s=hold,
-                          range_gains=_range_gains(row["firmware"]), range_s=0.001 * float(periods["range_ms"]),
-                          acc_hz=float(row["firmware"]["filters"]["acc_hz"]))
+                          range_gains=_range_gains(reading, float(release["range"]["std_m"]),
+                                                   float(release["kalman"]["noise_acc_z_mps2"])), range_s=reading,
+                          acc_hz=float(release["filters"]["acc_hz"]))
     i = AXES.index(axis) - 1
     rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
     speed = loops[settings.VELOCITY_Y if i == 0 else settings.VELOCITY_X]
@@ -84,13 +87,16 @@ def firmware(row: Any, axis: str) -> Controller:
     return Controller(gain, float(angle["p"]), float(speed["p"]) / DEGREES, _share(rate["d"], rate["p"]),
                       _share(rate["i"], rate["p"]), _share(angle["i"], angle["p"]), _share(speed["i"], speed["p"]),
                       0.001 * float(periods["attitude_ms"]), float(row["gyro_lowpass"]),
-                      bool(row["firmware"]["controller"]["derivative_on_error"]), hold, float(row["gyro_bandwidth"]))
+                      bool(release["controller"]["derivative_on_error"]), hold, float(row["gyro_bandwidth"]))
 
 
-def _range_gains(release: Any) -> tuple[float, float]:
-    """Steady gains of the firmware's Kalman filter from a near down range reading to height and climb (1/s)."""
-    period, variance = 0.001 * float(release["periods"]["range_ms"]), float(release["range"]["std_m"]) ** 2
-    noise = 1000.0 * period * (0.001 * float(release["kalman"]["noise_acc_z_mps2"])) ** 2
+@lru_cache(16)
+def _range_gains(period: float, std: float, acceleration: float) -> tuple[float, float]:
+    """Steady gains of the firmware's Kalman filter from a near down range reading to height and climb (1/s).
+
+    period: s, of the readings; std: m, that it gives them; acceleration: its process noise, m/s^2 a millisecond.
+    """
+    variance, noise = std ** 2, 1000.0 * period * (0.001 * acceleration) ** 2
     ahead, p, gains = np.array([[1.0, period], [0.0, 1.0]]), np.eye(2), np.zeros(2)
     for _ in range(400):
         p = ahead @ p @ ahead.T + np.diag([0.0, noise])

@@ -34,6 +34,7 @@ def look(plant, memory, ground, state, now, stream):
     true = (eye - top) / tilt
     if top != memory.top:
         memory.changed, memory.rose = now, 1.0 if top > memory.top else 0.0
+        memory.offset += top - memory.top  # optical flow sees it at once, however late the reading is
     decay = math.exp(-0.001 * plant.firmware.periods.range_ms / plant.range_drift_time)
     fresh = math.sqrt(1.0 - decay * decay) * plant.range_drift
     memory.drift[2] = decay * memory.drift[2] + fresh * memory.other_normals[1]
@@ -70,7 +71,7 @@ def range_reading(plant, memory, ground, tick, state, now, stream, reading):
     if math.isnan(memory.down) or memory.down >= firmware.range.most_m:
         return
     passed = range_module.compensated(firmware, memory.module, memory.down, memory.tops[row])
-    memory.offset = passed - memory.down
+    memory.offset = passed - memory.down + memory.top - memory.tops[row]
     if memory.tops[row] > memory.ground:
         passed -= plant.range_residual
     reading.distance = passed + memory.kicks[row]

@@ -74,7 +74,7 @@ def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
           free_air: Sequence[Flight] = ()) -> tuple[np.ndarray, np.ndarray]:
     """Inputs (batch, crop, 12) float32 and goals (batch, crop / 2, 3) float32.
 
-    free_air: flights without edges, the source of `recipe.free_air` of the crops.
+    free_air: flights without edges, the source of `recipe.free_air_share` of the crops.
     """
     share = np.array([f.weight for f in flights])
     drawn = [flights[i] for i in rng.choice(len(flights), recipe.batch, p=share / share.sum())]
@@ -82,7 +82,7 @@ def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
     y = np.empty((recipe.batch, recipe.crop // STRIDE, OUTPUTS), np.float32)
     silent = _silent(recipe, rng)
     for row, flight in enumerate(drawn):
-        if free_air and rng.random() < recipe.free_air:
+        if free_air and rng.random() < recipe.free_air_share:
             flight = free_air[rng.integers(len(free_air))]
         x[row], y[row] = _crop(flight, recipe, rng)
         silent[row, list(flight.silent)] = True

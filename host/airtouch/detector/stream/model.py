@@ -1,7 +1,9 @@
 """A trained streaming network as one file: float and int8 weights, decoder settings, how it came about."""
 
 import hashlib
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -18,30 +20,51 @@ from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.stream_int8 import StreamNetwork
 
 FORMAT = 1
+SHIPPED = "best.npz"
+#: the shipped models for logs that lack a sensor
+SPARES = {"acceleration": "best_without_acceleration.npz"}
 KIND = {"format": FORMAT, "network": "stream"}
 _INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
 #: what a model's file means that does not say so, because it is older
-_BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air": 0.0}
+_BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air_share": 0.0}
 _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 
 
 @dataclass(frozen=True)
 class StreamModel:
     """weights: float32 arrays (`Recipe.weight_shapes`); int8: what flies; tflite: the same over one window;
-    metadata: plain JSON: decoder, lag_s, flights, seed, command, ..."""
+    metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by its
+    name, in files of their own."""
 
     recipe: Recipe
     weights: dict[str, np.ndarray]
     int8: StreamNetwork
     tflite: bytes
     metadata: dict[str, Any]
+    spares: Mapping[str, "StreamModel"] = field(default_factory=dict)
+
+    def serving(self, missing: Sequence[str]) -> "StreamModel":
+        """The model for a log that lacks these sensors: a spare where there is one, else this one."""
+        return next((self.spares[sensor] for sensor in missing if sensor in self.spares), self)
 
     @property
     def decoder(self) -> DecoderConfig:
         """The decoder's settings."""
+        return self._settings(self.metadata.get("decoder"))
+
+    def decoder_without(self, missing: Sequence[str]) -> DecoderConfig:
+        """The decoder's settings for a log that lacks these sensors, `decoder` where there are none of their own."""
+        own = self.metadata.get("decoder_without", {})
+        for sensor in missing:
+            if sensor in own:
+                return self._settings(own[sensor])
+        return self.decoder
+
+    @staticmethod
+    def _settings(table: object) -> DecoderConfig:
         try:
-            return DecoderConfig(**self.metadata["decoder"])
-        except (KeyError, TypeError):
+            return DecoderConfig(**table)
+        except TypeError:
             raise AirTouchError(f"the model's decoder settings are not those of this version; {archive.REMEDY}") from None
 
     @property
@@ -72,11 +95,17 @@ class StreamModel:
 
 
 def load(path: str | Path | None = None) -> StreamModel:
-    """A model from its file, the shipped one for None. Raises AirTouchError, one line, for anything else."""
+    """A model from its file, the shipped one with its spares for None. Raises AirTouchError, one line, for anything else."""
     if path is None:
-        with resources.as_file(resources.files("airtouch") / "models" / "best.npz") as shipped:
-            return load(shipped)
+        spares = {sensor: _shipped(name) for sensor, name in SPARES.items()}
+        return replace(_shipped(SHIPPED), spares=spares)
     return parse(archive.read(Path(path)), str(path))
+
+
+@cache
+def _shipped(name: str) -> StreamModel:
+    with resources.as_file(resources.files("airtouch") / "models" / name) as path:
+        return load(path)
 
 
 def parse(data: bytes, source: str) -> StreamModel:
@@ -124,7 +153,10 @@ def _recipe(table: object, source: str) -> Recipe:
 
 
 def _check_metadata(model: StreamModel, source: str) -> None:
-    lag = model.metadata.get("lag_s")
-    settings = asdict(model.decoder).values()
+    lag, own = model.metadata.get("lag_s"), model.metadata.get("decoder_without", {})
+    if not isinstance(own, dict):
+        raise AirTouchError(f"{source}: decoder settings are not a table; {archive.REMEDY}")
+    configs = [model.decoder, *(model.decoder_without((sensor,)) for sensor in own)]
+    settings = [value for config in configs for value in asdict(config).values()]
     if not all(isinstance(v, (int, float)) and np.isfinite(v) for v in (lag, *settings)):
         raise AirTouchError(f"{source}: decoder settings or lag are not numbers; {archive.REMEDY}")

@@ -23,7 +23,7 @@ class Recipe:
     heights drawn `balance` times as often, gains, offsets and noise in usual swings, yaw in degrees,
     time warp, share mirrored left to right). silent_acceleration, silent_rates, silent_motors: shares of the crops in
     which that sensor's channels are held at 0, so that one network also runs without it; a sensor that no training
-    flight has is always silent. phases: share of the crops that hold take-off or landing. free_air: share of the crops
+    flight has is always silent. phases: share of the crops that hold take-off or landing. free_air_share: share of the crops
     from flights without edges, where there are such.
     """
 
@@ -55,7 +55,7 @@ class Recipe:
     silent_rates: float = 0.05
     silent_motors: float = 0.1
     phases: float = 0.15
-    free_air: float = 0.2
+    free_air_share: float = 0.2
 
     @property
     def shapes(self) -> tuple[tuple[int, int, int], ...]:

@@ -10,7 +10,7 @@ from airtouch.simulation.compiled import jit
 from airtouch.simulation.firmware.mixer import MOST
 from airtouch.simulation.firmware.settings import CUBIC, NO_COMPENSATION, OF_VEHICLE, QUADRATIC
 
-GRID = np.arange(10000.0, 65001.0, 2500.0)  #: commands at which `slope` looks
+COMMANDS, VOLTS = np.linspace(5000.0, 65000.0, 61), np.linspace(0.6, 4.4, 61)  #: where `slope` looks
 
 
 @jit
@@ -60,9 +60,16 @@ def apply(settings, plant, volts, commands):
 
 def slope(settings: Any, plant: Any, pwm: float) -> float:
     """PWM that one more count of a motor's command gives at the nominal voltage, where the PWM is `pwm`."""
-    volts = float(plant["nominal_voltage"])
-    out = np.array([compensate(settings, plant, volts, command) for command in GRID])
-    return float(np.interp(pwm, out, np.gradient(out, GRID)))
+    s = settings["battery_compensation"]
+    if s["kind"] == QUADRATIC:
+        grams = COMMANDS / (MOST + 1.0) * s["most_g"]
+        commands, volts = COMMANDS, (s["volts_of_grams"][0] + s["volts_of_grams"][1] * grams) * grams
+    elif s["kind"] == CUBIC:
+        commands, volts = np.polyval(s["newtons_of_volts"][::-1], VOLTS) / s["most_n"] * MOST, VOLTS
+    else:
+        return 1.0
+    out = MOST * volts / float(plant["nominal_voltage"])
+    return float(np.interp(pwm, out, np.gradient(out, commands)))
 
 
 __all__ = ["CUBIC", "apply", "compensate", "cubic_root", "slope", "smoothed"]

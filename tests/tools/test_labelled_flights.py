@@ -1,0 +1,77 @@
+"""The table of labelled flights: no flight scored is known, a run goes on, draws add up."""
+
+import sys
+
+import pytest
+from made_flight import SMALL, made_flight
+
+from airtouch import logs
+from airtouch.detector import best
+from airtouch.detector.dataset import Condition
+from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.errors import AirTouchError
+from tools import labelled_flights
+
+
+@pytest.fixture
+def house(tmp_path, monkeypatch):
+    """A folder of four made flights on two days, and a `best` that trains in a moment."""
+    pytest.importorskip("tensorflow")
+    monkeypatch.setattr(best, "Recipe", lambda: SMALL)
+    folder = tmp_path / "flights"
+    folder.mkdir()
+    for i in range(4):
+        logs.write(made_flight(i), folder / f"f{i}.csv")
+    (folder / "manifest.csv").write_text("file,day,speed_mps\n" + "".join(f"f{i}.csv,{i % 2},0.3\n" for i in range(4)))
+    return folder
+
+
+def run(monkeypatch, *arguments):
+    monkeypatch.setattr(sys, "argv", ["labelled_flights.py", *map(str, arguments)])
+    labelled_flights.main()
+
+
+def test_every_flight_is_scored_by_models_that_never_saw_it(house, tmp_path, monkeypatch, capsys):
+    trained = []
+    fit = best.fit
+
+    def spy(flights, **options):
+        trained.append({log.source for log in flights})
+        return fit(flights, **options)
+
+    fit([made_flight(9)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    monkeypatch.setattr(best, "fit", spy)
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 2, "--seeds", 1, "--steps", 3, "--alone-steps", 3)
+    run(monkeypatch, *call)
+    assert len(trained) == 8 and all(len(names) == 1 for names in trained)
+    days = [int(next(iter(names)).split("/")[-1][1]) % 2 for names in trained]
+    assert days == [1, 0] * 4, "day 0 is scored by a model of a flight of day 1, and the other way round"
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("| ") and "---" not in line][1:]
+    assert [row.split(" | ")[0] for row in rows] == ["| as it is", "| and 1 labelled", "| 1 labelled alone"]
+    assert [row.split(" | ")[1:3] for row in rows] == [["1", "4 / 8"], ["2", "4 / 8"], ["2", "4 / 8"]]
+    run(monkeypatch, *call)
+    assert len(trained) == 8, "what is done is not done again"
+
+
+def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):
+    best.fit([made_flight(1)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    with pytest.raises(AirTouchError, match="was trained on this flight"):
+        run(monkeypatch, house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out")
+
+
+def test_draws_of_a_flight_add_up():
+    edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
+    one = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))
+    both = labelled_flights.merged([one, one, FlightScore("b", Condition(), (edge,), (), 1, 10.0)])
+    assert [(s.file, len(s.edges), len(s.false), s.detections, s.airborne_s) for s in both] == [
+        ("a", 2, 2, 4, 60.0), ("b", 1, 0, 1, 10.0)]
+    assert both[0].windows == (2, 4, 6, 8)
+
+
+def test_smaller_draws_lie_within_larger_ones():
+    pool = [made_flight(0, 500) for _ in range(9)]
+    small, large = (labelled_flights.drawn(pool, k, draw=3) for k in (2, 5))
+    assert all(any(a is b for b in large) for a in small)
+    with pytest.raises(AirTouchError, match="ask for fewer"):
+        labelled_flights.drawn(pool, 10, 0)

@@ -1,0 +1,149 @@
+"""What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
+
+    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled [--labelled 2 --labelled 5]
+        [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
+
+Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
+that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained on the
+same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of learning.
+--start must not know a flight that is scored. What is in --out already is not done again, so a run that was stopped goes on.
+Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the flights scored, each with all its draws.
+"""
+
+import argparse
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector import best, crossval, dataset, evaluate, training_set
+from airtouch.detector.dataset import FlightFile
+from airtouch.detector.score import FlightScore
+from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.summary import summarise
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
+
+FIRST_HALF = 3  #: folds below this one are one half, the others the other
+
+
+def group_of(file: FlightFile, by: str) -> str:
+    """What is held out together."""
+    known = file.condition.fold if by == "halves" else file.condition.day
+    if known is None:
+        raise AirTouchError(f"{file.path}: no {'fold' if by == 'halves' else 'day'} in the manifest beside it")
+    return str(known) if by == "day" else "folds 0 to 2" if int(known) < FIRST_HALF else "folds 3 and up"
+
+
+def drawn(pool: Sequence[FlightLog], count: int, draw: int) -> list[FlightLog]:
+    """`count` flights of the pool; a draw's smaller sets lie within its larger ones."""
+    if count > len(pool):
+        raise AirTouchError(f"{count} labelled flights wanted, {len(pool)} are not held out; ask for fewer")
+    return [pool[i] for i in np.random.default_rng(draw).permutation(len(pool))[:count]]
+
+
+def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
+    """One score a flight, with the edges, false detections and minutes of all its draws."""
+    flights: dict[str, list[FlightScore]] = {}
+    for score in scores:
+        flights.setdefault(score.file, []).append(score)
+    return [FlightScore(name, some[0].condition, sum((s.edges for s in some), ()), sum((s.false for s in some), ()),
+                        sum(s.detections for s in some), sum(s.airborne_s for s in some),
+                        tuple(int(n) for n in np.sum([s.windows for s in some], axis=0)),
+                        np.sum([s.bins for s in some], axis=0)) for name, some in flights.items()]
+
+
+def scored(model: StreamModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
+    """Scores of the held-out flights. Raises AirTouchError where the model knows one."""
+    for file in held:
+        if training_set.contains(model.metadata, readable[file.path]):
+            raise AirTouchError(f"{file.path}: the model to start from was trained on this flight; train one without it")
+    return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
+
+
+def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
+         pool: Sequence[FlightLog], readable: dict[Path, FlightLog], start: StreamModel | None,
+         options: argparse.Namespace) -> list[FlightScore]:
+    """One training and its scores, or what an earlier run found."""
+    steps = {"start": 0, "labelled": options.steps, "alone": options.alone_steps}[row]
+    asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
+             [f.path.name for f in held], [log.source for log in pool]]
+    key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
+    kept = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{key}.json"
+    if kept.is_file():
+        return [FlightScore.from_dict(entry) for entry in json.loads(kept.read_text())]
+    if row == "start":
+        model = start
+    else:
+        model = best.fit(drawn(pool, count, draw), seed=seed, start=start if row == "labelled" else None, steps=steps,
+                         command="tools/labelled_flights.py")
+    scores = scored(model, held, readable)
+    write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), kept, force=True)
+    return scores
+
+
+def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
+    """One row of the table."""
+    found: dict[str, Any] = summarise(merged(scores))
+
+    def text(name: str, scale: float, digits: int) -> str:
+        if found[name] is None:
+            return "-"
+        ends = found["intervals"][name] or (np.nan, np.nan)
+        value, low, high = (f"{scale * x:.{digits}f}" for x in (found[name], *ends))
+        return f"{value} [{low}, {high}]"
+
+    cells = (title, str(draws), f"{found['flights']} / {found['edges'] // draws}", text("mean_abs_error_m", 1, 3),
+             text("mean_abs_error_s", 1, 2), text("missed", 100, 1), text("false_per_minute", 1, 2))
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Each row as soon as its last draw is done."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--start", type=Path, help="model to go on from; the rows without it if left out")
+    parser.add_argument("--by", choices=("halves", "day"), default="halves")
+    parser.add_argument("--out", type=Path, default=Path("out/labelled"))
+    parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
+    parser.add_argument("--draws", type=int, default=5)
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--steps", type=int, default=best.FINE_TUNING["steps"], help="of going on (default 300)")
+    parser.add_argument("--alone-steps", type=int, default=1000, help="of training on the K alone; 0: no such rows")
+    parser.add_argument("--speed", type=float, help="m/s, for flights whose manifest does not say")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    files = dataset.collect(options.folders, options.speed)
+    readable, left_out = crossval.readable_flights(files, best.SPARE_SENSORS)
+    if left_out:
+        raise SystemExit(f"not usable: {left_out[0][1]}")
+    start = best.load(options.start) if options.start else None
+    groups = sorted({group_of(file, options.by) for file in files})
+
+    def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
+        scores: list[FlightScore] = []
+        for draw, seed in draws:
+            for group in groups:
+                held = [f for f in files if group_of(f, options.by) == group]
+                pool = [readable[f.path] for f in files if group_of(f, options.by) != group]
+                scores += cell(kind, count, draw, seed, group, held, pool, readable, start, options)
+        print(line(title, scores, len(draws)), flush=True)
+
+    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute |\n|---|---|---|---|---|---|---|",
+          flush=True)
+    every = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
+    if start:
+        row("as it is", "start", 0, [(0, 0)])
+    for count in options.labelled or (2, 5, 10, 20):
+        if start:
+            row(f"and {count} labelled", "labelled", count, every)
+        if options.alone_steps:
+            row(f"{count} labelled alone", "alone", count, every)
+
+
+if __name__ == "__main__":
+    main()
