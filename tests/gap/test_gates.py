@@ -10,6 +10,8 @@ from airtouch.gap import calibrate, candidates, flight, gates
 from airtouch.gap.channels import inside, residual
 from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
+from airtouch.gap.result import Cell
+from airtouch.gap.select import select
 from airtouch.gap.unexplained import unexplained
 from airtouch.simulation import effects, scenario
 from airtouch.simulation.batch import flights as simulated
@@ -47,7 +49,7 @@ def test_a_wake_is_found_with_its_seconds(study, quiet):
     data = Data(study, [pushed(quiet, 0.1)])
     found = gates.best_gated(data)
     assert found is not None and found.gain > 100.0
-    acts = inside(found.terms[0].gate, quiet)
+    acts = inside(found.fitted.terms[0].gate, quiet)
     t = np.arange(len(quiet)) * flight.PERIOD_S
     true = (t >= FROM_S) & (t < TO_S)
     assert (acts & true).sum() > 0.7 * true.sum()
@@ -60,7 +62,9 @@ def test_a_nominal_flight_has_nothing_that_comes_and_goes(study, quiet):
 
 
 def test_the_diagnosis_says_when(study, quiet):
-    told = brief(study, [pushed(quiet, 0.1)])
+    told = brief(study, [pushed(quiet, 0.03)])
+    assert told.verdict == "effect"
+    assert told.effects[0].parameters["strength"].value == pytest.approx(0.03, rel=0.15)
     stretches = [s for e in told.effects for s in e.seconds]
     assert stretches and all(name == quiet.name for name, _, _ in stretches)
     plain = next(e for e in told.plain()["effects"] if "seconds" in e)
@@ -98,8 +102,6 @@ def test_every_gated_effect_is_one_of_the_registry():
 
 
 def test_what_stays_open_is_shown_with_its_seconds(study, quiet):
-    from airtouch.gap.gap_map import gap_map, where
-    from airtouch.gap.select import select
     rng = np.random.default_rng(3)
     t = np.arange(len(quiet)) * flight.PERIOD_S
     on = (t >= FROM_S) & (t < TO_S)
@@ -107,8 +109,8 @@ def test_what_stays_open_is_shown_with_its_seconds(study, quiet):
     force[on, 1] += 1.5 * np.sin(2.0 * np.pi * 4.0 * t[on]) + 0.1 * rng.normal(size=on.sum())
     odd = replace(quiet, acceleration=force)
     found = select(Data(study, [odd]), {}, without=tuple(candidates.GATED))
-    cells = where(gap_map(study, [odd], flown(2, 63)))
-    shown = unexplained(study, [odd], found, cells)
-    first = next(u for u in shown if u["channel"] == "force_y")
+    cell = Cell("force_y", (2.0, 6.0), "cruise", 0.5, 0.1, "m/s^2")
+    first, = unexplained(study, [odd], found, [cell])
+    assert (first["channel"], first["flight"]) == ("force_y", quiet.name)
     assert FROM_S - 2.0 < first["from_s"] < first["to_s"] < TO_S + 2.0
     assert first["over_floor"] > 3.0

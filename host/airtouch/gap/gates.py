@@ -14,7 +14,7 @@ import numpy as np
 from airtouch.gap import candidates
 from airtouch.gap.candidates import Term
 from airtouch.gap.data import Data
-from airtouch.gap.fit import fit, judge, left_over
+from airtouch.gap.fit import Fit, fit, judge, left_over
 from airtouch.gap.flight import PERIOD_S
 from airtouch.gap.problem import Part, problem_of, whole_of
 from airtouch.gap.spectra import AIR, LENGTH
@@ -23,15 +23,17 @@ MOST_STRETCHES = 4  #: of one flight
 WORST = 0.25  #: share of the blocks that are explained worst
 ROUNDS = 3
 LEAST_BLOCKS = 6  #: in the air
+STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
+Gate = tuple[tuple[str, float, float], ...]
 WHOLE = 0.9  #: of a flight's blocks: what acts there does not come and go
 
 
 @dataclass(frozen=True)
 class Gated:
-    """An effect with its stretches and parameters, what it gains after all costs, and what the choice of them costs."""
+    """An effect as fitted in its stretches, what it gains after all costs, and what the choice of them costs."""
 
     name: str
-    terms: tuple[Term, ...]
+    fitted: Fit
     gain: float
     cost: float
 
@@ -68,12 +70,29 @@ def _judged(data: Data, name: str, terms: Sequence[Term]) -> Gated | None:
             break
         on = chosen
     gate = tuple((data.flights[problem.piece[a]].name, *_seconds(data, problem, a, b)) for a, b in stretches)
+    gate = _sharpened(data, whole, fitted.terms, gate)
     gated = [replace(t, gate=gate) for t in fitted.terms]
     refitted = fit(data, whole, gated, fitted.scaled if len(fitted.scaled) else None)
     free = sum(len(t.free) for t in gated)
     gained = judge(data, whole, refitted.terms) - judge(data, whole, ()) - cost
     gained -= 0.5 * free * np.log(blocks)
-    return Gated(name, refitted.terms, gained, cost)
+    return Gated(name, refitted, gained, cost)
+
+
+def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:
+    """The gate with each end moved by less and less, as long as the likelihood grows."""
+    level = lambda tried: judge(data, whole, [replace(t, gate=tried) for t in terms])
+    best = level(gate)
+    for step in STEPS_S:
+        for i in range(len(gate)):
+            for end in (1, 2):
+                for sign in (-1.0, 1.0):
+                    moved = list(gate[i])
+                    moved[end] += sign * step
+                    tried = (*gate[:i], tuple(moved), *gate[i + 1:])
+                    if moved[1] < moved[2] and (found := level(tried)) > best:
+                        best, gate = found, tried
+    return gate
 
 
 def _each(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:

@@ -192,8 +192,10 @@ def _passing(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float
     steady = max((j.gain for n, j in singles.items() if j.evidence >= least[n]), default=0.0)
     if gated is None or gated.gain < data.study.scatter.passing(_seconds(data), LEAST_GAIN) or gated.gain < steady:
         return None
-    crossed = _crossed(data, parts, base, gated.name, (), gated.terms, None, gated.cost)
-    return replace(crossed, evidence=gated.gain)
+    shaken = any(t.kind == SPECTRUM for t in gated.fitted.terms)
+    gain = sum(judge(data, p, gated.fitted.terms) - before for p, before in zip(parts, base[shaken], strict=True))
+    return Judged(gated.name, gated.fitted.terms, gain - gated.cost, (gated.fitted, gated.fitted), choice=gated.cost,
+                  strength=_strength(gated.fitted.terms[0], gated.fitted.terms, (gated.fitted,))[0], evidence=gated.gain)
 
 
 def _beside(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], screen: Screen,
