@@ -39,6 +39,13 @@ def test_flights_of_a_class_are_taken_for_it():
         assert min(apart, key=apart.__getitem__) == name, apart
 
 
+def test_recorded_flights_are_never_taken_for_simulated_ones():
+    still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
+    flights = [Apparent(still, still, 0.0) for _ in range(4)]
+    assert scatter_of(flights).rms["wind"][0] < 0.05
+    assert scatter_of(flights, recorded=True).rms["wind"][0] > scatter_of(flights).rms["wind"][0]
+
+
 def test_many_baseline_flights_outweigh_the_table():
     rng = np.random.default_rng(4)
     own = {k: 0.1 + 3.0 * v for k, v in table()[REAL[0]].rms.items()}

@@ -76,9 +76,16 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
     study = replace(study, usual=usual_of(Data(study, flights)))
     if scatter:
-        study = replace(study, scatter=scatter_of([apparent(Data(study, [f])) for f in _some(flights)]))
+        study = replace(study, scatter=scatter_of([apparent(Data(study, [f])) for f in _some(flights)],
+                                                    any(_recorded(f) for f in flights)))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))
+
+
+def _recorded(flight: Flight) -> bool:
+    """Whether the log's format is one that only drones and their ground stations write."""
+    formats = {str(flight.log.meta.get(key, "")).split("-")[0] for key in ("format", "origin_format")}
+    return bool(formats & {"authors", "crazypad", "imrclab", "usd"})
 
 
 def _some(flights: Sequence[Flight]) -> list[Flight]:

@@ -26,6 +26,7 @@ WORTH = 4.0  #: flights that a class of the table counts as at most, beside the 
 NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
 RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
 RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
+SIMULATED = "simulated"  #: the class of flights of this project's simulator
 GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the likeliest is taken
 
 
@@ -82,13 +83,15 @@ class Scatter:
         return least + seconds * (rate[0] + min(sure, MOST_SURE) * rate[1]) ** 2
 
 
-def scatter_of(baseline: Sequence[Apparent]) -> Scatter:
+def scatter_of(baseline: Sequence[Apparent], recorded: bool = False) -> Scatter:
     """What the table knows of the class that the baseline flights fit best, updated by them.
+
+    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs.
 
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
     """
-    classes = table()
+    classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
     n = len(baseline)
     wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
     known = baseline if n > 1 else ()
