@@ -95,6 +95,10 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
         screen.print(f"cannot be told apart here: {', '.join(group)}")
     if found.where:
         screen.print(cells(found.where, "Where"))
+    remarks(screen, "What stays open", [words.open_in_words(u) for u in found.unexplained])
+    if found.unexplained and found.unexplained[0]["nearest"]:
+        remarks(screen, "Nearest effects", [f"{n['name'].replace('_', ' ')}: {n['fails']}"
+                                            for n in found.unexplained[0]["nearest"]])
     if found.advice:
         screen.print(f"advice: {found.advice}")
     remarks(screen, "What these logs cannot say", found.cannot)

@@ -1,6 +1,8 @@
 """A diagnosis in sentences, for the terminal and the report alike."""
 
 from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 from airtouch.gap.gap_map import CHANNEL_WORDS, LEAST_SHARE, PHASE_WORDS, in_words, short
 from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
@@ -42,8 +44,18 @@ def share(cell: Cell) -> float:
 
 
 def effect_in_words(effect: Found) -> str:
-    """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`."""
-    return f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
+    """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`; of one that comes and goes, when it acts."""
+    when = ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
+    return (f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
+            + (f"; acts from {when}" if when else ""))
+
+
+def open_in_words(entry: Mapping[str, Any]) -> str:
+    """`lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv; follows height`."""
+    low, high = entry["band_hz"]
+    follows = f"; follows {joined(list(entry['follows']))}" if entry["follows"] else ""
+    return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to {entry['over_floor']:.1f} times the "
+            f"floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of {Path(entry['flight']).name}{follows}")
 
 
 def quantity(q: Quantity, form: str = "{:.3g}") -> str:
