@@ -20,7 +20,7 @@ from importlib import resources
 import numpy as np
 from scipy.stats import t as student
 
-MOST_SURE = 3.0  #: standard deviations of the rate that are no news, at most
+MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
 WORTH = 4.0  #: flights that a class of the table counts as at most, beside the baseline's own
 NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
