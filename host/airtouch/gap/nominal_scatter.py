@@ -21,6 +21,7 @@ import numpy as np
 from scipy.stats import t as student
 
 MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
+LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
 WORTH = 4.0  #: flights that a class of the table counts as at most, beside the baseline's own
 NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
@@ -96,7 +97,9 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False) -> Scatter:
     wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
     known = baseline if n > 1 else ()
     weight = np.array([_fit(c, known, wide) for c in classes.values()])
-    own = list(classes.values())[int(np.argmax(weight))] if n > 1 else _widest(classes.values())
+    name_of = list(classes)[int(np.argmax(weight))]
+    own = classes[name_of] if n > 1 else _widest(classes.values())
+    least = LEAST if n > 1 and name_of == SIMULATED else LEAST_RECORDED
     worth = min(own.freedom, WORTH)
     rms = {}
     for name, prior in own.rms.items():
@@ -104,6 +107,7 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False) -> Scatter:
         rms[name] = prior if not rows else np.array([_likeliest(math.sqrt(wide) * _column(rows, name, "strengths", k),
                                          math.sqrt(wide) * _column(rows, name, "errors", k), p, worth)
                               for k, p in enumerate(prior)])
+        rms[name] = np.maximum(rms[name], least)
     return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth),
                    _rate(own.passing_rate, [f.passing_rate for f in known], worth))
 
