@@ -1,6 +1,5 @@
 """Simulated flights of made-up courses: their truth is known."""
 
-import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles

@@ -14,7 +14,7 @@ from airtouch.gap import random_effects
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.data import Data
 from airtouch.gap.least_squares import bounded_step, cost_of, limits, weights_of, without_offsets
-from airtouch.gap.problem import GROUPS, LOOP, Part, Problem, problem_of
+from airtouch.gap.problem import LOOP, Part, Problem, problem_of
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8
@@ -76,12 +76,6 @@ def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> 
     """
     problem, values, added, price = _explained(data, part, terms, wide)
     return problem.likelihood(values, added) - price
-
-
-def judge_groups(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> np.ndarray:
-    """What `judge` gives, by group (generic.GROUPS,) of view, regime, channel and band; costs count nowhere."""
-    problem, values, added, _ = _explained(data, part, terms, wide)
-    return np.bincount(problem.groups, problem.each(values, added), GROUPS)
 
 
 def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, np.ndarray, np.ndarray]:

@@ -87,10 +87,9 @@ class Scatter:
 def scatter_of(baseline: Sequence[Apparent], recorded: bool = False) -> Scatter:
     """What the table knows of the class that the baseline flights fit best, updated by them.
 
-    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs.
-
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
+    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs.
     """
     classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
     n = len(baseline)
@@ -104,10 +103,10 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False) -> Scatter:
     rms = {}
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
-        rms[name] = prior if not rows else np.array([_likeliest(math.sqrt(wide) * _column(rows, name, "strengths", k),
-                                         math.sqrt(wide) * _column(rows, name, "errors", k), p, worth)
-                              for k, p in enumerate(prior)])
-        rms[name] = np.maximum(rms[name], least)
+        scale = math.sqrt(wide)
+        own_rms = [_likeliest(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p, worth)
+                   for k, p in enumerate(prior)] if rows else prior
+        rms[name] = np.maximum(own_rms, least)
     return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth),
                    _rate(own.passing_rate, [f.passing_rate for f in known], worth))
 

@@ -453,7 +453,6 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
     `unknown` has one half where as much is left as is allowed, and odds that grow with its square.
     """
     names = list(selection.singles)
-    singles = selection.singles
     score = np.array([*_scores(selection, names), 0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
     odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
