@@ -1,13 +1,8 @@
-"""The emulator's tools are no part of the installed package: they are found in the checkout. Flights for the cores."""
+"""Flights for the cores."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
-
 from app.drone import signals
 
 from airtouch import vehicle as vehicles

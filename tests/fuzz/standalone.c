@@ -1,6 +1,7 @@
 // Runs a target without libFuzzer: every file of the corpus, then mutations of them from a seed, blindly. It takes
 // those of libFuzzer's flags that tools/fuzz.py gives and says how many inputs it ran; the input at which a sanitizer
-// or a promise ended the run is written to a file.
+// or a promise ended the run is written to a file whose name begins with -artifact_prefix=, or not at all without one:
+// a replayed file need not be written again.
 #include <dirent.h>
 #include <signal.h>
 #include <unistd.h>
@@ -19,7 +20,7 @@ typedef struct {
 static input_t corpus[MAX_INPUTS];
 static size_t inputs;
 static input_t now;  // what the target is given
-static const char *prefix = "";
+static const char *prefix;  // of a finding's path; NULL: none is written
 static unsigned long runs, seed = 1, longest = 4096, timeout = 20, executed;
 static uint64_t state;
 
@@ -33,7 +34,7 @@ static uint32_t draw(uint32_t limit) {
 static void save(void) {
   char path[4096];
   static bool saved;
-  if (saved || now.bytes == NULL) {
+  if (saved || prefix == NULL || now.bytes == NULL) {
     return;
   }
   saved = true;

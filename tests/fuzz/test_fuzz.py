@@ -67,7 +67,10 @@ def test_the_driver_of_our_own_finds_a_planted_defect(tmp_path):
     program = fuzz.build(["parser"], engine, {fuzz.ROOT / path: planted}, tmp_path, only=[fuzz.ROOT / path])["parser"]
     result = fuzz.run("parser", program, 20_000, folder=tmp_path)
     assert result.finding is not None
-    assert subprocess.run([program, result.finding], capture_output=True).returncode != 0
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    assert subprocess.run([program, result.finding], capture_output=True, cwd=elsewhere).returncode != 0
+    assert list(elsewhere.iterdir()) == [], "a replay writes no file into the folder in which it is run"
 
 
 def test_the_kept_seeds_are_small():

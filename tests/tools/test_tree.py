@@ -1,0 +1,34 @@
+"""The top folder holds what a reader expects there, and nothing that a run left behind."""
+
+import shutil
+import subprocess
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+#: what may stand in the top folder; anything else belongs into one of its folders or was left by a run
+ALLOWED = (".*", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "pyproject.toml",
+           "*.lock", "firmware", "gap8", "host", "tests", "tools")
+
+
+def strangers(root: Path) -> set[str]:
+    """The names in the top folder that git tracks and ALLOWED does not list."""
+    tracked = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout
+    names = {line.split("/")[0] for line in tracked.splitlines()}
+    return {name for name in names if not any(fnmatch(name, pattern) for pattern in ALLOWED)}
+
+
+@pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="no git checkout on this machine")
+def test_the_top_folder_holds_only_what_it_may():
+    assert strangers(ROOT) == set()
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="no git on this machine")
+def test_a_file_that_a_run_left_is_seen(tmp_path):
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    (tmp_path / "README.md").touch()
+    (tmp_path / "crash-1-0").touch()
+    subprocess.run(["git", "add", "."], cwd=tmp_path, check=True)
+    assert strangers(tmp_path) == {"crash-1-0"}
