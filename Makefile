@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
 
-.PHONY: help setup demo test fuzz bench firmware gap8 flash clean
+.PHONY: help setup demo test fuzz bench firmware emulate gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -35,6 +35,9 @@ bench: setup  ## time the kernels and the simulator against their peers, as rati
 firmware:  ## build the STM32 app: CRAZYFLIE_BASE=... [PLATFORM=cf21bl] [VEHICLE=...] [CONFIG=app-config-tap]
 	@sh firmware/app/build.sh "$(CRAZYFLIE_BASE)" "$(or $(CONFIG),app-config)" "$(or $(PLATFORM),cf2)" "$(VEHICLE)" \
 	  "$(NETWORKS)"
+
+emulate: setup  ## the whole firmware with the app in QEMU: CRAZYFLIE_BASE=... [ARGS="flight.csv --steps 2400"]
+	@$(BIN)/python -m tools.emulate "$(CRAZYFLIE_BASE)" $(ARGS)
 
 gap8:  ## build the GAP8 app: GAP_SDK_HOME=... AIDECK=...
 	@sh gap8/app/build.sh "$(GAP_SDK_HOME)" "$(AIDECK)"

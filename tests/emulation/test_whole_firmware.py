@@ -1,0 +1,158 @@
+"""The whole firmware in QEMU: bad input anywhere; with a checkout (CRAZYFLIE_BASE) the image itself, beside the desktop."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace as changed
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle as vehicles
+from airtouch.detector import best
+from airtouch.errors import AirTouchError
+from airtouch.kernels.app_core import AppCore
+from airtouch.simulation import scenario
+from airtouch.simulation.flight import fly
+from tools.emulate import build
+from tools.emulate.board import REPLAY, Board
+from tools.emulate.replay import FED, desktop_values, differs, replay, rows, sample
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def log():
+    return fly(scenario.load("paper-4cm"), vehicles.load(), seed=3)
+
+
+@pytest.fixture(scope="module")
+def image():
+    base = os.environ.get("CRAZYFLIE_BASE")
+    if not base or not all(map(shutil.which, ("arm-none-eabi-gcc", "qemu-system-arm"))):
+        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc and qemu-system-arm")
+    build.compile_firmware(Path(base))
+    return build.link()
+
+
+def emulate(*arguments, **environment):
+    return subprocess.run([sys.executable, "-m", "tools.emulate", *map(str, arguments)], cwd=ROOT, capture_output=True,
+                          text=True, env=os.environ | environment)
+
+
+def one_line(run, words):
+    assert run.returncode == 1 and words in run.stderr and run.stderr.count("\n") == 1, run.stderr
+
+
+@pytest.fixture
+def path_with(tmp_path):
+    """A PATH with these programs that do nothing, and git."""
+    def make(*names):
+        folder = tmp_path / "bin"
+        folder.mkdir()
+        for name in names:
+            (folder / name).write_text("#!/bin/sh\n")
+            (folder / name).chmod(0o755)
+        (folder / "git").symlink_to(shutil.which("git"))
+        return str(folder)
+    return make
+
+
+def test_without_a_checkout_it_says_where_to_get_one():
+    one_line(emulate(""), "say where the firmware's sources are")
+
+
+@pytest.mark.parametrize("there, missing", [((), "no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi"),
+                                            (("arm-none-eabi-gcc",), "no qemu-system-arm: apt-get install qemu-system-arm")])
+def test_a_missing_tool_is_named(there, missing, path_with, tmp_path):
+    one_line(emulate(tmp_path, PATH=path_with(*there)), missing)
+
+
+def test_a_folder_that_is_no_checkout_is_refused(path_with, tmp_path):
+    tools = path_with("arm-none-eabi-gcc", "qemu-system-arm")
+    one_line(emulate(tmp_path, PATH=f"{tools}:{os.environ['PATH']}"), "is no checkout of bitcraze/crazyflie-firmware")
+
+
+def test_another_release_is_refused(path_with, tmp_path):
+    base = tmp_path / "base"
+    (base / "tools/make").mkdir(parents=True)
+    (base / "tools/make/oot.mk").touch()
+    for command in (["init", "-q"], ["add", "."], ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "a"],
+                    ["tag", "2025.02"]):
+        subprocess.run(["git", "-C", base, *command], check=True)
+    tools = path_with("arm-none-eabi-gcc", "qemu-system-arm")
+    run = emulate(base, PATH=f"{tools}:{os.environ['PATH']}")
+    one_line(run, "is 2025.02, the board is written for 2026.08: git -C")
+
+
+def test_a_flight_without_motors_is_refused(log):
+    less = changed(log, columns={k: v for k, v in log.columns.items() if k != "m3_pwm"})
+    with pytest.raises(AirTouchError, match="has no m3_pwm: the app needs acceleration, rates and motors"):
+        rows(less)
+
+
+def test_what_is_fed_is_what_the_core_gets(log):
+    table = rows(log)
+    acc, gyro, pwm, volts, attitude = map(np.array, zip(*map(sample, table), strict=True))
+    for column, axis in zip(acc.T, "xyz", strict=True):
+        np.testing.assert_allclose(column, log[f"acc_world_{axis}_mps2"], atol=2e-5)
+    np.testing.assert_allclose(gyro[:, 1], log["gyro_y_radps"], atol=1e-5)
+    np.testing.assert_allclose(pwm[:, 2], log["m3_pwm"], atol=0.5)
+    np.testing.assert_allclose(volts, log["vbat_V"], atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(attitude, axis=1), 1.0, atol=1e-6)
+    assert len(FED) == table.shape[1]
+
+
+def test_a_bit_more_is_a_difference():
+    core = AppCore()
+    for _ in range(3):
+        core.step([0.1, 0.0, 9.8], [0.0, 0.1, 0.0], [30_000.0] * 4)
+    values = desktop_values(core)
+    assert not any(differs(name, value, value) for name, value in values.items())
+    off = np.nextafter(np.float32(values["fwz"]), np.float32(9))
+    assert differs("fwz", off, values["fwz"]) and differs("steps", values["steps"] + 1, values["steps"])
+    assert differs("health", int(values["health"]) ^ 1, values["health"]) and not differs("late", 7, 0)
+    assert not differs("thresh", np.nan, np.nan) and differs("thresh", 1.0, np.nan) and differs("fwz", -0.0, 0.0)
+
+
+@pytest.mark.slow
+def test_the_firmware_computes_what_the_desktop_does(image, log):
+    steps = best.run(log).edges[0].sample + 100
+    changes = {100: {"pFa": 1e-3}, 200: {"scoreIn": 99.0}, 300: {"detector": 0}, 400: {"detector": 1, "scoreIn": 2.3}}
+    found = replay(image, log, steps, changes)
+    assert (found.steps, found.different, found.late) == (steps, 0, 0), found.first
+    assert found.prob_off < 1e-6 and len(found.edges) == 1 and 0 < found.stack_bytes < 1200 and found.longest_us < 2000
+    assert "Self test passed!" in found.console
+
+
+@pytest.mark.slow
+def test_the_comparison_notices_another_input(image, log):
+    found = replay(image, log, 50, {10: {"pFa": 1e-3}})
+    assert found.different == 0
+    core = AppCore(vehicle=vehicles.load("crazyflie-2.1-flow"))
+    with Board(image, REPLAY, ["airtouch.fwz", "airtouch.steps"]) as board:
+        board.ask("W", FED)
+        board.go()
+        table = rows(log)
+        table[:, 2] += np.float32(1e-6)
+        seen = []
+        for row, true in zip(table[1000:1010], rows(log)[1000:1010], strict=True):
+            board.say("V", row.tobytes())
+            board.go()
+            acc, gyro, pwm, volts, attitude = sample(true)
+            core.step(acc, gyro, pwm, vbat_v=volts, attitude=attitude)
+            seen.append(differs("fwz", board.values(board.hear("S"))["airtouch.fwz"], core.log.force[2]))
+    assert any(seen)
+
+
+@pytest.mark.slow
+def test_a_log_variable_or_a_parameter_that_is_missing_is_named(image):
+    with pytest.raises(AirTouchError, match="no log variable airtouch.nothing"), Board(image, REPLAY, ["airtouch.nothing"]):
+        pass
+    with pytest.raises(AirTouchError, match="stopped: no such parameter"), Board(image, REPLAY, ["airtouch.steps"]) as board:
+        board.ask("W", FED)
+        board.parameter("airtouch.nothing", 1.0)
+        board.go()
+        board.hear("S")

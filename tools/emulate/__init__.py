@@ -1,0 +1,1 @@
+"""The whole firmware with the app in QEMU: `make emulate`, host/docs/emulate.md."""

@@ -1,0 +1,79 @@
+"""The whole firmware with the app, in QEMU: `make emulate CRAZYFLIE_BASE=...`.
+
+    python -m tools.emulate ~/crazyflie-firmware                    # two recorded flights through the log variables
+    python -m tools.emulate ~/crazyflie-firmware flight.csv --steps 2400
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
+from airtouch.logs import read
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import scenario
+from airtouch.simulation.flight import fly as simulated
+from tools.emulate import build
+from tools.emulate.replay import Replay, replay
+
+RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
+CLONE = "git clone --recursive --branch 2026.08 https://github.com/bitcraze/crazyflie-firmware ~/crazyflie-firmware"
+#: step -> parameters: three that are taken over, one out of range, the other detector and back
+CHANGES = {100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0}, 300: {"detector": 1, "scoreIn": 2.3}}
+
+
+def recorded(count: int) -> list[FlightLog]:
+    """So many recorded flights, or a simulated one where none are here."""
+    folder = Path(os.environ.get("AIRTOUCH_FLIGHTS", build.ROOT.parent / "shared" / "flights"))
+    logs = [read(path) for path in sorted(folder.glob(RECORDED))[:count]]
+    if logs:
+        return logs
+    log = simulated(scenario.load("paper-4cm"), vehicles.load(), seed=3)
+    return [log] if isinstance(log, FlightLog) else []
+
+
+def show(what: str, seconds: float, found: Replay) -> None:
+    """A line of the table, and what differed."""
+    task, words = found.least_left
+    print(f"{what}: {found.steps} steps, {found.different} differ, prob within {found.prob_off:.1g}; edges "
+          f"{' '.join(f'{kind}@{step}' for step, kind in found.edges) or 'none'}\n  late {found.late}, longest step "
+          f"{found.longest_us} us; app's stack {found.stack_bytes} of 1600 bytes, least left of any task {4 * words} ({task});\n  "
+          f"{found.steps / 100:.1f} s of flight in {seconds:.0f} s", flush=True)
+    if found.first:
+        print(f"  first difference: {found.first}")
+
+
+def main(arguments: list[str]) -> int:
+    """Build, run, print. 1 where a step differs."""
+    parser = argparse.ArgumentParser(prog="python -m tools.emulate", description=__doc__.splitlines()[0])
+    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
+    parser.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
+    parser.add_argument("--steps", type=int, default=2400, help="of each flight (2400)")
+    parser.add_argument("--built", action="store_true", help="take what `make firmware` built last")
+    given = parser.parse_args(arguments)
+    build.tools()
+    if not given.built:
+        build.compile_firmware(given.base.expanduser().resolve())
+    elf = build.link()
+    logs = [read(path) for path in given.flights] or recorded(2)
+    different = 0
+    for i, log in enumerate(logs):
+        changes = CHANGES if i == len(logs) - 1 else {}
+        begun = time.monotonic()
+        found = replay(elf, log, given.steps, changes)
+        name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes else "")
+        show(name, time.monotonic() - begun, found)
+        different += found.different
+    return 1 if different else 0
+
+
+if __name__ == "__main__":
+    try:
+        if len(sys.argv) < 2 or not sys.argv[1]:
+            raise AirTouchError(f"say where the firmware's sources are: make emulate CRAZYFLIE_BASE=~/crazyflie-firmware; {CLONE}")
+        sys.exit(main(sys.argv[1:]))
+    except AirTouchError as error:
+        sys.exit(f"make emulate: {error}")

@@ -1,0 +1,127 @@
+"""The emulated image: the objects that `make firmware` compiled, linked anew around a board of ours (board.c).
+
+Nothing of the firmware is compiled a second time. The linker puts the board's functions in place of those in WRAPPED,
+moves the CCM behind the RAM (QEMU's STM32F405 has none at its own place), and adds the two words that the
+bootloader has in front of the firmware.
+"""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILT = ROOT / "build" / "firmware"
+OUT = ROOT / "build" / "emulate"
+RELEASE = "2026.08"  #: the one that the board was written for
+#: functions of drivers, whose place the board's take
+WRAPPED = (
+    "SystemInit", "usecTimerInit", "usecTimestamp", "uartslkInit", "uartslkTest",
+    "uartslkGetPacketBlocking", "uartslkSendDataDmaBlocking", "uart2Init", "uart2GetData", "uart2GetDataWithTimeout",
+    "uart2SendData", "eepromInit", "eepromTest", "eepromTestConnection", "eepromReadBuffer", "eepromWriteBuffer",
+    "bmi088_gyro_init", "bmi088_accel_init", "bmi088_set_gyro_power_mode", "bmi088_set_gyro_meas_conf",
+    "bmi088_set_gyro_int_config", "bmi088_accel_switch_control", "bmi088_set_accel_power_mode",
+    "bmi088_set_accel_meas_conf", "bmi088_perform_gyro_selftest", "bmi088_get_gyro_data", "bmi088_get_accel_data",
+    "bmp3_init", "bmp3_set_sensor_settings", "bmp3_set_op_mode", "bmp3_get_sensor_data", "pmw3901Init",
+    "pmw3901ReadMotion", "vl53l1xInit", "VL53L1_StopMeasurement", "VL53L1_StartMeasurement", "VL53L1_SetDistanceMode",
+    "VL53L1_SetMeasurementTimingBudgetMicroSeconds", "VL53L1_GetMeasurementDataReady",
+    "VL53L1_GetRangingMeasurementData", "consolePutchar", "assertFail", "storeAssertTextData",
+    "storeAssertHardfaultData", "appMain", "vTaskDelayUntil", "xTaskIncrementTick")
+#: functions of hardware that is not there, which do nothing and return 0
+LEFT_OUT = ("i2cdevInit", "i2cdevRead", "i2cdevReadReg8", "i2cdevReadReg16", "i2cdevWrite", "i2cdevWriteReg8", "i2cdevWriteReg16",
+            "usblinkInit", "adcInit", "buzzerInit", "watchdogInit")
+CORE = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+OWN, BOARDS, PAGE = 0x1FFF7000, 0x08001000, 0x1000  #: where the STM32 keeps its type, number and size, and board.ld does
+
+
+def tools() -> None:
+    """AirTouchError where the compiler or QEMU is missing."""
+    for tool, package in (("arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
+                          ("qemu-system-arm", "qemu-system-arm")):
+        if shutil.which(tool) is None:
+            raise AirTouchError(f"no {tool}: apt-get install {package}")
+
+
+def release(base: Path) -> str:
+    """The release of a checkout, by its tag; "unknown" where git cannot say."""
+    run = subprocess.run(["git", "-C", base, "describe", "--tags", "--always"], capture_output=True, text=True)
+    return run.stdout.strip() or "unknown"
+
+
+def compile_firmware(base: Path, config: str = "app-config") -> str:
+    """`make firmware` of this checkout; what it printed."""
+    found = release(base) if (base / ".git").exists() else "unknown"
+    if (base / "tools/make/oot.mk").is_file() and found.split("-")[0] != RELEASE:
+        raise AirTouchError(f"{base} is {found}, the board is written for {RELEASE}: git -C {base} checkout {RELEASE}")
+    run = subprocess.run(["make", "-C", ROOT, "--no-print-directory", "firmware", f"CRAZYFLIE_BASE={base}",
+                          f"CONFIG={config}"], capture_output=True, text=True)
+    if run.returncode:
+        said = [line for line in run.stderr.splitlines() if line.startswith("make firmware: ")]
+        raise AirTouchError(said[0] if said else run.stderr[-2000:])
+    return run.stdout
+
+
+def _flags() -> tuple[list[str], Path]:
+    """How the firmware compiled the app, less what belongs to that file; the checkout."""
+    command = (BUILT / "firmware/app/src/.airtouch_app.o.cmd").read_text().splitlines()[0].split(":=", 1)[1].split()
+    kept = [word for word in command[1:] if re.match(r"-[IDmf]", word) and "KBUILD_" not in word]
+    base = next(word[2:] for word in kept if word.endswith("/src/config"))
+    return kept, Path(base).parents[1]
+
+
+def _objects() -> list[Path]:
+    """The objects of the firmware's last link, each for itself: what was joined to built-in.o on the way is taken apart,
+    since a name that is defined in the same object cannot be replaced."""
+    where = BUILT / "firmware/app/build"
+
+    def parts(path: Path) -> list[Path]:
+        if path.name not in ("built-in.o", "firmware"):
+            return [path]
+        text = (path.parent / f".{path.name}.cmd").read_text().splitlines()[0].split(":=", 1)[1]
+        inner = [where / word for word in text.split(" -o ")[0 if path.name == "firmware" else 1].split()
+                 if word.endswith(".o")] if " -o " in text else []
+        return [part for child in inner if child != path for part in parts(child)]
+
+    return parts(where / "firmware")
+
+
+def link() -> Path:
+    """The image, from the last `make firmware`."""
+    flags, base = _flags()
+    OUT.mkdir(parents=True, exist_ok=True)
+    here = Path(__file__).parent
+    nothing = OUT / "left_out.c"
+    nothing.write_text("".join(f"int __wrap_{name}(void) {{ return 0; }}\n" for name in LEFT_OUT))
+    for source in (here / "board.c", nothing):
+        _run("arm-none-eabi-gcc", *flags, "-std=gnu11", "-O2", "-g", "-Wall", "-Werror", "-c", source,
+             "-o", OUT / f"{source.stem}.o")
+    elf = OUT / "board.elf"
+    wraps = [f"-Wl,--wrap={name}" for name in (*WRAPPED, *LEFT_OUT)]
+    listed = OUT / "objects"
+    listed.write_text("\n".join(f'"{path}"' for path in [OUT / "board.o", OUT / "left_out.o", *_objects()]))
+    _run("arm-none-eabi-gcc", *CORE, "--specs=nosys.specs", "--specs=nano.specs", "-nostdlib", "-z", "noexecstack",
+         "-Wl,--gc-sections,--undefined=uxTopUsedPriority,--undefined=boot", f"-L{base}/tools/make/F405/linker",
+         "-T", here / "board.ld", *wraps, f"@{listed}", "-lm", "-o", elf)
+    _own_number(elf)
+    return elf
+
+
+def _own_number(elf: Path) -> None:
+    """Let every word that points to where the STM32 keeps its number point to the board's."""
+    data = bytearray(elf.read_bytes())
+    words = np.frombuffer(data, "<u4", len(data) // 4)
+    own = (words >= OWN) & (words < OWN + PAGE)
+    if not own.any():
+        raise AirTouchError("the image does not read the processor's number: is it of another release?")
+    words[own] += np.uint32(BOARDS - OWN & 0xFFFFFFFF)
+    elf.write_bytes(data)
+
+
+def _run(*command: object) -> None:
+    run = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+    if run.returncode:
+        raise AirTouchError(f"{command[0]}: {run.stderr[-3000:]}")
