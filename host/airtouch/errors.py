@@ -1,5 +1,8 @@
 """The one exception that users see, and text from files made fit for its message."""
 
+import difflib
+from collections.abc import Iterable
+
 
 class AirTouchError(ValueError):
     """Bad input, said in one line: the file, the place in it and the remedy.
@@ -12,3 +15,9 @@ def shown(text: str, most: int = 40) -> str:
     """At most `most` characters of a text that a file brought with it, unprintable ones as escapes."""
     short = text if len(text) <= most else text[:most - 3] + "..."
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in short)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """`; did you mean a or b?` for the known names that are close to one that is not, "" where none is."""
+    close = difflib.get_close_matches(name.lower(), list(dict.fromkeys(known)), 3)
+    return f"; did you mean {' or '.join(close)}?" if close else ""

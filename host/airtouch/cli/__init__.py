@@ -6,7 +6,7 @@ import sys
 import click
 
 from airtouch import __version__
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, nearest
 
 #: command -> (module in this package, one line of help)
 COMMANDS = {
@@ -31,7 +31,16 @@ COMMANDS = {
 }
 
 
-class LazyGroup(click.Group):
+class Suggesting(click.Group):
+    """A group that names the nearest commands of a name that it does not know."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
+            ctx.fail(f"No such command {args[0]!r}{nearest(args[0], self.list_commands(ctx))}.")
+        return super().resolve_command(ctx, args)
+
+
+class LazyGroup(Suggesting):
     """A group whose commands are imported when they are asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:

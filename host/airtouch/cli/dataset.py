@@ -9,7 +9,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs import public
 
 
-@click.group("dataset")
+@click.group("dataset", cls=Suggesting)
 def command() -> None:
     """Public flights to train and score on."""
 

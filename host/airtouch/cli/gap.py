@@ -10,11 +10,11 @@ import click
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait for one another: products are small
 
-from airtouch.cli import scores
+from airtouch.cli import Suggesting, scores
 from airtouch.errors import AirTouchError
 
 
-@click.group("gap")
+@click.group("gap", cls=Suggesting)
 def command() -> None:
     """Diagnose the gap between recorded flights and the simulator."""
 
@@ -76,9 +76,10 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     if json_path:
         scores.write_json(json_path, found.plain(), force)
     if report:
+        from airtouch.gap import pictures
         from airtouch.report import gap_report
 
-        gap_report.write_measurement(report, found, flights, vehicle, force=force,
+        gap_report.write_measurement(report, found, pictures.of_measurement(found, flights, vehicle), force=force,
                                      command=_line("measure", real, baseline, vehicle_name))
     gap_show.measurement(scores.console(), found)
     gap_show.left_out(found.left_out)
@@ -121,14 +122,13 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         if not logs:
             raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
         with gap_show.Bar() as bar:
-            found = case(logs, progress=bar)
+            found = case(logs, progress=bar, pictures=bool(report))
         if json_path:
             scores.write_json(json_path, found.plain(), force)
         if report:
             from airtouch.report import gap_report
 
-            gap_report.write_diagnosis(report, found, logs, vehicle, list(nominal),
-                                       command=_line("diagnose", real, baseline, vehicle_name), force=force)
+            gap_report.write_diagnosis(report, found, command=_line("diagnose", real, baseline, vehicle_name), force=force)
         gap_show.diagnosis(scores.console(), found)
     gap_show.left_out([*flights.failed.values(), *nominal.failed.values()])
     _written(json_path, report)
@@ -180,12 +180,12 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
 
 def _alone(case: Callable, log: Any) -> Any:
     try:
-        return replace(case([log]), held=None)  # which need not travel
+        return replace(case([log]), held=None, map=None)  # which need not travel
     except AirTouchError as error:
         return str(error)
 
 
-@command.group("blind")
+@command.group("blind", cls=Suggesting)
 def blind() -> None:
     """Sealed sets of flights whose effect is withheld: make them, score a diagnosis of them."""
 

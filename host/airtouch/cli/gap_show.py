@@ -81,26 +81,27 @@ def measurement(screen: Console, found: Measurement) -> None:
 
 def diagnosis(screen: Console, found: Diagnosis) -> None:
     """What `diagnose` says: sentence, effects, ranking, where, advice."""
-    screen.print(words.answer(found))
+    for sentence in words.sentences(found):
+        screen.print(sentence)
     for effect in found.effects:
         screen.print("  " + words.effect_in_words(effect))
     table = Table(title="Ranking", title_justify="left", caption_justify="left",
                   caption="shrink: part of the gap above the floor that goes away on data held out, 90 %")
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
+    table.add_column("why it is not the answer", ratio=1)
     for r in [r for i, r in enumerate(found.ranking) if i < 8 or r.name in ("none", "unknown")]:
-        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"))
+        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"), r.why)
     screen.print(table)
     for group in found.indistinguishable:
         screen.print(f"cannot be told apart here: {', '.join(group)}")
     if found.where:
         screen.print(cells(found.where, "Where"))
     remarks(screen, "What stays open", [words.open_in_words(u) for u in found.unexplained])
-    if found.unexplained and found.unexplained[0]["nearest"]:
-        remarks(screen, "Nearest effects", [f"{n['name'].replace('_', ' ')}: {n['fails']}"
-                                            for n in found.unexplained[0]["nearest"]])
-    if found.advice:
-        screen.print(f"advice: {found.advice}")
+    if found.unexplained:
+        remarks(screen, "Nearest effects", words.nearest_in_words(found.unexplained[0]))
+    remarks(screen, "Next", [s.text + (f" (host/docs/effects.md, {s.page!r})" if s.page else "")
+                             + (f"\n      {s.command}" if s.command else "") for s in found.next])
     remarks(screen, "What these logs cannot say", found.cannot)
     remarks(screen, "Notes", found.notes)
 

@@ -20,7 +20,7 @@ GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range":
           "position": "x_m", "velocity": "vx_mps", "attitude": "roll_rad", "rpm": "rpm_1"}
 
 
-@click.group(name="logs")
+@click.group(name="logs", cls=Suggesting)
 def command() -> None:
     """Look at, check and convert flight logs.
 

@@ -1,15 +1,16 @@
 """The diagnosis of flights without a gyro, from the balance of the motors in hover (`hover_balance`)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from airtouch.gap import advice as advices
-from airtouch.gap import measure
+from airtouch.gap import calibrate, measure, summary
+from airtouch.gap import pictures as picture
 from airtouch.gap.candidates import twins_of
 from airtouch.gap.flight import Flight
 from airtouch.gap.hover_balance import Hypothesis, Reference, evidence, hypotheses, pattern, reference
-from airtouch.gap.result import Cell, Diagnosis, Found, Quantity, Ranked
+from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked
 from airtouch.simulation.effects import get
 from airtouch.vehicle import Vehicle
 
@@ -23,7 +24,7 @@ def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehic
 
 
 def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle,
-              notes: Sequence[str] = (), without: Iterable[str] = ()) -> Diagnosis:
+              notes: Sequence[str] = (), without: Iterable[str] = (), pictures: bool = False) -> Diagnosis:
     """Which of the hypotheses of `hover_balance` the flights' mean pattern fits best."""
     left_out = set(without)
     every = [h for h in hypotheses(vehicle) if not left_out & {h.name, *(name for name, _ in h.effects)}]
@@ -44,8 +45,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         first = "com_offset"
     best = {n: max((i for i, h in enumerate(every) if h.name == n), key=logs.__getitem__) for n in names}
     share = {n: _shrink(seen, base, every[i], weights[i]) for n, i in best.items()}
-    ranking = sorted((Ranked(n, total[n], share[n][1]) for n in names),
-                     key=lambda r: (r.name != first, -r.probability))
+    ranking = _ranking(names, first, total, family, {n: s[1] for n, s in share.items()})
     verdict = first if first in ("none", "unknown") else "effect"
     effects = _found(every[best[first]], weights[best[first]]) if verdict == "effect" else ()
     cells = _cells(seen, base, vehicle, every[best[first]], weights[best[first]], len(flights))
@@ -64,12 +64,32 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
             "leave both as they are were not tried", *notes]
     if not voltage:
         said.append("no battery voltage in some flights: their lift may differ for that alone")
+    alike = list(dict.fromkeys(alike))
+    headline = summary.headline(cells, bool(effects))
+    made = GapMap(cells, BASELINE, tuple(f.name for f in flights))
+    steps = advices.steps(verdict, effects, alike, headline, flights, True, vehicle.name)
+    study = calibrate.declared(vehicle, ())
     return Diagnosis(
-        verdict, tuple(effects), tuple(ranking), tuple(dict.fromkeys(alike)), cells,
+        verdict, tuple(effects), tuple(ranking), tuple(alike), cells,
         {"before": before, "after": after if verdict == "effect" else before, "floor": 1.0},
         share[first][1] if verdict == "effect" else None, control,
-        advices.advice(verdict, [e.name for e in effects], alike, cells, flights, True), {}, tuple(said),
-        measure.cannot_of([f.cannot for f in flights]), tuple(f.name for f in flights))
+        advices.advice(steps), {}, tuple(said), measure.cannot_of([f.cannot for f in flights]),
+        tuple(f.name for f in flights), (), made, headline, steps, vehicle.name, tuple(f.name for f in nominal), {},
+        picture.of(study, flights, nominal, [], headline, cells) if pictures else None)
+
+
+def _ranking(names: Sequence[str], first: str, total: Mapping[str, float], family: Mapping[str, float],
+             share: Mapping[str, Quantity]) -> list[Ranked]:
+    """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
+    chance = dict(total)
+    weight = "com_offset" if first == "mass" else "mass"
+    if first in ("mass", "com_offset") and weight in chance:
+        chance[first], chance[weight] = chance[first] + chance[weight], 0.0
+    why = {weight: f"counted with {first}: a weight, whether its own mass shows or not"} if chance.get(weight) == 0.0 else {}
+    best = max(chance.values())
+    return sorted((Ranked(n, chance[n], share[n],
+                          "" if n == first else why.get(n, f"{best / max(chance[n], 1e-12):.3g} times less probable than {first}"))
+                   for n in names), key=lambda r: (r.name != first, -r.probability))
 
 
 def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis,

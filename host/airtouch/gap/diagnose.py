@@ -1,13 +1,14 @@
 """Where, which, how far: the whole diagnosis of some flights."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import advice as advices
-from airtouch.gap import balance_result, calibrate, candidates, measure
+from airtouch.gap import balance_result, calibrate, candidates, measure, summary
+from airtouch.gap import pictures as picture
 from airtouch.gap.candidates import CLOCK, Term
 from airtouch.gap.data import Data, Study
 from airtouch.gap.fit import fit, strength_variance
@@ -19,7 +20,7 @@ from airtouch.gap.select import FIRST_GAIN, Judged, Selection, halves, probabili
 from airtouch.gap.shrink import Shrink, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.gap.twin import Twin
-from airtouch.gap.unexplained import unexplained
+from airtouch.gap.unexplained import unexplained, why_not
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
@@ -33,13 +34,15 @@ WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bia
 
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
-             progress: Callable[[str], None] | None = None, without: Iterable[str] = ()) -> Diagnosis:
+             progress: Callable[[str], None] | None = None, without: Iterable[str] = (),
+             pictures: bool = False) -> Diagnosis:
     """Name the unmodelled effect that the flights have in common and how much of the gap it is.
 
     flights: one or more; what they share is looked for. baseline: flights declared free of
     unmodelled effects, on which the vehicle is calibrated and the floor is measured; without
     them the floor is the sensors' declared noise and the twin view is left out. without:
-    names of effects to leave out. Raises AirTouchError when no flight can be used.
+    names of effects to leave out. pictures: whether to keep the curves that a report shows. Raises
+    AirTouchError when no flight can be used.
     """
     say = progress or (lambda _: None)
     left_out: list[str] = []
@@ -48,18 +51,19 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if not seen:
         raise AirTouchError(left_out[-1] if left_out else "no flight to diagnose")
     if balance_result.applies(seen, nominal, vehicle):
-        return balance_result.diagnosis(seen, nominal, vehicle, left_out, without)
+        return balance_result.diagnosis(seen, nominal, vehicle, left_out, without, pictures)
     say("calibration")
     study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = _data(study, some)
     found = select(data, candidates.every(without), say, tuple(without))
     say("how far")
-    ranking, overall = _ranking(data, found)
-    effects = _effects(data, found)
-    verdict = _verdict(found, overall.before)
-    named = [candidates.term_of(e) for e in effects] if verdict == "effect" else []
-    cells = where(gap_map(study, seen, nominal, named))
+    ranking, overall, verdict = _ranking(data, found)
+    effects = _effects(data, found) if verdict == "effect" else []
+    named = [candidates.term_of(e) for e in effects]
+    made = gap_map(study, seen, nominal, named)
+    first = summary.headline(made.cells, bool(named))
+    cells = tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(made)))
     alike = _alike(found)
     notes = [n for f in seen for n in f.notes] + left_out
     notes += list(fitted.notes) if fitted else [NO_BASELINE]
@@ -67,15 +71,17 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
     control = _control(data, found) if verdict == "effect" else {}
+    steps = advices.steps(verdict, effects, alike, first, seen, bool(nominal), vehicle.name)
     return Diagnosis(
-        verdict, tuple(effects) if verdict == "effect" else (), tuple(ranking), alike, tuple(cells),
+        verdict, tuple(effects), tuple(ranking), alike, cells,
         {"before": overall.before, "after": overall.after if verdict == "effect" else overall.before,
          "floor": 1.0},
-        overall.share if verdict == "effect" else None, control,
-        advices.advice(verdict, [e.name for e in effects], alike, cells, seen, bool(nominal)),
+        overall.share if verdict == "effect" else None, control, advices.advice(steps),
         _arms(vehicle, nominal, some, found, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
         measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen),
-        tuple(unexplained(study, some, found, cells)) if verdict == "unknown" else (), (study, fitted))
+        tuple(unexplained(study, some, found, cells)) if verdict == "unknown" else (), made, first, steps, vehicle.name,
+        tuple(f.name for f in nominal), fitted.parameters if fitted else {},
+        picture.of(study, seen, nominal, named, first, cells) if pictures else None, (study, fitted))
 
 
 def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
@@ -85,8 +91,7 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     """
     data = _data(study, flights) if data is None else data
     found = select(data, candidates.every(without), without=tuple(without))
-    ranking, overall = _ranking(data, found)
-    verdict = _verdict(found, overall.before)
+    ranking, overall, verdict = _ranking(data, found)
     named = verdict == "effect"
     return Diagnosis(
         verdict, tuple(_effects(data, found)) if named else (), tuple(ranking), _alike(found), (),
@@ -144,7 +149,8 @@ def _effects(data: Data, found: Selection) -> list[Found]:
         x = t.scaled(t.values)
         n = sum(len(f) for f in data.flights)
         out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
-    return out
+    order = {s.name: i for i, s in reversed(list(enumerate(found.named)))}
+    return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
 
 
 def _with_random_part(effect: Found, part: Term) -> Found:
@@ -188,21 +194,36 @@ def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray
     return covariance + apart + doubt
 
 
-def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink]:
-    """Every candidate with probability and shrink, best first; and the shrink of what was chosen."""
+def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink, str]:
+    """Every candidate with probability and shrink, best first; the shrink of what was chosen; the verdict."""
     parts = found.parts
     overall = shrink_of(data, parts, found.chosen)
-    chance = probabilities(found, found.chosen is None and overall.before <= AT_FLOOR)
+    verdict = _verdict(found, overall.before)
+    answer = found.named[0].name if verdict == "effect" else verdict
+    chance = agreeing(probabilities(found, found.chosen is None and overall.before <= AT_FLOOR), answer)
     out = []
     for name, p in chance.items():
         one = found.singles.get(name)
         share = Quantity(0.0)
-        if one is not None and one.full and one.gain > FIRST_GAIN:
+        if name == answer and found.chosen is not None and len(found.named) == 1:
+            share = overall.share
+        elif one is not None and one.full and one.gain > FIRST_GAIN:
             share = shrink_of(data, parts, one).share
-        out.append(Ranked(name, float(p), share))
+        out.append(Ranked(name, float(p), share, why_not(found, name, verdict)))
     order = {n: j.gain for n, j in found.singles.items()}
-    out.sort(key=lambda r: (-r.probability, -order.get(r.name, 0.0)))
-    return out, overall
+    out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
+    return out, overall, verdict
+
+
+def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
+    """The probabilities with the answer's at least as large as any other: it changes places with a larger one.
+
+    The verdict weighs what the ranking of single candidates does not, as effects that come and go.
+    """
+    out = {answer: 0.0, **chance}
+    best = max(out, key=out.__getitem__)
+    out[answer], out[best] = out[best], out[answer]
+    return out
 
 
 def _alike(found: Selection) -> tuple[tuple[str, ...], ...]:

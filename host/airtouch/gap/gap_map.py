@@ -19,12 +19,11 @@ from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.data import Data, Study
 from airtouch.gap.flight import GROUND, Flight
-from airtouch.gap.result import Cell
+from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.spectra import frequencies
 from airtouch.logs.segments import KINDS
 
 LEAST_SHARE = 0.05  #: an effect that takes less of a cell's gap is not its cause
-BASELINE, SPREAD = "baseline flights", "sensor noise and how these flights differ among themselves"
 
 CHANNEL_WORDS = {
     "force_x": "forward force", "force_y": "sideways force", "force_z": "lift",
@@ -35,15 +34,6 @@ CHANNEL_WORDS = {
 }
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
                "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
-
-
-@dataclass(frozen=True)
-class GapMap:
-    """Every cell with data, and where the floor is from: BASELINE or SPREAD."""
-
-    cells: tuple[Cell, ...]
-    floor_from: str
-    flights: tuple[str, ...]
 
 
 @dataclass(frozen=True)

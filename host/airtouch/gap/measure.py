@@ -2,21 +2,21 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap import calibrate, twin
+from airtouch.gap import calibrate, summary, twin
 from airtouch.gap.channels import residual
 from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, Flight, ready
 from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of,
                                    where)
 from airtouch.gap.motion import held
-from airtouch.gap.result import Cell, Quantity, rounded
+from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.logs.flight_log import RPM, FlightLog
 from airtouch.simulation import replay
 from airtouch.vehicle import Vehicle
@@ -62,11 +62,6 @@ class Measurement:
             "rotors": [dict(r) for r in self.rotors], "spectra": dict(self.spectra),
             "map": [plain_cell(c) for c in self.map.cells],
         })
-
-
-def plain_cell(cell: Cell) -> dict[str, Any]:
-    """A cell without the fields that it does not have."""
-    return {k: v for k, v in asdict(cell).items() if v is not None}
 
 
 @dataclass(frozen=True)
@@ -116,8 +111,9 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     if len(maps) > 1:
         gap["calibrated"] = overall(maps[1].cells)
     notes += [f"{h.parts[0].name}: {n}" for h in found for n in h.notes]
+    first = summary.headline(maps[0].cells)
     return Measurement(
-        vehicle.name, maps[0], tuple(where(maps[0])), gap, maps[0].flights,
+        vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap, maps[0].flights,
         tuple(f.name for f in nominal), fitted.parameters if fitted else {},
         _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]),
         _rotors([h.speeds for h in found]), tuple(notes),

@@ -34,11 +34,16 @@ class Found:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate: its probability and the share of the gap that it takes away on held-out data."""
+    """A candidate: its probability, the share of the gap that it takes away on held-out data, and why it is not the answer."""
 
     name: str
     probability: float
     shrink: Quantity
+    why: str = ""
+
+    def plain(self) -> dict[str, Any]:
+        why = {"why": self.why} if self.why else {}
+        return {"name": self.name, "probability": self.probability, "shrink": self.shrink.plain(), **why}
 
 
 @dataclass(frozen=True)
@@ -65,12 +70,37 @@ class Cell:
     by: str | None = None  #: of the named effects the one that alone takes most from it
 
 
+BASELINE, SPREAD = "baseline flights", "sensor noise and how these flights differ among themselves"
+
+
+@dataclass(frozen=True)
+class GapMap:
+    """Every cell with data, and where the floor is from: BASELINE or SPREAD."""
+
+    cells: tuple[Cell, ...]
+    floor_from: str
+    flights: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What to do next: a sentence, the command that does it, the heading of a page that says how; "" where there is none."""
+
+    text: str
+    command: str = ""
+    page: str = ""
+
+    def plain(self) -> dict[str, str]:
+        return {k: v for k, v in asdict(self).items() if v}
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """verdict "effect", "none" or "unknown"; gap: {"before", "after", "floor"} as rms over the floor's
 
     unit (dimensionless, floor 1 per bin), judged on held-out blocks; control: the same with
     a deliberately wrong effect; arms: shrink with the vehicle as declared and as calibrated.
+    Terminal, report and JSON show this and compute nothing of their own.
     """
 
     verdict: str
@@ -87,7 +117,21 @@ class Diagnosis:
     cannot: tuple[str, ...] = ()
     flights: tuple[str, ...] = ()
     unexplained: tuple[Mapping[str, Any], ...] = ()  #: what no named effect explains, largest first
-    held: Any = field(default=None, repr=False, compare=False)  #: study and calibration, for the report alone
+    map: GapMap | None = None  #: every cell, of which `where` has the largest
+    headline: Cell | None = None  #: the cell that the answer speaks of
+    next: tuple[Step, ...] = ()  #: what to do next; `advice` is their text
+    vehicle: str = ""
+    baseline: tuple[str, ...] = ()
+    calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
+    pictures: Any = field(default=None, repr=False, compare=False)  #: `gap.pictures.Pictures`, where they were asked for
+    held: Any = field(default=None, repr=False, compare=False)  #: study and calibration, to diagnose further flights alike
+
+    def __post_init__(self) -> None:
+        """Verdict, effects and ranking say one thing: ValueError where they do not."""
+        named = [e.name for e in self.effects]
+        answer = (named or ["effect"])[0] if self.verdict == "effect" else self.verdict
+        if self.ranking and (answer != self.ranking[0].name or bool(named) != (self.verdict == "effect")):
+            raise ValueError(f"the ranking begins with {self.ranking[0].name}, the verdict is {self.verdict} {named}")
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, GAP.md's fields and more; floats rounded to six digits."""
@@ -96,16 +140,24 @@ class Diagnosis:
             "effects": [{"name": e.name, "parameters": {k: q.plain() for k, q in e.parameters.items()},
                          **({"seconds": [{"flight": f, "from_s": a, "to_s": b} for f, a, b in e.seconds]}
                             if e.seconds else {})} for e in self.effects],
-            "ranking": [{"name": r.name, "probability": r.probability, "shrink": r.shrink.plain()}
-                        for r in self.ranking],
+            "ranking": [r.plain() for r in self.ranking],
             "indistinguishable": [list(g) for g in self.indistinguishable],
-            "where": [{k: v for k, v in asdict(c).items() if v is not None} for c in self.where],
+            "where": [plain_cell(c) for c in self.where],
             "gap": dict(self.gap), "shrink": self.shrink.plain() if self.shrink else None,
             "control": dict(self.control), "advice": self.advice, "arms": dict(self.arms),
             "notes": list(self.notes), "cannot": list(self.cannot), "flights": list(self.flights),
-            "unexplained": [dict(u) for u in self.unexplained],
+            "unexplained": [dict(u) for u in self.unexplained], "next": [s.plain() for s in self.next],
+            "headline": plain_cell(self.headline) if self.headline else None, "vehicle": self.vehicle,
+            "baseline": list(self.baseline), "calibration": {k: q.plain() for k, q in self.calibration.items()},
+            "floor_from": self.map.floor_from if self.map else None,
+            "map": [plain_cell(c) for c in self.map.cells] if self.map else [],
         }
         return rounded(made)
+
+
+def plain_cell(cell: Cell) -> dict[str, Any]:
+    """A cell without the fields that it does not have."""
+    return {k: v for k, v in asdict(cell).items() if v is not None}
 
 
 def rounded(value: Any) -> Any:

@@ -12,7 +12,7 @@ from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.motion import held
 from airtouch.gap.result import Cell
-from airtouch.gap.select import Selection
+from airtouch.gap.select import Judged, Selection
 from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.simulation import signals as at
 
@@ -52,22 +52,39 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
 def nearest(selection: Selection) -> list[dict[str, str]]:
     """The effects that gain most and were not named, each with what speaks against it."""
     named = {t.name for t in selection.chosen.terms} if selection.chosen else set()
-    held_by = selection.chosen.gain if selection.chosen else 0.0
     others = sorted((j for n, j in selection.singles.items() if n not in named and j.gain > 0.0), key=lambda j: -j.gain)
-    out = []
-    for j in others[:NEAREST]:
-        least = selection.least[j.name]
-        if j.gain < least:
-            why = f"held-out data gain {j.gain:.1f} nats by it, {least:.0f} are needed"
-        elif j.evidence < least:
-            why = (f"as strong as it often seems to be in nominal flights: {j.gain:.0f} nats, of which "
-                   f"{max(j.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
-        elif selection.chosen:
-            why = f"gains {j.gain:.0f} nats, the effects named {held_by:.0f}"
-        else:
-            why = f"gains {j.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
-        out.append({"name": j.name, "fails": why})
-    return out
+    return [{"name": j.name, "fails": fails(selection, j)} for j in others[:NEAREST]]
+
+
+def fails(selection: Selection, judged: Judged) -> str:
+    """Why a candidate was not named, in nats of held-out log likelihood."""
+    least = selection.least[judged.name]
+    if judged.gain < least:
+        return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
+    if judged.evidence < least:
+        return (f"as strong as it often seems to be in nominal flights: {judged.gain:.0f} nats, of which "
+                f"{max(judged.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+    if selection.chosen:
+        return f"gains {judged.gain:.0f} nats, the effects named {selection.chosen.gain:.0f}"
+    return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+
+
+def why_not(selection: Selection, name: str, verdict: str) -> str:
+    """Why a candidate of the ranking is not the answer, "" for the answer."""
+    first = selection.named[0].name if selection.named else ""
+    step = next((s for s in selection.named[1:] if s.name == name), None)
+    if name == verdict or (verdict == "effect" and name == first):
+        return ""
+    if step is not None and verdict == "effect":
+        before = selection.steps[selection.steps.index(step) - 1].gain
+        return f"named beside {first}: adds {step.gain - before:.0f} nats to it; the probability is that it acts alone"
+    if name == "unknown":
+        return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} may be left"
+                if selection.explained else "the gap as a whole is at its floor")
+    if name == "none":
+        return (f"{first} gains {selection.chosen.gain:.0f} nats over it" if selection.chosen else
+                f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be left")
+    return fails(selection, selection.singles[name])
 
 
 def _over(study: Study, flight: Flight, active: Sequence[Any], cell: Cell) -> np.ndarray:

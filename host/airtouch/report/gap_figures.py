@@ -9,10 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from airtouch.gap.band_sums import BANDS_HZ, filtered, stretches
-from airtouch.gap.channels import CHANNELS, TORQUE
-from airtouch.gap.flight import PERIOD_S, Flight
 from airtouch.gap.gap_map import CHANNEL_WORDS
+from airtouch.gap.pictures import Signal, Spectrum
 from airtouch.logs.segments import KINDS
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE
 
@@ -23,55 +21,45 @@ WIDTH_IN = 4.4  #: a phone's width at a readable size
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
 
-def signals(flight: Flight, channel: str, band: int, before: np.ndarray, after: np.ndarray | None,
-            floor: float) -> bytes:
-    """One channel of one flight: measured and modelled above, what is left below, up to the band's end.
-
-    before, after (n, COUNT): the gap without and with the effects in the model.
-    """
-    c = next(i for i, ch in enumerate(CHANNELS) if ch.name == channel)
-    t = np.arange(len(flight)) * PERIOD_S
-    measured = _measured(flight, c)
-    rows = 1 if measured is None else 2
+def signals(made: Signal) -> bytes:
+    """One channel of one flight: measured and modelled above, what is left below, up to the band's end."""
+    rows = 1 if made.measured is None else 2
     with style():
         figure = Figure(figsize=(WIDTH_IN, 2.0 * rows + 0.8), layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-        left = _below(flight, before[:, c], band)
-        then = None if after is None else _below(flight, after[:, c], band)
-        if measured is not None:
-            said = _below(flight, measured, band)
-            axes[0].plot(t, said, color="black", lw=1.0, label="measured")
-            axes[0].plot(t, said - left, color=BEFORE, lw=1.0, label="model")
-            if then is not None:
-                axes[0].plot(t, said - then, color=AFTER, lw=1.0, label="model with effect")
-            axes[0].set_ylabel(f"{CHANNEL_WORDS[channel]}\n{CHANNELS[c].unit}")
-            _robust(axes[0], said, said - left)
-        axes[-1].axhspan(-floor, floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
-        axes[-1].plot(t, left, color=BEFORE, lw=1.0, label="gap before")
-        if then is not None:
-            axes[-1].plot(t, then, color=AFTER, lw=1.0, label="gap after")
-        axes[-1].set(ylabel=f"measured - model\n{CHANNELS[c].unit}", xlabel="time, s")
-        _robust(axes[-1], left, np.array([-floor, floor]))
+        if made.measured is not None:
+            axes[0].plot(made.time_s, made.measured, color="black", lw=1.0, label="measured")
+            axes[0].plot(made.time_s, made.measured - made.before, color=BEFORE, lw=1.0, label="model")
+            if made.after is not None:
+                axes[0].plot(made.time_s, made.measured - made.after, color=AFTER, lw=1.0, label="model with effect")
+            axes[0].set_ylabel(f"{CHANNEL_WORDS[made.channel]}\n{made.unit}")
+            _robust(axes[0], made.measured, made.measured - made.before)
+        axes[-1].axhspan(-made.floor, made.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
+        axes[-1].plot(made.time_s, made.before, color=BEFORE, lw=1.0, label="gap before")
+        if made.after is not None:
+            axes[-1].plot(made.time_s, made.after, color=AFTER, lw=1.0, label="gap after")
+        axes[-1].set(ylabel=f"measured - model\n{made.unit}", xlabel="time, s")
+        _robust(axes[-1], made.before, np.array([-made.floor, made.floor]))
         for ax in axes:
-            _phases(ax, flight.phase)
+            _phases(ax, made.time_s, made.phase)
             ax.margins(x=0)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
         return _png(figure)
 
 
-def spectra(frequency_hz: np.ndarray, shown: Sequence[Mapping[str, Any]]) -> bytes:
-    """Spectra of the gap: for each shown channel `before`, `floor` and, where there is one, `after`, PSD."""
+def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
+    """Spectra of the gap: for each shown channel before, floor and, where there is one, after."""
     rows = len(shown)
     with style():
         figure = Figure(figsize=(WIDTH_IN, 1.75 * rows + 0.6), layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
         for ax, some in zip(axes, shown, strict=True):
             for key, colour, width in (("floor", FLOOR, 1.6), ("before", BEFORE, 1.3), ("after", AFTER, 1.3)):
-                if some.get(key) is not None:
-                    ax.loglog(frequency_hz[1:], np.maximum(some[key][1:], 1e-12), color=colour, lw=width,
+                if getattr(some, key) is not None:
+                    ax.loglog(frequency_hz[1:], np.maximum(getattr(some, key)[1:], 1e-12), color=colour, lw=width,
                               label=key)
-            ax.set_title(CHANNEL_WORDS[some["channel"]], loc="left")
-            ax.set_ylabel(f"({some['unit']})²/Hz")
+            ax.set_title(CHANNEL_WORDS[some.channel], loc="left")
+            ax.set_ylabel(f"({some.unit})²/Hz")
             ax.grid(alpha=0.2)
         _legend(figure, axes[0])
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
@@ -118,34 +106,15 @@ def _frequency_axis(axes: Sequence[Axes], ticks: Sequence[float]) -> None:
     axes[-1].set_xlabel("frequency, Hz")
 
 
-def _below(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
-    """Values up to the end of a band, NaN where nothing is judged."""
-    out = np.full(len(values), np.nan)
-    for start, stop in stretches(flight):
-        here = values[start:stop]
-        if band < len(BANDS_HZ) - 1:
-            here = filtered(np.nan_to_num(here[:, None]))[:max(band, 1) + 1].sum(axis=0)[:, 0]
-        out[start:stop] = here
-    return out
-
-
-def _measured(flight: Flight, channel: int) -> np.ndarray | None:
-    if channel < 3:
-        return flight.acceleration[:, channel]
-    if TORQUE.start <= channel < TORQUE.stop and flight.rates is not None:
-        return np.diff(flight.rates[:, channel - 3], append=flight.rates[-1:, channel - 3]) / PERIOD_S
-    return None
-
-
-def _phases(ax: Axes, phase: np.ndarray) -> None:
+def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
     """Take-off, landing and platforms shaded behind the curves."""
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in zip(bounds[:-1], bounds[1:] - 1, strict=True):
         kind = KINDS[phase[a]]
         if kind in PHASE_COLOURS:
-            ax.axvspan(a * PERIOD_S, b * PERIOD_S, color=PHASE_COLOURS[kind], lw=0, zorder=0)
+            ax.axvspan(time_s[a], time_s[b], color=PHASE_COLOURS[kind], lw=0, zorder=0)
             if b - a > 0.15 * len(phase):
-                ax.text((a + b) / 2 * PERIOD_S, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center",
+                ax.text((time_s[a] + time_s[b]) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center",
                         va="top", fontsize=8, color=MUTED)
 
 

@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from airtouch.gap.band_sums import BANDS_HZ
+from airtouch.gap import summary
 from airtouch.gap.channels import CHANNELS
-from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, GapMap, in_words, ratio, short, significant
+from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, ratio, short, significant
 from airtouch.gap.result import Cell, Diagnosis, Quantity
-from airtouch.gap.words import quantity
-from airtouch.logs.segments import KINDS
+from airtouch.gap.words import quantity, seconds_in_words
 
 #: least ratio to the floor, background, ink
 SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd6b4d", "#ffffff"),
@@ -19,20 +18,44 @@ LEGEND = [(*QUIET, "floor"), *((colour, ink, f"> {least:g}×" if least else "< 1
 MOST_RANKED = 10
 
 
-def maps(made: GapMap) -> list[dict[str, Any]]:
-    """One table for each phase: channels down, bands across."""
-    cells = {(c.phase, c.channel, c.band_hz): c for c in made.cells if c.regime == "all"}
+def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
+    """The frequency bands of the map, lowest first."""
+    return sorted({c.band_hz for c in cells})
+
+
+def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
+    """One table for each phase, that with most energy first: channels down, bands across.
+
+    The first and that of the headline are open, the others folded.
+    """
+    place = {(c.phase, c.channel, c.band_hz): c for c in cells if c.regime == "all"}
+    marked = (headline.phase, headline.channel, headline.band_hz) if headline else None
     out = []
-    for kind in KINDS:
+    for n, phase in enumerate(summary.phases(cells)):
         rows = []
         for channel in CHANNELS:
-            some = [cells.get((kind, channel.name, band)) for band in BANDS_HZ]
+            some = [place.get((phase.name, channel.name, band)) for band in bands(cells)]
             if any(some):
-                rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [c and shaded(c) for c in some]})
-        if rows:
-            words = PHASE_WORDS[kind]
-            out.append({"name": words[0].upper() + words[1:], "rows": rows})
+                rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [
+                    c and {**shaded(c), "headline": (c.phase, c.channel, c.band_hz) == marked} for c in some]})
+        shown = n == 0 or (headline is not None and phase.name == headline.phase)
+        worse = f", {phase.worse} worse than before" if phase.worse else ""
+        out.append({"name": capital(PHASE_WORDS[phase.name]), "rows": rows, "open": shown,
+                    "text": f"{phase.over} of {phase.cells} cells over the floor"
+                            + ("" if phase.after is None else f", {phase.stay} with the effects in the model{worse}")})
     return out
+
+
+def phase_rows(phases: Sequence[summary.Phase]) -> list[dict[str, Any]]:
+    """What the effects change in each phase."""
+    return [{"name": capital(PHASE_WORDS[p.name]), "before": short(p.before),
+             "after": "-" if p.after is None else short(p.after), "over": p.over, "stay": p.stay, "worse": p.worse}
+            for p in phases]
+
+
+def capital(text: str) -> str:
+    """The text with its first letter large."""
+    return text[:1].upper() + text[1:]
 
 
 def shaded(cell: Cell) -> dict[str, str]:
@@ -48,9 +71,9 @@ def shaded(cell: Cell) -> dict[str, str]:
             "title": title, "after": after}
 
 
-def largest_rows(cells: Iterable[Cell]) -> list[dict[str, str]]:
+def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
     """The largest cells in figures."""
-    return [{"words": in_words(c).split(":")[0], "gap": f"{short(c.gap)}",
+    return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": f"{short(c.gap)}",
              "interval": "" if c.low is None else f"{short(c.low)} to {short(c.high)}",
              "after": "-" if c.after is None else f"{short(c.after)}", "floor": f"{short(c.floor)}",
              "unit": c.unit + (f"; {c.by}" if c.by else ""),
@@ -61,7 +84,8 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """The parameters of the effects named."""
     return [{"effect": e.name if i == 0 else "", "parameter": k, "value": f"{q.value:.3g}",
              "interval": "" if q.low is None or q.high is None else f"{q.low:.3g} to {q.high:.3g}",
-             "unit": "" if q.unit == "1" else q.unit}
+             "unit": "" if q.unit == "1" else q.unit, "seconds": "acts " + seconds if i == 0 and (seconds := seconds_in_words(e))
+             else ""}
             for e in diagnosis.effects for i, (k, q) in enumerate(e.parameters.items())]
 
 
@@ -69,7 +93,7 @@ def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The best candidates, and `none` and `unknown` wherever they are."""
     shown = [r for i, r in enumerate(diagnosis.ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
     return [{"name": r.name, "probability": f"{r.probability:.1%}", "width": round(100 * r.probability),
-             "shrink": f"{r.shrink.value:.2f}",
+             "shrink": f"{r.shrink.value:.2f}", "why": r.why,
              "interval": "" if r.shrink.low is None or r.shrink.high is None
              else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in shown]
 
@@ -78,12 +102,13 @@ def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
     """Gap before, after and floor, in both arms and with the wrong effect."""
     keys = ("before", "after", "floor", "shrink")
     sources: list[tuple[str, Mapping[str, Any]]] = []
+    named = ", ".join(e.name for e in diagnosis.effects) or "no effect"
     if diagnosis.gap:
-        named = ", ".join(e.name for e in diagnosis.effects) or "no effect"
         sources.append((named, {**diagnosis.gap, "shrink": diagnosis.shrink}))
     if diagnosis.control:
         sources.append((f"wrong effect: {diagnosis.control.get('name', 'control')}", diagnosis.control))
-    sources += [(f"vehicle {name}", arm) for name, arm in diagnosis.arms.items() if isinstance(arm, Mapping)]
+    sources += [(f"{named}, vehicle as {name}", arm) for name, arm in diagnosis.arms.items()
+                if isinstance(arm, Mapping) and arm.get("shrink") != (diagnosis.shrink.plain() if diagnosis.shrink else None)]
     rows = [{"name": name, "cells": [figure(some.get(k)) for k in keys]} for name, some in sources]
     rows = [r for r in rows if any(v != "-" for v in r["cells"])]
     return {"columns": keys, "rows": rows} if rows else None
@@ -103,8 +128,3 @@ def figure(value: Any) -> str:
 def named(parameters: Mapping[str, Quantity]) -> list[tuple[str, str]]:
     """Calibrated parameters with their intervals."""
     return [(k, quantity(q)) for k, q in parameters.items()]
-
-
-def shown_channels(cells: Sequence[Cell], most: int = 3) -> list[str]:
-    """The channels of the largest cells, each once."""
-    return list(dict.fromkeys(c.channel for c in cells))[:most]

@@ -94,7 +94,7 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
             raise AirTouchError(f"{effect.name} has no parameter {key!r}; it has {', '.join(units)}")
         unit = match.group(2).replace(" ", "")
         expected = units[key].replace(" ", "")
-        if unit != ("" if expected == "1" else expected):
+        if unit not in (("",) if expected == "1" else (expected, expected.removeprefix("1"))):  # 0.3/s is 0.3 1/s
             want = "no unit" if expected == "1" else f"the unit {units[key]}"
             raise AirTouchError(f"{effect.name}: {key}={quantity} needs {want}")
         given[key] = float(match.group(1))

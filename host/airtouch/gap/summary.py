@@ -1,0 +1,131 @@
+"""The map in a few figures: where most of the gap lies, what stays and what got worse, phase by phase.
+
+Everything that is said of a map, in a sentence, a table, the JSON or a picture, comes from here.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.result import Cell
+from airtouch.logs.segments import KINDS
+
+GROUND = "ground"
+WORSE = 1.1  #: times the gap before, from which a cell has become worse
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One phase of the flights: rms over its cells of gap over floor, and how many cells stand out of their floor.
+
+    energy: of all its cells over the floor, in blocks, by which phases are put in order; stay, worse: cells that
+    still stand out, and that got worse, with the named effects in the model.
+    """
+
+    name: str
+    before: float
+    after: float | None
+    cells: int
+    over: int
+    stay: int
+    worse: int
+    energy: float
+
+    def plain(self) -> dict[str, Any]:
+        return {k: v for k, v in asdict(self).items() if v is not None}
+
+
+def over_floor(cell: Cell, value: float | None = None) -> float:
+    """Gap, or another value of the cell, over the upper end of the floor."""
+    return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, 1e-12)
+
+
+def stands_out(cell: Cell) -> bool:
+    """Whether the gap's interval lies above that of the floor."""
+    return (cell.gap if cell.low is None else cell.low) > (cell.floor_high or cell.floor)
+
+
+def stays(cell: Cell) -> bool:
+    """Whether the cell stands out with the named effects in the model: its interval, moved with it, above the floor's."""
+    if cell.after is None:
+        return stands_out(cell)
+    low = cell.after * (1.0 if cell.low is None else cell.low / max(cell.gap, 1e-12))
+    return low > (cell.floor_high or cell.floor)
+
+
+def got_worse(cell: Cell) -> bool:
+    """Whether the named effects made the cell larger, by a tenth or more, and it stands out of its floor."""
+    return cell.after is not None and stays(cell) and cell.after > WORSE * cell.gap
+
+
+def energy(cell: Cell) -> float:
+    """Power of the gap over its floor times the number of blocks: what the cell is in the whole flight."""
+    return max(cell.blocks, 1) * max(over_floor(cell) ** 2 - 1.0, 0.0) if stands_out(cell) else 0.0
+
+
+def removed(cell: Cell) -> float:
+    """Power over the floor that the named effects take from the cell, times the number of blocks."""
+    if cell.after is None or not stands_out(cell):
+        return 0.0
+    return max(cell.blocks, 1) * (over_floor(cell) ** 2 - max(over_floor(cell, cell.after), 1.0) ** 2)
+
+
+def closes(cell: Cell) -> bool:
+    """Whether the named effects take half or more of the cell's power over the floor."""
+    return removed(cell) >= 0.5 * energy(cell) > 0.0
+
+
+def headline(cells: Iterable[Cell], named: bool = False) -> Cell | None:
+    """The cell that stands for the gap; None where no cell in the air stands out.
+
+    It is in the channel and band with most energy over all phases in the air (with named effects: from which they
+    take most, among cells that they halve; where they halve none, as without), there in the phase with most of it. A
+    short phase with one large ratio is not the gap.
+    """
+    weight = (lambda c: removed(c) if closes(c) else 0.0) if named else energy
+    air = [c for c in cells if c.regime == "all" and c.phase != GROUND and weight(c) > 0.0]
+    total: dict[tuple, float] = {}
+    for c in air:
+        total[c.channel, c.band_hz] = total.get((c.channel, c.band_hz), 0.0) + weight(c)
+    if not total:
+        return headline(cells) if named else None
+    best = max(total, key=total.__getitem__)
+    return max((c for c in air if (c.channel, c.band_hz) == best), key=weight)
+
+
+def same_place(cells: Iterable[Cell], one: Cell) -> list[Cell]:
+    """The cells in the air of one's channel and band that stand out of their floor."""
+    return [c for c in cells if c.regime == "all" and c.phase != GROUND and stands_out(c)
+            and (c.channel, c.band_hz) == (one.channel, one.band_hz)]
+
+
+def remaining(cells: Iterable[Cell]) -> list[Cell]:
+    """Cells that stand out with the named effects in the model, largest first."""
+    return sorted((c for c in cells if c.regime == "all" and c.after is not None and stays(c)),
+                  key=lambda c: -over_floor(c, c.after))
+
+
+def worse(cells: Iterable[Cell]) -> list[Cell]:
+    """Cells that the named effects made larger, the largest first."""
+    return [c for c in remaining(cells) if got_worse(c)]
+
+
+def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
+    """Every phase with its figures, that with most energy first."""
+    made = []
+    for kind in KINDS:
+        some = [c for c in cells if c.phase == kind and c.regime == "all"]
+        if not some:
+            continue
+        changed = all(c.after is not None for c in some)
+        made.append(Phase(kind, rms([c.gap / max(c.floor, 1e-12) for c in some]),
+                          rms([c.after / max(c.floor, 1e-12) for c in some]) if changed else None, len(some),
+                          sum(stands_out(c) for c in some), sum(stays(c) for c in some),
+                          sum(got_worse(c) for c in some), sum(energy(c) for c in some)))
+    return tuple(sorted(made, key=lambda p: -p.energy))
+
+
+def rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
