@@ -1,6 +1,7 @@
 """collect and monitor with cflib as it is and the virtual drone, in its own time."""
 
 import re
+import struct
 import threading
 from contextlib import contextmanager
 
@@ -94,6 +95,37 @@ def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards)
     listed = (tmp_path / "manifest.csv").read_text().splitlines()
     assert listed[1].startswith("hop_0004.csv.gz,clean,4,40mm,") and listed[1].endswith(",0.4")
     assert run("evaluate", tmp_path).exit_code == 0
+
+
+def test_a_second_collect_starts_where_the_first_did(serve, hop, cache, tmp_path):
+    with serve() as virtual:
+        for number in (1, 2):  # the first lands behind the platform
+            shown = fly(virtual, hop, cache, tmp_path, "--number", str(number))
+            assert shown.exit_code == 0, shown.output
+            assert comes_to_rest(virtual) and virtual.drone.row[loop.PLACE] > 1.5
+    kinds = [[e.kind for e in logs.true_edges(logs.read(tmp_path / f"hop_000{n}.csv.gz"))] for n in (1, 2)]
+    assert kinds == [["entry", "exit"]] * 2
+    assert [row.split(",")[1] for row in (tmp_path / "manifest.csv").read_text().splitlines()[1:]] == ["clean"] * 2
+
+
+def test_a_killed_flight_in_mid_air_is_followed_by_one_from_the_ground(serve, hop, cache, tmp_path):
+    with serve() as virtual:
+        virtual.drone.commander.planner.command(bytes([7, 0]) + struct.pack("<ff?ff", 0.5, 0.0, True, 0.0, 1.0), virtual.drone.now_s)
+        virtual.clock.wait_for(lambda: virtual.drone.row[loop.PLACE + 2] > 0.4, 5.0)
+        shown = fly(virtual, hop, cache, tmp_path)
+        assert shown.exit_code == 0, shown.output
+    log = logs.read(tmp_path / "hop_0001.csv.gz")
+    assert log["zrange_m"][0] < 0.1 and log.stack(("m1_pwm", "m2_pwm"))[0].max() == 0.0
+
+
+def test_a_flight_without_an_edge_is_free_air(serve, cache, tmp_path):
+    far = tmp_path / "far.toml"
+    far.write_text(HOP.replace('"hop"', '"far"').replace("distance_m = 2.0", "distance_m = 0.3"))
+    with serve() as virtual:
+        shown = fly(virtual, far, cache, tmp_path)
+        assert shown.exit_code == 0, shown.output
+    assert (tmp_path / "manifest.csv").read_text().splitlines()[1].startswith("far_0001.csv.gz,free-air,")
+    assert "no edge" in shown.output
 
 
 def test_thirty_percent_packet_loss_of_everything(serve, hop, cache, tmp_path):

@@ -66,7 +66,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     from airtouch.crazyflie.link import default_cache
 
     if recover:
-        found, unreadable = recorder.recover(out)
+        found, unreadable = collect.recover(out)
         lines = [f"recovered: {path}" for path in found] + unreadable
         click.echo("\n".join(lines) or f"{out}: nothing to recover")
         sys.exit(2 if unreadable else 0)
@@ -182,6 +182,8 @@ def _report(outcome) -> None:
                f"({log.meta['lost_samples'] / total:.1%}), longest gap {log.meta['longest_gap_s']:.2f} s")
     start = log["t_s"][0]
     edges = logs.true_edges(log)
+    if outcome.use == "free-air":
+        click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the mission sweep does over its own")
     for edge in edges:
         click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: "
                    f"down range {edge.height_before_m:.2f} to {edge.height_after_m:.2f} m")

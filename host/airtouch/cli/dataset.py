@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 from rich.progress import Progress
 
+from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError
 from airtouch.logs import public
 

@@ -64,7 +64,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
         _, failures = evaluate.evaluate(test, registry.get(name), model, outcomes.append)
         results[name] = [r for r in outcomes if isinstance(r, evaluate.Result)]
         left_out += [f for f in failures if f not in left_out]
-    if not results["paper"]:
+    if not results[names[0]]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
     scores = {name: [r.score for r in some] for name, some in results.items()}
     show.console().print(show.table({n: summarise(s) for n, s in scores.items()}, where))
@@ -153,8 +153,8 @@ def fit(name: str, training: Sequence[Any], options: dict[str, Any]) -> Any:
 
 
 def order(name: str) -> int:
-    """The paper's detector first, its baseline second, others after."""
-    return ("paper", "baseline").index(name) if name in ("paper", "baseline") else 2
+    """The best detector first, the paper's baseline last."""
+    return SCORED.index(name)
 
 
 def export(name: str, model: Any, out: Path) -> None:
@@ -173,10 +173,11 @@ def write(path: Path, where: str, results: dict[str, list[evaluate.Result]], mod
     """The HTML report: the flights shown are spread from the best found to the worst."""
     from airtouch.report.write import ShownFlight, write_report
 
-    first = sorted(results["paper"], key=badness)
+    shown_first, *_ = results
+    first = sorted(results[shown_first], key=badness)
     chosen = [first[i * (len(first) - 1) // max(SHOWN - 1, 1)] for i in range(min(SHOWN, len(first)))]
     others = {name: {r.score.file: r.trace for r in some} for name, some in results.items()
-              if name != "paper"}
+              if name != shown_first}
     shown = [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
                          {name: found[r.score.file] for name, found in others.items()
                           if r.score.file in found})

@@ -29,14 +29,19 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     module = registry.get(detector)
     trained = module.load(model)
     files = dataset.collect(flights, speed)
+    said: dict[str, list[str]] = {}
     with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
         def done(result: evaluate.Result | Exception) -> None:
             if isinstance(result, Exception):
                 click.echo(f"\rairtouch: {result}", err=True)
+            elif found := evaluate.remarks(result.log):
+                said[result.score.file] = found
             bar.update(1)
 
         scores, failures = evaluate.evaluate(files, module, trained, done)
+    _pass_on(said)
     result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
+    result["remarks"] = said
     screen = show.console()
     if scores:
         screen.print(show.table({detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off"))
@@ -55,3 +60,15 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     show.left_out(failures, len(scores))
     if failures:
         sys.exit(2)
+
+
+def _pass_on(said: dict[str, list[str]]) -> None:
+    """What the logs' own checks say, one line each, on stderr."""
+    files: dict[str, list[str]] = {}
+    for file, lines in said.items():
+        for line in lines:
+            files.setdefault(line, []).append(file)
+    for line, some in files.items():
+        click.echo(f"airtouch: {some[0] if len(some) == 1 else f'{len(some)} flights'}: {line}", err=True)
+    if files:
+        click.echo("airtouch: airtouch logs check says more", err=True)

@@ -13,6 +13,7 @@ from airtouch.vehicle import Vehicle
 
 ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin")
 DEFAULT = "crazyflie-2.1-flow"
+MANIFEST = "manifest.csv"
 
 
 class Flights:
@@ -51,11 +52,15 @@ def files_of(names: Sequence[str]) -> list[Path]:
         path = Path(name)
         if path.is_dir():
             some = [p for p in sorted(path.iterdir())
-                    if p.name.endswith(ENDINGS) and p.name != "manifest.csv"]
+                    if p.name.endswith(ENDINGS) and p.name != MANIFEST]
         elif path.exists():
+            if path.name == MANIFEST:  # which a shell's *.csv names too
+                if len(names) == 1:
+                    raise AirTouchError(f"{name}: a list of flights, not a flight; name its folder")
+                continue
             some = [path]
         else:
-            some = [Path(p) for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file()]
+            some = [Path(p) for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file() and Path(p).name != MANIFEST]
         if not some:
             raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
         found.update(dict.fromkeys(some))

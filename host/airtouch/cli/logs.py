@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from airtouch import logs
+from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError, shown
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")

@@ -1,6 +1,7 @@
 """What `evaluate`, `crossval` and `demo` print and write alike."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,16 @@ def write_json(path: Path, content: dict[str, Any], force: bool) -> None:
 
 
 def check_free(path: Path | None, force: bool) -> None:
-    """Refuse an existing file before the work, not after it."""
-    if path is not None and path.exists() and not force:
+    """Refuse, before the work and not after it, a file that exists and a folder that cannot be made or written to."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise AirTouchError(f"{path}: is a folder; give the name of a file")
+    if path.exists() and not force:
         raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AirTouchError(f"{path.parent}: cannot be made: {error.strerror}") from None
+    if not os.access(path.parent, os.W_OK):
+        raise AirTouchError(f"{path.parent}: cannot be written to")

@@ -64,7 +64,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     from airtouch import vehicle as vehicles
     from airtouch.simulation import batch, cluster, effects, local, store
     from airtouch.simulation import scenario as scenarios
-    from airtouch.simulation.flight import choose
+    from airtouch.simulation.flight import choose, refuse_off
 
     if flights < 1 or seed < 0 or (workers is not None and workers < 1):
         raise AirTouchError("--flights and --workers must be 1 or more, --seed 0 or more")
@@ -73,7 +73,9 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
         effects.load_file(path)
     scene, craft = scenarios.load(scenario), vehicles.load(vehicle)
     pairs = [effects.parse(text) for text in chosen]
-    choose(scenarios.draw_flight(scene, seed, 0), pairs, without)
+    plan = scenarios.draw_flight(scene, seed, 0)
+    refuse_off(plan, without)
+    choose(plan, pairs, without)
     request = {"scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)),
                "vehicle": vars(craft),
                "effects": pairs, "without": list(without), "seed": seed,

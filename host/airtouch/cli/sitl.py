@@ -28,19 +28,27 @@ import click
 def command(scenario: str, port: int, host: str, speed: float, vehicle: str, chosen: tuple[str, ...],
             without: tuple[str, ...], seed: int, flight: int, faults: tuple[str, ...], no_ai_deck: bool,
             record: Path | None, force: bool) -> None:
-    """Serve a virtual Crazyflie that flies over the world of SCENARIO until Ctrl-C.
+    """Serve a virtual Crazyflie that flies over the world of SCENARIO (or of a mission) until Ctrl-C.
 
     Connect with cflib, cfclient or `airtouch collect --uri udp://127.0.0.1:19850`.
     """
+    from airtouch.cli.scores import check_free
+    from airtouch.crazyflie import mission
     from airtouch.simulation import effects
+    from airtouch.simulation.flight import refuse_off
+    from airtouch.simulation.scenario import draw_flight
     from airtouch.sitl import Server
 
-    server = Server(scenario, port=port, host=host, speed=speed, vehicle=vehicle,
+    check_free(record, force)
+    scene = mission.scene_of(scenario)
+    refuse_off(draw_flight(scene, seed, flight), without)
+    click.echo("starting; the first time compiles the simulator, which takes a minute", err=True)
+    server = Server(scene, port=port, host=host, speed=speed, vehicle=vehicle,
                     effects=[effects.parse(text) for text in chosen], without=without, seed=seed,
                     flight=flight, faults=faults, ai_deck=not no_ai_deck, record=record, force=force)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.stop())
-    click.echo(f"{server.uri}: {scenario}, {vehicle}; Ctrl-C ends it")
+    click.echo(f"ready: {server.uri}: {scenario}, {vehicle}; each `airtouch collect` starts at the start; Ctrl-C ends it")
     server.run(click.echo)
     if record:
         click.echo(f"{server.drone.now_s:.0f} s of flight log in {record}")

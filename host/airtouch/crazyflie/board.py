@@ -44,6 +44,8 @@ class Link:
     def __str__(self) -> str:
         if self.silent_s > 1.0:
             return f"SILENT for {self.silent_s:.1f} s"
+        if not np.isfinite(self.rate_hz):
+            return "waiting for data"
         ways = [f"{self.rate_hz:.0f} Hz", f"{100 * self.lost:.1f} % lost"]
         if np.isfinite(self.late_s):
             ways.append(f"late {1000 * self.late_s:.0f} ms")

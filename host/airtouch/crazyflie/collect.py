@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from airtouch import __version__
+from airtouch import __version__, logs
 from airtouch.crazyflie import blocks, checks, recorder
 from airtouch.crazyflie.autopilot import Autopilot, Origin
 from airtouch.crazyflie.drone import Drone, drain
@@ -24,6 +24,7 @@ from airtouch.crazyflie.intake import Intake
 from airtouch.crazyflie.mission import LANDING_MPS, Mission
 from airtouch.crazyflie.recorder import LEAST_FREE_BYTES, Recorder
 from airtouch.errors import AirTouchError
+from airtouch.logs.edges import true_edges
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 
@@ -31,7 +32,9 @@ DECKS = ("bcFlow2", "bcFlow", "bcMultiranger", "bcAI", "bcZRanger2", "bcLighthou
 FIRST_DATA_S = 3.0
 PARAMETERS_S = 30.0  #: cflib fetches them all, one after the other
 LINEAR_PROTOCOL = 8  #: of the radio; from here on go-to can be linear
-CAN_BE_ARMED, ARMED = 1, 2  #: bits of the supervisor
+CAN_BE_ARMED, ARMED, FLYING = 1, 2, 16  #: bits of the supervisor
+LANDED_S = 15.0  #: that a drone gets to land after a killed flight
+START_OVER = "sitl.startOver"  #: parameter that only a virtual drone has
 ARMING_S = 1.0
 RESET_S = 1.0  #: that the estimator gets to settle
 MANIFEST_COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
@@ -61,6 +64,7 @@ class Outcome:
     ended: str
     log: FlightLog
     silences: list[float] = field(default_factory=list)
+    use: str = "messy"  #: as in the manifest
 
     @property
     def planned(self) -> bool:
@@ -89,7 +93,7 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
     if free < LEAST_FREE_BYTES:
         raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, "
                             f"{LEAST_FREE_BYTES / 2**20:.0f} are needed")
-    found, unreadable = recorder.recover(out)
+    found, unreadable = recover(out)
     for path in found:
         say(f"{path}: recovered from a flight whose process was killed")
     for line in unreadable:
@@ -97,7 +101,7 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
 
 
 def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readiness:
-    """Check log variables, block size, decks; start the log blocks; set parameters.
+    """Check log variables, block size, decks; start the log blocks; set parameters. A virtual drone is put to its start.
 
     Raises AirTouchError with one line a fault. Nothing has moved yet.
     """
@@ -110,6 +114,7 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
     slow = slow if slow.variables else None
     for name, text in plan.settings:
         drone.set_parameter(name, text)
+    start_over(drone)
     drone.start(blocks.MOTION)
     if slow:
         drone.start(slow)
@@ -161,6 +166,24 @@ def firmware(drone: Drone) -> str:
     return f"{int(parts[0]):08x}{int(parts[1]):04x}{dirty}"
 
 
+def start_over(drone: Drone) -> None:
+    """Put a virtual drone back to its start; another one stands where it stands."""
+    if drone.has_parameter(START_OVER):
+        drone.set_parameter(START_OVER, "1")
+
+
+def standing_still(drone: Drone, slow: blocks.Block | None) -> Intake:
+    """What the drone says once it does not fly any more. AirTouchError where it goes on for LANDED_S."""
+    until = time.monotonic() + LANDED_S
+    while True:
+        seen = listen(drone, slow, FIRST_DATA_S)
+        if seen.supervisor is None or not seen.supervisor & FLYING:
+            return seen
+        if time.monotonic() > until:
+            raise AirTouchError("not ready: the drone is still flying; land it, then start again")
+        time.sleep(0.2)
+
+
 def reset_estimator(drone: Drone) -> None:
     """Let the position estimate start at this place, where the firmware can."""
     if drone.has_parameter("kalman.resetEstimation"):
@@ -179,6 +202,8 @@ def origin_of(latest: dict[str, float]) -> Origin:
 def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int, *, stop: Event,
         say: Callable[[str], None], show: Callable[[Flight], None] = lambda _: None) -> Outcome:
     """One flight, from the ground to the file. Raises AirTouchError where it could not be written."""
+    start_over(drone)
+    standing_still(drone, ready.slow)
     reset_estimator(drone)
     standing = listen(drone, ready.slow, FIRST_DATA_S)
     now = replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor)
@@ -207,7 +232,7 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
             log = book.finish(ended=ended, silences_s=flight.silences)
     outcome = Outcome(path, ended, log, flight.silences)
     if len(log):
-        list_flight(plan.out, outcome, mission, number)
+        outcome.use = list_flight(path, log, ended == "as planned")
     if flight.pilot.refused:
         raise AirTouchError(flight.pilot.refused)
     return outcome
@@ -227,22 +252,44 @@ def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number
     }
 
 
-def list_flight(folder: Path, outcome: Outcome, mission: Mission, number: int) -> None:
-    """Add a flight to the folder's manifest.csv, which `evaluate` reads; clean when it went as planned."""
-    path = folder / "manifest.csv"
+def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
+    """Add a flight to the manifest.csv of its folder, which `evaluate` reads; returns its use there.
+
+    "clean" when it went as planned and crossed an edge, "free-air" when it crossed none, "messy" otherwise. What the
+    row says of the mission comes from the log's metadata.
+    """
+    path, meta = file.parent / "manifest.csv", log.meta
     rows = []
     if path.is_file():
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.DictReader(file) if row.get("file") != outcome.path.name]
-    total = len(outcome.log) + outcome.log.meta["lost_samples"]
-    clean = outcome.planned and outcome.log.meta["lost_samples"] <= CLEAN_LOSS * total
-    clearance = mission.values.get("clearance")
-    rows.append({"file": outcome.path.name, "use": "clean" if clean else "messy", "fold": number % 5,
+        with path.open(encoding="utf-8-sig", newline="") as handle:
+            rows = [row for row in csv.DictReader(handle) if row.get("file") != file.name]
+    total = len(log) + meta["lost_samples"]
+    use = "messy"
+    if planned and meta["lost_samples"] <= CLEAN_LOSS * total:
+        use = "clean" if crossed_an_edge(log) else "free-air"
+    values = meta.get("condition")
+    values = values if isinstance(values, dict) else {}
+    clearance = values.get("clearance")
+    rows.append({"file": file.name, "use": use, "fold": int(meta.get("flight") or 0) % 5,
                  "height": f"{1000 * clearance:.0f}mm" if clearance is not None else "",
-                 "angle_deg": mission.values.get("angle", ""), "wind": mission.values.get("wind", "none"),
-                 "speed_mps": mission.speed_mps or ""})
+                 "angle_deg": values.get("angle", ""), "wind": values.get("wind", "none"),
+                 "speed_mps": meta.get("speed_mps") or ""})
     text = io.StringIO()
     writer = csv.DictWriter(text, MANIFEST_COLUMNS, extrasaction="ignore", restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     write_bytes(text.getvalue().encode(), path, force=True)
+    return use
+
+
+def crossed_an_edge(log: FlightLog) -> bool:
+    """Whether the down range shows an edge; True where nothing tells."""
+    return not log.has("zrange_m") or bool(true_edges(log))
+
+
+def recover(folder: Path) -> tuple[list[Path], list[str]]:
+    """`recorder.recover`, and a row of the manifest for each flight that was finished."""
+    found, unreadable = recorder.recover(folder)
+    for path in found:
+        list_flight(path, logs.read(path), planned=False)
+    return found, unreadable

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, nearest
 from airtouch.simulation import setpoint as c
 from airtouch.simulation import scenario
 from airtouch.simulation.mission import RATE_HZ
@@ -72,20 +72,25 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
 
     Raises AirTouchError in one line for what cannot be read or flown.
     """
-    if str(name_or_path) in names():
-        text = (_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
-        scene = scenario.parse(text, str(name_or_path))
-    elif Path(name_or_path).suffix != ".toml" and str(name_or_path) not in scenario.names():
-        raise AirTouchError(f"no mission {str(name_or_path)!r}; ready ones: {', '.join(names())}; "
-                            "or give a .toml file")
-    else:
-        scene = scenario.load(name_or_path)
+    scene = scene_of(name_or_path)
     plan = scenario.draw_flight(scene, seed, flight)
     legs = legs_of(plan.setpoints)
     if not any(leg.kind == "take-off" for leg in legs):
         raise AirTouchError(f"{scene.name}: this mission never takes off")
     level = [(leg.seconds, speed) for leg, speed in zip(legs, _speeds(legs), strict=True) if leg.kind == "go"]
     return Mission(scene.name, tuple(legs), plan.values, round(max(level)[1], 4) if level else None)
+
+
+def scene_of(name_or_path: str | Path) -> scenario.Scenario:
+    """The world and mission of that name (ready ones and scenarios) or .toml file. AirTouchError names what is near."""
+    if str(name_or_path) in names():
+        text = (_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
+        return scenario.parse(text, str(name_or_path))
+    if Path(name_or_path).suffix != ".toml" and str(name_or_path) not in scenario.names():
+        near = nearest(str(name_or_path), [*names(), *scenario.names()])
+        raise AirTouchError(f"no mission {str(name_or_path)!r}{near}; ready ones: {', '.join(names())}; "
+                            "or give a .toml file")
+    return scenario.load(name_or_path)
 
 
 def legs_of(setpoints: np.ndarray) -> list[Leg]:

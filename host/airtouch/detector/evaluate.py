@@ -16,6 +16,7 @@ from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.clock import sample_period
+from airtouch.logs.quality import nothing_logged
 
 SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air
 MOST_MISSING = 0.1  #: share of samples of a channel that may be NaN; they hold the last value
@@ -51,6 +52,8 @@ def check(log: FlightLog, spare: int = 0) -> None:
     if abs(period - SAMPLE_PERIOD_S) > 0.02 * SAMPLE_PERIOD_S:
         raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, the detectors need 100 Hz: "
                             "airtouch logs convert --rate 100")
+    if nothing_logged(log):
+        raise AirTouchError(f"{log.source}: nothing was logged: every value of every channel is missing (NaN)")
     names, channels = logged_channels(log, sensors.missing(log) if spare else ())
     if spare:
         sensors.signals(log)  # names what is missing, where that is too much
@@ -74,6 +77,16 @@ def check(log: FlightLog, spare: int = 0) -> None:
             pair = used[:, names.index(rate)], used[:, names.index(acceleration)]
             if np.corrcoef(*pair)[0, 1] > 0.999999:
                 raise AirTouchError(f"{log.source}: {rate} is a copy of {acceleration}; log the gyro or leave it out")
+
+
+def remarks(log: FlightLog) -> list[str]:
+    """What `airtouch logs check` knows of a log that a score may suffer from: its clock, and what the reader found."""
+    said = [str(w) for w in log.meta.get("warnings", [])]
+    if log.has("t_s"):
+        with np.errstate(invalid="ignore"):
+            back = int((np.diff(log["t_s"]) < 0).sum())
+        said += [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
+    return said
 
 
 def truth(log: FlightLog) -> list[logs.Edge] | None:

@@ -7,6 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap import motion
 from airtouch.logs.clock import lost_samples, true_period
+from airtouch.logs.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
 from airtouch.logs.resample import resample
@@ -70,6 +71,8 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     accelerations, when the clock runs backwards, and when there is no flight in it.
     """
     name, notes, cannot = log.source, [], []
+    if nothing_logged(log):
+        raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
     log, unfit = _sane(log)
     if unfit:
         notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")

@@ -73,6 +73,11 @@ def check(log: FlightLog) -> Quality:
     )
 
 
+def nothing_logged(log: FlightLog) -> bool:
+    """Whether every value of every channel but the time is missing."""
+    return len(log) > 0 and not any(np.isfinite(v).any() for name, v in log.columns.items() if name != "t_s")
+
+
 def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
     """Airborne samples, phases and edges; a log without motors and height has none of them."""
     try:
@@ -89,6 +94,8 @@ def _duration(clock: np.ndarray, samples: int, period: float) -> float:
 
 def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment], period: float | None) -> list[str]:
     words = []
+    if nothing_logged(log):
+        return ["nothing was logged: every value of every channel is missing"]
     if found["gaps"]:
         lost = sum(gap.lost for gap in found["gaps"])
         longest = max(gap.seconds for gap in found["gaps"])

@@ -15,8 +15,14 @@ from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
 
 TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
+COLOURS = {"best": FOUND, "paper": OTHER, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}  #: of a detector, in every plot
 KINDS = {"entry": "v", "exit": "^", "edge": "o"}
 STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
+
+
+def colour_of(name: str) -> str:
+    """A detector's colour; that of the first for one that has none of its own."""
+    return COLOURS.get(name, FOUND)
 
 
 def png(figure: Figure) -> bytes:
@@ -60,7 +66,8 @@ def reliability(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
         ax.plot([0, 1], [0, 1], color=MUTED, lw=1, ls="--", label="perfect")
-        for (name, some), colour in zip(scores.items(), (FOUND, OTHER, TRUE), strict=False):
+        for name, some in scores.items():
+            colour = colour_of(name)
             table = np.sum([s.bins for s in some], axis=0) if some else np.zeros((BINS, 3))
             filled = table[:, 0] > 0
             if not filled.any():
@@ -81,7 +88,8 @@ def error_distribution(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
-        for (name, some), colour in zip(scores.items(), (FOUND, OTHER, TRUE), strict=False):
+        for name, some in scores.items():
+            colour = colour_of(name)
             edges = [e for s in some for e in s.edges]
             errors = np.sort([abs(e.error_m) for e in edges if e.error_m is not None])
             if edges:
@@ -122,8 +130,8 @@ def _band_power(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object
     ax.set_ylabel("band power\ndB on median", fontsize=8)
 
 
-def _probability(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
-    ax.plot(t, trace.probability, color=FOUND, lw=0.9)
+def _probability(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, rows: Mapping[str, Trace]) -> None:
+    ax.plot(t, trace.probability, color=colour_of(next(iter(rows))), lw=0.9)
     ax.set_ylim(-0.05, 1.05)
     ax.set_ylabel("P(over)", fontsize=8)
 
@@ -133,7 +141,7 @@ def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, rows: Mapping[
         for kind, marker in KINDS.items():
             samples = [e.sample for e in some.edges if e.kind == kind]
             ax.plot(np.array(samples) * SAMPLE_PERIOD_S, np.full(len(samples), row), marker, ms=6,
-                    color=FOUND if row == 0 else OTHER, ls="none")
+                    color=colour_of(name), ls="none")
     ax.set_yticks(range(len(rows)), rows, fontsize=7)
     ax.set_ylim(len(rows) - 0.5, -0.5)
     ax.set_ylabel("edges\n▼ in, ▲ out", fontsize=8)

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from shapely.geometry import LineString
+from matplotlib.patches import Polygon as PolygonPatch
+from shapely.geometry import LineString, Point
 from shapely.plotting import patch_from_polygon
 
 from airtouch.detector.edge_map import EdgePoint, Platform
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
 
+STRIP_M = 0.3  #: drawn width of a platform that a single pass crossed
 COLOURS = {"entry": FOUND, "exit": OTHER, "edge": TRUE}
 
 
@@ -18,8 +21,16 @@ def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Pl
     with style():
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
-        ax.plot(*xy.T, color=MUTED, lw=0.7, label="track")
+        ax.grid(color="#e5e7eb", lw=0.6, zorder=0)
+        ax.plot(*xy.T, color=MUTED, lw=0.9, label="track")
+        _ends(ax, xy)
         for platform in platforms:
+            ends = (platform.near, platform.far)
+            if platform.outline is None and all(isinstance(end, Point) for end in ends):
+                strip = _strip(*(np.array(end.coords[0]) for end in ends))
+                ax.add_patch(PolygonPatch(strip, facecolor=TRUE, alpha=0.12, lw=0, label="platform (its width is not known)"))
+            elif platform.outline is not None:
+                ax.add_patch(patch_from_polygon(platform.outline, facecolor=TRUE, alpha=0.12, lw=0, label="platform"))
             if platform.outline is not None:
                 ring = np.array(platform.outline.exterior.coords)
                 band = platform.outline.boundary.buffer(2 * platform.sigma_m)
@@ -37,10 +48,45 @@ def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Pl
             if at:
                 ax.scatter(*np.array(at).T, s=14, color=colour, zorder=3, label=f"{kind} ({len(at)})")
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
+        _scale_bar(ax)
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
         return png(figure)
+
+
+def _strip(near: np.ndarray, far: np.ndarray) -> np.ndarray:
+    """Corners (4, 2) of the ground between two edges of one pass, as wide as STRIP_M: nothing tells its true width."""
+    along = far - near
+    length = float(np.hypot(*along))
+    side = 0.5 * STRIP_M * (np.array([-along[1], along[0]]) / length if length > 0.0 else np.array([0.0, 1.0]))
+    return np.array([near + side, far + side, far - side, near - side])
+
+
+def _ends(ax: Axes, xy: np.ndarray) -> None:
+    """Where the flight starts and ends, and which way it goes."""
+    known = xy[np.isfinite(xy).all(axis=1)]
+    if len(known) < 2:
+        return
+    ax.scatter(*known[0], s=46, marker="o", facecolor="white", edgecolor="black", zorder=4, label="start")
+    ax.scatter(*known[-1], s=46, marker="s", facecolor="white", edgecolor="black", zorder=4, label="end")
+    passed = np.r_[0.0, np.cumsum(np.hypot(*np.diff(known, axis=0).T))]
+    for part in (0.25, 0.75):
+        i = int(np.clip(np.searchsorted(passed, part * passed[-1]), 1, len(known) - 1))
+        step = _direction(known, i)
+        if step.any():
+            ax.annotate("", known[i] + 0.02 * step, known[i] - 0.02 * step, zorder=4,
+                        arrowprops={"arrowstyle": "-|>", "color": "#4b5563", "lw": 1.2})
+
+
+def _scale_bar(ax: Axes) -> None:
+    """A bar of a round length at the lower left."""
+    ax.autoscale_view()
+    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+    length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * (x1 - x0)), 0.05)
+    x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
+    ax.plot([x, x + length], [y, y], color="black", lw=3, solid_capstyle="butt")
+    ax.text(x + length / 2, y, f"{length:g} m", ha="center", va="bottom", fontsize=8)
 
 
 def _direction(xy: np.ndarray, sample: int) -> np.ndarray:

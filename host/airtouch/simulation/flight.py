@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.simulation import loop, setpoint
 from airtouch.simulation import effects as registry
@@ -54,6 +55,16 @@ def choose(plan: FlightPlan, effects: Chosen = (), without: Sequence[str] = ()) 
     named = {a.effect.name for a in added}
     kept = [(name, values) for name, values in plan.effects if name not in named]
     return [a for a in registry.activate([*kept, *added]) if a.effect.name not in without]
+
+
+def refuse_off(plan: FlightPlan, without: Sequence[str]) -> None:
+    """Raise AirTouchError for the name of an effect that the flight's scenario does not switch on."""
+    on = [name for name, _ in plan.effects]
+    for name in without:
+        registry.get(name)
+        if name not in on:
+            raise AirTouchError(f"--without {name}: this scenario does not switch it on; on are "
+                                f"{', '.join(dict.fromkeys(on)) or 'none'}")
 
 
 def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],

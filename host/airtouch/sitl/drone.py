@@ -112,6 +112,15 @@ class Drone:
         self.commander.reset()
         self.state, self.emergency = PRE_FLIGHT, False
 
+    def start_over(self) -> None:
+        """Put back to where the scenario's mission starts, on the ground, with the battery as at first."""
+        self.commander.reset()
+        self.state, self.emergency = PRE_FLIGHT, False
+        self._stepper.begin(self._start)
+        self._setpoint[0] = self._start
+        self._stepper.fly(self._setpoint, self._table)
+        self._thrust_s = -math.inf
+
     def drain(self) -> None:
         """From now on the battery is nearly empty."""
         self._stepper.plant[0]["battery_strength"] = 1.0

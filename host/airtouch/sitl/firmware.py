@@ -9,6 +9,7 @@ from airtouch.sitl.drone import Drone
 from airtouch.sitl.log_service import LogService
 from airtouch.sitl.packet import Packet
 from airtouch.sitl.param_service import ParamService
+from airtouch.sitl.variables import START_OVER
 
 PROTOCOL = 12
 VERSION, DEVICE = b"2026.08 virtual", b"CF21"
@@ -125,7 +126,9 @@ class Firmware:
         if group == GROUP:
             drone.app.set(parameter, value)
             return drone.app.values()
-        if name == "stabilizer.stop" and value:
+        if name == START_OVER and value:
+            drone.start_over()
+        elif name == "stabilizer.stop" and value:
             drone.stop()
         elif name == "hlCommander.vtoff":
             planner.takeoff_mps = value if value > 0.0 else planner.takeoff_mps

@@ -18,6 +18,7 @@ from airtouch.sitl.toc import Item
 
 G = 9.81
 INVALID_RANGE_MM = 32767
+START_OVER = "sitl.startOver"  #: parameter of the virtual drone alone: a write of 1 puts it back to its start
 GYRO_LSB_DEG = 2000.0 * 2.0 / 65536.0
 Read = Callable[[Drone], float]
 Variables = dict[str, tuple[str, Read]]
@@ -126,6 +127,7 @@ def parameters(drone: Drone, ai_deck: bool) -> list[Parameter]:
         Parameter("firmware.revision1", "uint16_t", 0, read_only=True),
         Parameter("firmware.modified", "uint8_t", 0, read_only=True),
         Parameter("crtpsrv.echoDelay", "uint16_t", 0),
+        Parameter(START_OVER, "uint8_t", 0),
         *drone.app.parameters(),
     ]
 

@@ -1,0 +1,117 @@
+"""What a new user types first, wrong and right: suggestions, checks before the work, what a score must pass on."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli import airtouch, demo, scores
+from airtouch.cli.gap_input import files_of
+from airtouch.crazyflie import board, collect, mission
+from airtouch.errors import AirTouchError
+from airtouch.report import figures
+from airtouch.simulation import scenario
+from airtouch.simulation.flight import refuse_off
+
+
+def run(*arguments):
+    return CliRunner().invoke(airtouch, [str(a) for a in arguments])
+
+
+@pytest.mark.parametrize(("typed", "meant"), [
+    (("evalute",), "evaluate"), (("gap", "diagnos"), "diagnose"), (("gap", "blind", "scroe"), "score"), (("logs", "chek"), "check"),
+    (("simulat",), "simulate")])
+def test_a_mistyped_command_gets_the_nearest(typed, meant):
+    shown = run(*typed)
+    assert shown.exit_code == 2 and f"No such command '{typed[-1]}'; did you mean {meant}" in shown.output
+
+
+def test_a_mistyped_mission_gets_the_nearest():
+    with pytest.raises(AirTouchError, match="no mission 'swep'; did you mean sweep"):
+        mission.scene_of("swep")
+
+
+def test_every_ready_mission_is_a_world_of_the_virtual_drone_with_an_edge_on_its_way():
+    for name in mission.names():
+        scene = mission.scene_of(name)
+        assert scene.name == name and scenario.draw_flight(scene, 0, 0).world is not None
+
+
+@pytest.mark.parametrize("line", [("gap", "measure", "{log}", "--report"), ("gap", "diagnose", "{log}", "--json"),
+                                  ("evaluate", "{log}", "--json"), ("train", "{log}", "--out")])
+def test_an_output_that_cannot_be_written_is_told_before_the_work(generated, tmp_path, line):
+    (tmp_path / "file").write_text("")
+    words = [w.replace("{log}", str(generated / "f0.csv.gz")) for w in line]
+    for out in (tmp_path / "file" / "out.x", tmp_path):
+        shown = run(*words, out)
+        assert shown.exit_code != 0
+        assert any(t in f"{shown.exception} {shown.output}" for t in ("cannot be made", "is a folder", "is a directory")), shown.output
+
+
+def test_a_manifest_is_no_flight(generated):
+    names = [p.name for p in files_of([f"{generated}/*"])]
+    assert names == ["f0.csv.gz", "f1.csv.gz", "f2.csv.gz", "f3.csv.gz"]
+    assert files_of([str(generated / "manifest.csv"), str(generated / "f0.csv.gz")]) == [generated / "f0.csv.gz"]
+    with pytest.raises(AirTouchError, match="a list of flights, not a flight"):
+        files_of([str(generated / "manifest.csv")])
+
+
+def test_an_effect_that_is_off_cannot_be_switched_off(tmp_path):
+    plan = scenario.draw_flight(scenario.load("paper-low"), 0, 0)
+    refuse_off(plan, ["gust"])
+    with pytest.raises(AirTouchError, match="--without slung_load: this scenario does not switch it on; on are .*gust"):
+        refuse_off(plan, ["slung_load"])
+    shown = run("simulate", "diagnosis", "--out", tmp_path / "o", "--without", "gust")
+    assert isinstance(shown.exception, AirTouchError) and "does not switch it on" in str(shown.exception)
+    assert not (tmp_path / "o").exists()
+
+
+def test_a_log_of_nothing_is_told_as_that(generated, tmp_path):
+    log = logs.read(generated / "f0.csv.gz")
+    nothing = {name: np.full(len(log), np.nan) for name in log.columns if name != "t_s"}
+    logs.write(log.with_columns(nothing), tmp_path / "nan.csv")
+    shown = run("evaluate", tmp_path / "nan.csv", "--speed", "0.3", "--detector", "baseline")
+    assert "nan.csv: nothing was logged: every value of every channel is missing" in shown.output
+    shown = run("gap", "measure", tmp_path / "nan.csv")
+    assert "nothing was logged" in str(shown.exception)
+    assert "nothing was logged" in run("logs", "check", tmp_path / "nan.csv").output
+
+
+def test_a_score_passes_on_what_the_log_check_knows(generated, tmp_path):
+    log = logs.read(generated / "f0.csv.gz")
+    clock = log["t_s"].copy()
+    clock[300:310] = clock[300:310][::-1]
+    logs.write(log.with_columns({"t_s": clock}), tmp_path / "back.csv")
+    whole = (tmp_path / "back.csv").read_bytes()
+    (tmp_path / "cut.csv").write_bytes(whole[:-20])
+    shown = run("evaluate", tmp_path / "back.csv", tmp_path / "cut.csv", "--speed", "0.3", "--detector", "baseline",
+                "--json", tmp_path / "out.json")
+    assert "the clock runs backwards 9 times" in shown.output
+    assert "cut off" in shown.output, shown.output
+    assert "runs backwards" in (tmp_path / "out.json").read_text()
+
+
+def test_recovered_flights_are_listed(generated, tmp_path):
+    log = logs.read(generated / "f0.csv.gz")
+    log = log.with_columns({}, mission="sweep", flight=7, speed_mps=0.3, condition={"clearance": 0.04})
+    logs.write(log, tmp_path / "sweep_0007.csv")
+    (tmp_path / "sweep_0007.csv").rename(tmp_path / "sweep_0007.csv.gz.part")
+    found, _ = collect.recover(tmp_path)
+    assert [p.name for p in found] == ["sweep_0007.csv.gz"]
+    assert (tmp_path / "manifest.csv").read_text().splitlines()[1] == "sweep_0007.csv.gz,messy,2,40mm,,none,0.3"
+
+
+def test_the_link_says_that_it_waits_before_there_is_a_rate():
+    assert str(board.Link()) == "waiting for data"
+    assert str(board.Link(100.0)).startswith("100 Hz")
+
+
+def test_best_comes_first_and_each_detector_keeps_its_colour():
+    assert sorted(("baseline", "paper", "best"), key=demo.order) == ["best", "paper", "baseline"]
+    colours = [figures.colour_of(n) for n in ("best", "paper", "baseline", "paper-stream")]
+    assert len(set(colours)) == 4 and figures.TRUE not in colours  # green is the truth's
+
+
+def test_check_free_makes_the_folder(tmp_path):
+    scores.check_free(tmp_path / "a" / "b.json", False)
+    assert (tmp_path / "a").is_dir()
