@@ -46,6 +46,15 @@ typedef struct {
   const uint8_t *blockSkips;    // sparse: blocks of four inputs to skip before each block
 } layerInt8_t;
 
+// Initialisers of the tables that `airtouch export` writes.
+#define LAYER_IN(rows, columns, channels) .inRows = (rows), .inColumns = (columns), .inChannels = (channels)
+#define LAYER_OUT(rows, columns, channels) .outRows = (rows), .outColumns = (columns), .outChannels = (channels)
+#define LAYER_KERNEL(rows, columns) .kernelRows = (rows), .kernelColumns = (columns)
+#define LAYER_RANGE(zeroPoint, least, most) .outputZeroPoint = (zeroPoint), .outputMin = (least), .outputMax = (most)
+#define LAYER_DENSE_ARRAYS(name) \
+  .weights = name##Weights, .bias = name##Bias, .multiplier = name##Multiplier, .shift = name##Shift
+#define LAYER_SPARSE_ARRAYS(name) LAYER_DENSE_ARRAYS(name), .blockCounts = name##BlockCounts, .blockSkips = name##BlockSkips
+
 enum { LAYER_MAX_VALUES = 1 << 16 };  // of a layer's input or output: all that the cluster's L1 holds
 
 // Whether a shape has values, and no more than there can be: its size may be computed then.

@@ -120,7 +120,9 @@ def test_an_export_is_checked(tmp_path: Path, sparsity: float) -> None:
     with pytest.raises(AirTouchError, match="stale or foreign"):
         export.check(other, tmp_path / "model")
     source = tmp_path / "model" / "airtouch_model.c"
-    source.write_text(source.read_text().replace("= 3,", "= 4,", 1))
+    text = source.read_text()
+    assert "LAYER_KERNEL(3, " in text
+    source.write_text(text.replace("LAYER_KERNEL(3, ", "LAYER_KERNEL(4, ", 1))
     with pytest.raises(AirTouchError, match="edited"):
         export.check(model, tmp_path / "model")
     source.write_text("int x;\n")

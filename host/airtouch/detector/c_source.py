@@ -10,24 +10,22 @@ from airtouch.reference.int8_network import Int8Layer
 _KINDS = ("LAYER_CONV", "LAYER_MAX_POOL", "LAYER_DENSE", "LAYER_SPARSE_DENSE", "LAYER_SPARSE_CONV")
 
 
-def fields(layer: Int8Layer) -> list[str]:
-    """Initialisers of a layerInt8_t's plain members."""
-    kind, *shape = layer_shape(layer)
-    names = ("inRows", "inColumns", "inChannels", "outRows", "outColumns", "outChannels", "kernelRows",
-             "kernelColumns", "outputZeroPoint", "outputMin", "outputMax")
-    return [f".kind = {_KINDS[kind]}", *(f".{n} = {v}" for n, v in zip(names, shape, strict=True))]
-
-
-def layer_arrays(name: str, layer: Int8Layer) -> tuple[str, list[str]]:
-    """The C arrays of one layer, and the initialisers that point to them."""
-    weights, counts, skips = packed_weights(layer)
-    bias, multiplier, shift = layer.c_constants()
+def layer(name: str, of: Int8Layer) -> tuple[str, str]:
+    """The C arrays of one layer, whose names begin with `name`, and the initialiser of its layerInt8_t."""
+    kind, *shape = layer_shape(of)
+    sizes = [", ".join(map(str, shape[start:stop])) for start, stop in ((0, 3), (3, 6), (6, 8), (8, 11))]
+    head = (f"{{.kind = {_KINDS[kind]}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), LAYER_KERNEL({sizes[2]}), "
+            f"LAYER_RANGE({sizes[3]})")
+    if of.kind == "max_pool":
+        return "", head + "}"
+    weights, counts, skips = packed_weights(of)
+    bias, multiplier, shift = of.c_constants()
     arrays = [("Weights", "int8_t", weights), ("Bias", "int32_t", bias),
               ("Multiplier", "int32_t", multiplier), ("Shift", "int8_t", shift)]
     if counts.size:
         arrays += [("BlockCounts", "uint16_t", counts), ("BlockSkips", "uint8_t", skips)]
     text = "".join(array(kind, name + what, np.ravel(values)) for what, kind, values in arrays)
-    return text, [f".{what[0].lower() + what[1:]} = {name + what}" for what, _, _ in arrays]
+    return text, f"{head},\n     LAYER_{'SPARSE' if counts.size else 'DENSE'}_ARRAYS({name})}}"
 
 
 def array(kind: str, name: str, values: np.ndarray, static: bool = True) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.detector.c_source import fields, float_literal, golden_header, golden_source, layer_arrays
+from airtouch.detector.c_source import float_literal, golden_header, golden_source, layer
 from airtouch.detector.model_file import Model
 from airtouch.detector.network import WEIGHTED
 from airtouch.detector.paper import decoding, stride
@@ -190,14 +190,9 @@ def _decoding(model: Model, prefix: str) -> str:
 
 def _model_source(network: Int8Network, header: str, variable: str) -> str:
     names = iter(WEIGHTED)
-    arrays, rows = [], []
-    for layer in network.layers:
-        members = fields(layer)
-        if layer.kind != "max_pool":
-            text, pointers = layer_arrays(next(names), layer)
-            arrays.append(text)
-            members += pointers
-        rows.append("    {" + ",\n     ".join(members) + "},")
+    parts = [layer("" if one.kind == "max_pool" else next(names), one) for one in network.layers]
+    arrays = [text for text, _ in parts if text]
+    rows = [f"    {initialiser}," for _, initialiser in parts]
     first, last = network.layers[0], network.layers[-1]
     return "\n".join([
         f'#include "{header}"', "", *arrays, "static const layerInt8_t layers[] = {", *rows, "};", "",

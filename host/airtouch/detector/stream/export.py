@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.detector.c_source import fields, float_literal, golden_header, golden_source, layer_arrays
+from airtouch.detector.c_source import float_literal, golden_header, golden_source, layer
 from airtouch.detector.stream.model import StreamModel
 from airtouch.detector.vehicle_header import thrust_text
 from airtouch.kernels.network import parameter_bytes
@@ -64,13 +64,11 @@ def _source(model: StreamModel) -> str:
     network, decoder = model.int8, model.decoder
     arrays, convs = [], []
     for i, conv in enumerate(network.convs):
-        text, pointers = layer_arrays(f"conv{i}", conv.layer)
+        text, inside = layer(f"conv{i}", conv.layer)
         arrays.append(text)
-        inside = ",\n               ".join(fields(conv.layer) + pointers)
-        convs.append(f"    {{.layer = {{{inside}}},\n     .dilation = {conv.dilation},\n"
-                     f"     .zeroPoint = {conv.layer.input_zero_point}}},")
-    text, pointers = layer_arrays("head", network.head)
-    first, head = network.convs[0].layer, ",\n    ".join(fields(network.head) + pointers)
+        convs.append(f"    {{.dilation = {conv.dilation}, .zeroPoint = {conv.layer.input_zero_point}, .layer =\n     {inside}}},")
+    text, head = layer("head", network.head)
+    first = network.convs[0].layer
     settings = {
         "overShare": float_literal(decoder.over_share), "entryScore": "AIRTOUCH_STREAM_ENTRY_SCORE",
         "exitScore": "AIRTOUCH_STREAM_EXIT_SCORE", "lateEntry": float_literal(decoder.late_entry),
@@ -79,7 +77,7 @@ def _source(model: StreamModel) -> str:
               "holdSteps": decoder.hold_steps}
     return "\n".join([
         '#include "airtouch_stream.h"', "", *arrays, text, "static const streamConv_t convs[] = {", *convs, "};", "",
-        f"static const layerInt8_t head = {{\n    {head},\n}};", "",
+        f"static const layerInt8_t head =\n    {head};", "",
         "const streamInt8_t airtouchStream = {", "    .convs = convs,", f"    .convCount = {len(network.convs)},",
         f"    .stride = {network.stride},", f"    .firstSkip = {network.first_skip},", "    .head = &head,", "};", "",
         "const streamQuantisation_t airtouchStreamQuantisation = {",
@@ -95,7 +93,8 @@ def _source(model: StreamModel) -> str:
 def _motion(motion: MotionConfig) -> str:
     vehicle = motion.vehicle
     thrust = ", ".join(float_literal(c) for c in vehicle.thrust_of_pwm_n)
-    scales = ", ".join(float_literal(1.0 / s) for s in motion.scale)
+    literals = [float_literal(1.0 / s) for s in motion.scale]
+    scales = ",\n                     ".join(", ".join(literals[i:i + 5]) for i in range(0, len(literals), 5))
     plain = {"limit": motion.limit, "armPwm": motion.arm_pwm, "slowGain": 1.0 / motion.slow_samples,
              "lagGain": 1.0 / motion.lag_samples, "leastThrust": motion.least_thrust_n}
     return "\n".join([
