@@ -36,6 +36,8 @@ FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-
 INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link", "firmware/app/src",
             "gap8/kernels", "gap8/model", "gap8/app/src"]
 VARIANTS = {"networks_xpulp": ("networks", ["-DAIRTOUCH_XPULP_EMULATION"])}  # the chip's path of the int8 kernels
+OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "quarantine_size_mb=32"}
+LONG = ("-O2",)  # of runs in which the inputs cost more than the compiler: a third less for those of a network
 LONGEST = 2048  # bytes of an input
 TIMEOUT = 20  # seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
 SEED_BYTES = 9_000  # kept of a target, at most, with what the archive needs for each input
@@ -176,7 +178,7 @@ def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None 
                "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", corpus(name, folder)]
     used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     with log.open("w") as to:
-        done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | {"UBSAN_OPTIONS": "print_stacktrace=1", "ASAN_OPTIONS": "quarantine_size_mb=32"})
+        done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | OPTIONS)
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
     text = log.read_text(errors="replace")
     new = [path for path in findings.iterdir() if path not in before]
@@ -199,7 +201,8 @@ def keep(name: str, program: Path) -> tuple[int, int]:
     for path in sorted(findings.iterdir()) if findings.is_dir() else []:
         found[f"found-{hashlib.sha256(path.read_bytes()).hexdigest()[:12]}"] = path.read_bytes()
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([program, "-merge=1", f"-max_len={LONGEST}", folder, grown], check=True, capture_output=True)
+        subprocess.run([program, "-merge=1", f"-max_len={LONGEST}", f"-artifact_prefix={BUILD}/", folder, grown],
+                       check=True, capture_output=True)
         SEEDS.mkdir(exist_ok=True)
         kept, total = len(found), sum(len(content) + ENTRY_BYTES for content in found.values())
         with zipfile.ZipFile(SEEDS / f"{name}.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
@@ -223,8 +226,8 @@ def cover(names: list[str]) -> None:
     folder = BUILD / "coverage"
     programs = build(names, made_by, folder=folder, flags=("-fprofile-instr-generate", "-fcoverage-mapping"))
     for name, program in programs.items():
-        subprocess.run([program, "-runs=0", f"-max_len={LONGEST}", corpus(name)], check=True, capture_output=True,
-                       env=os.environ | {"LLVM_PROFILE_FILE": str(folder / f"{name}.raw")})
+        subprocess.run([program, "-runs=0", f"-max_len={LONGEST}", f"-artifact_prefix={BUILD}/", corpus(name)],
+                       check=True, capture_output=True, env=os.environ | {"LLVM_PROFILE_FILE": str(folder / f"{name}.raw")})
     merged = folder / "all.profile"
     subprocess.run([tools[0], "merge", *folder.glob("*.raw"), "-o", merged], check=True)
     objects = [word for name in names for word in ("-object", programs[name])]
@@ -249,7 +252,7 @@ def main() -> None:
     made_by = engine(wanted.engine)
     if made_by is None:
         raise SystemExit("no compiler with sanitizers here: apt-get install clang")
-    programs = build(names, made_by)
+    programs = build(names, made_by, flags=LONG)
     if wanted.replay:
         sys.exit(max(subprocess.run([programs[name], *wanted.replay]).returncode for name in names))
     if wanted.keep:
