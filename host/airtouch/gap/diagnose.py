@@ -7,6 +7,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import advice as advices
+from airtouch.gap import callable_module
 from airtouch.gap import balance_result, calibrate, candidates, measure, summary
 from airtouch.gap import pictures as picture
 from airtouch.gap.candidates import CLOCK, Term
@@ -269,3 +270,6 @@ def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], f
 
 def _plain(shrink: Shrink) -> dict[str, object]:
     return {"before": shrink.before, "after": shrink.after, "shrink": shrink.share.plain()}
+
+
+callable_module(__name__)

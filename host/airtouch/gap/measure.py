@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap import calibrate, summary, twin
+from airtouch.gap import calibrate, callable_module, summary, twin
 from airtouch.gap.channels import residual
 from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, Flight, ready
@@ -217,3 +217,6 @@ def _spectra(flown: Sequence[np.ndarray], nominal: Sequence[np.ndarray]) -> dict
         if usual is not None and usual[0, -1]:
             made[axis]["nominal"] = (usual[:, i] / usual[0, -1]).tolist()
     return made
+
+
+callable_module(__name__)

@@ -1,0 +1,80 @@
+"""`import airtouch as at` from the outside: quick to import, and each function on a file, a log and a pandas table."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import short_flights
+
+import airtouch as at
+
+NEVER = ("numba", "scipy", "pandas", "matplotlib", "tensorflow", "keras", "sklearn", "jinja2", "numpy", "cffi", "click")
+
+
+@pytest.fixture(scope="module")
+def log():
+    return short_flights.fly(1)[0]
+
+
+@pytest.fixture(scope="module")
+def path(log, tmp_path_factory):
+    path = tmp_path_factory.mktemp("api") / "flight.csv.gz"
+    at.write(log, path)
+    return path
+
+
+def test_the_import_itself_brings_nothing_heavy():
+    code = f"import sys, airtouch; print([m for m in {NEVER!r} if m in sys.modules], sorted(airtouch.__all__) == dir(airtouch))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[] True\n"
+
+
+def test_everything_promised_is_there():
+    for name in at.__all__:
+        assert getattr(at, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        at.nonsense
+
+
+def test_detect_and_evaluate_take_a_file_a_log_and_a_table(log, path):
+    table = at.to_pandas(path)
+    assert list(table.columns) == list(at.read(path).columns) and len(table) == len(log)
+    found = [at.detect(flight, "baseline").edges for flight in (path, str(path), at.read(path), table)]
+    assert found[0] == found[1] == found[2] == found[3]
+    scores = [at.evaluate(f, "baseline", speed_mps=0.3) for f in (path, [at.read(path)], table)]
+    assert len({s["edges"] for s in scores}) == 1 and scores[0]["flights"] == 1 and scores[0]["edges"] >= 2
+    assert len({s["missed_count"] for s in scores}) == 1
+
+
+def test_a_table_goes_there_and_back(log):
+    back = at.from_pandas(at.to_pandas(log).assign(more=1.0))
+    assert back.meta["vehicle"] == log.meta["vehicle"] and set(back.columns) == set(log.columns)
+    for name in log.columns:
+        np.testing.assert_array_equal(back[name], log[name])
+    with pytest.raises(at.AirTouchError, match="no column of this table"):
+        at.from_pandas(at.to_pandas(log)[["t_s"]].rename(columns={"t_s": "seconds"}))
+
+
+def test_simulate_is_what_the_command_flies():
+    (one,) = at.simulate("hover", effects={"wind": {"x": 0.3}}, seed=3)
+    (other,) = at.simulate("hover", effects=[("wind", {"x": 0.3})], seed=3)
+    np.testing.assert_array_equal(one["gyro_x_radps"], other["gyro_x_radps"])
+    with pytest.raises(at.AirTouchError, match="wind has no parameter"):
+        at.simulate("hover", effects={"wind": {"speed": 0.3}})
+
+
+def test_gap_is_called_by_name_and_stays_a_module(log, path, tmp_path):
+    from airtouch.gap.measure import Measurement, measure
+
+    assert isinstance(at.gap.measure(path), Measurement) and callable(measure)
+    from airtouch.gap.diagnose import diagnose  # the import of a module must not hide the function
+
+    assert callable(diagnose) and callable(at.gap.diagnose)
+    with pytest.raises(at.AirTouchError, match="no flight to diagnose|too short|no flight in it"):
+        at.gap.diagnose(log.slice(0, 150))
+
+
+def test_types_are_marked():
+    from importlib import resources
+
+    assert (resources.files("airtouch") / "py.typed").is_file()
