@@ -19,5 +19,6 @@ def shown(text: str, most: int = 40) -> str:
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """`; did you mean a or b?` for the known names that are close to one that is not, "" where none is."""
-    close = difflib.get_close_matches(name.lower(), list(dict.fromkeys(known)), 3)
+    folded = {k.lower(): k for k in known}
+    close = [folded[k] for k in difflib.get_close_matches(name.lower(), folded, 3)]
     return f"; did you mean {' or '.join(close)}?" if close else ""

@@ -6,10 +6,12 @@ one of your own; `load_file` registers those of a Python file.
 
 import importlib
 import re
+import traceback
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, nearest
+from airtouch.simulation.effects import names
 from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
 __all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "load_text", "parse",
@@ -45,7 +47,7 @@ def unregister(name: str) -> None:
 def get(name: str) -> Effect:
     """The effect of that name; AirTouchError names the known ones."""
     if name not in EFFECTS:
-        raise AirTouchError(f"no effect {name!r}; known: {', '.join(EFFECTS)}")
+        raise AirTouchError(f"no effect {name!r}{nearest(name, EFFECTS)}; known: {', '.join(EFFECTS)}")
     return EFFECTS[name]
 
 
@@ -115,16 +117,25 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
         return _LOADED[key]
     scope: dict[str, object] = {"__name__": "airtouch_effects"}
     try:
+        names.check(text, source)
         exec(compile(text, source, "exec"), scope)
     except AirTouchError:
         raise
     except Exception as error:
-        raise AirTouchError(f"{source}: {type(error).__name__}: {str(error).splitlines()[0]}") from None
+        raise AirTouchError(f"{source}{_line_of(error, source)}: {type(error).__name__}: {str(error).splitlines()[0]}") from None
     found = [v for v in scope.values() if isinstance(v, Effect)]
     if not found:
         raise AirTouchError(f"{source}: defines no Effect")
     _LOADED[key] = [register(e) for e in found]
     return _LOADED[key]
+
+
+def _line_of(error: Exception, source: str) -> str:
+    """`:12`, the line of the file in which an error was raised, "" where it is not known."""
+    if isinstance(error, SyntaxError):
+        return f":{error.lineno}" if error.lineno else ""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == source]
+    return f":{lines[-1]}" if lines else ""
 
 
 _LOADED: dict[int, list[Effect]] = {}

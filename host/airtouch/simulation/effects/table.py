@@ -1,11 +1,15 @@
-"""The table of effects in host/docs/effects.md: `python -m airtouch.simulation.effects.table FILE`."""
+"""The tables of effects, signals and plant fields in host/docs/effects.md: `python -m airtouch.simulation.effects.table FILE`."""
 
+import inspect
+import re
 import sys
 from pathlib import Path
 
+from airtouch.simulation import plant, signals
 from airtouch.simulation.effects import EFFECTS, NAMES
 
 BEGIN, END = "<!-- begin: python -m airtouch.simulation.effects.table -->", "<!-- end -->"
+BEGIN_NAMES, END_NAMES = "<!-- begin: signals and fields, by the same command -->", "<!-- end of signals and fields -->"
 
 
 def table() -> str:
@@ -27,11 +31,36 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def names_table() -> str:
+    """Markdown tables of the signals that a wrench may read and of the plant fields that settings may change."""
+    lines = ["| signal | numbers | unit and meaning |", "|---|---|---|"]
+    for name, count, text in signal_rows():
+        lines.append(f"| `at.{name}` | {count} | {text} |")
+    lines += ["", "| plant field | numbers | where the vehicle says nothing | unit and meaning |", "|---|---|---|---|"]
+    lines += [f"| `{name}` | {count} | {default:g} | {text} |" for name, count, default, text in plant.FIELDS]
+    return "\n".join(lines) + "\n"
+
+
+def signal_rows() -> list[tuple[str, int, str]]:
+    """Name, how many numbers, and meaning of every signal, as `simulation/signals.py` says them."""
+    rows = []
+    for name, text in re.findall(r"^([A-Z_]+) = \d+  #: (.*)$", inspect.getsource(signals), re.M):
+        if name == "COUNT":
+            continue
+        many = re.match(r"(\d+)(?:, (.*))?$", text)
+        rows.append((name, int(many[1]) if many else 1, (many[2] or "") if many else text))
+    return rows
+
+
 def updated(text: str) -> str:
-    """A page with the part between BEGIN and END replaced."""
-    before, _, rest = text.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    return f"{before}{BEGIN}\n{table()}{END}{after}"
+    """A page with the parts between the marks replaced."""
+    return _between(_between(text, BEGIN, END, table()), BEGIN_NAMES, END_NAMES, names_table())
+
+
+def _between(text: str, begin: str, end: str, made: str) -> str:
+    before, _, rest = text.partition(begin)
+    _, _, after = rest.partition(end)
+    return f"{before}{begin}\n{made}{end}{after}"
 
 
 if __name__ == "__main__":

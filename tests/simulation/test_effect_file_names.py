@@ -1,0 +1,57 @@
+"""A wrong name in a user's effect file: told with its line and the nearest right ones, before numba sees it."""
+
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation import effects, plant
+from airtouch.simulation.effects import names, table
+
+FILE = '''from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Effect, Parameter, wrench
+
+
+@wrench
+def push(p, s, memory, stream, out):
+    if s[at.TIME] > p[1]:
+        out[2] -= p[0] * s[at.HEIGHT]
+
+
+def slower(plant, values):
+    plant["motor_rise"] *= values["lag"]
+
+
+EFFECT = Effect("late_push", "begins half-way",
+                (Parameter("force", "N", 0.01, 0.0, 0.1, 0.0, ""), Parameter("since", "s", 8.0, 0.0, 100.0, None, ""),
+                 Parameter("lag", "1", 1.0, 0.5, 3.0, 1.0, "")), settings=slower, wrench=push)
+'''
+
+
+@pytest.mark.parametrize(("right", "wrong", "said"), [
+    ("at.HEIGHT", "at.HIGHT", "mine.py:8: no signal 'HIGHT'; did you mean HEIGHT"),
+    ("at.TIME", "at.time", "mine.py:7: no signal 'time'; did you mean TIME"),
+    ('"motor_rise"', '"motor_rize"', "mine.py:12: no plant field 'motor_rize'; did you mean motor_rise"),
+    ('values["lag"]', 'values["laag"]', "mine.py:12: no parameter of this file 'laag'; did you mean lag"),
+    ("Effect(\"late", "Efect(\"late", "mine.py:15: NameError"),
+    ("def slower(plant, values):", "def slower(plant, values)", "mine.py:11: SyntaxError"),
+])
+def test_a_wrong_name_has_its_line_and_the_nearest(tmp_path, right, wrong, said):
+    file = tmp_path / "mine.py"
+    file.write_text(FILE.replace(right, wrong))
+    with pytest.raises(AirTouchError) as error:
+        effects.load_file(file)
+    assert said in str(error.value) and "\n" not in str(error.value)
+    assert "late_push" not in effects.EFFECTS
+
+
+def test_right_names_pass_and_are_the_tables():
+    names.check(FILE, "mine.py")
+    page = table.names_table()
+    assert all(f"`at.{name}`" in page for name in names.SIGNALS if name != "COUNT")
+    assert all(f"| `{name}` |" in page for name, *_ in plant.FIELDS)
+    rows = table.signal_rows()
+    assert len(rows) == len(names.SIGNALS) - 1 and sum(count for _, count, _ in rows) == 73
+
+
+def test_a_mistyped_effect_gets_the_nearest():
+    with pytest.raises(AirTouchError, match="no effect 'weak_moter'; did you mean weak_motor"):
+        effects.get("weak_moter")
