@@ -134,6 +134,42 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     _written(json_path, report)
 
 
+@command.command("demo")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/gap-demo"), show_default=True,
+              help="Folder for the report and the JSON.")
+@click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
+def demo_command(out: Path, force: bool) -> None:
+    """Diagnose a flight that comes with the package, whose effect is withheld, and compare with what it was.
+
+    Needs no drone, no network and no TensorFlow; about a minute, most of it compiling the first time.
+    """
+    import time
+
+    from airtouch.cli import gap_show
+    from airtouch.gap import example, words
+    from airtouch.gap.diagnose import diagnose
+    from airtouch.logs import read
+    from airtouch.report import gap_report
+    from airtouch.vehicle import load
+
+    report, json_path = out / "report.html", out / "diagnosis.json"
+    _check_free(report, json_path, force)
+    began = time.monotonic()
+    line = f"airtouch gap diagnose {example.real()} --baseline {example.FOLDER / 'nominal_*.csv.gz'} --report {report}"
+    click.echo(f"This is: {line}")
+    nominal = [read(p) for p in example.nominal()]
+    with gap_show.Steps(began) as say:
+        say("reading and compiling")
+        found = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say, pictures=True)
+    scores.write_json(json_path, found.plain(), force)
+    gap_report.write_diagnosis(report, found, command="airtouch gap demo", force=force)
+    gap_show.diagnosis(scores.console(), found)
+    true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
+    told = words.joined([e.name for e in found.effects]) or found.verdict
+    click.echo(f"\nSwitched on when the flight was made: {'; '.join(f'{n} ({p})' for n, p in true.items())}; found: {told}.")
+    click.echo(f"{time.monotonic() - began:.0f} s; open {report} in a browser")
+
+
 def _case(vehicle: Any, nominal: list, without: tuple[str, ...]) -> Callable:
     """The diagnosis of some flights, everything else being given."""
     from functools import partial

@@ -1,6 +1,7 @@
 """What `airtouch gap` prints: tables, sentences, and a bar when it takes long."""
 
 import threading
+import time
 from collections.abc import Iterable, Sequence
 
 import click
@@ -40,6 +41,33 @@ class Bar:
 
     def __call__(self, text: str) -> None:
         self.progress.update(self.task, advance=1, description=text[-60:])
+
+
+class Steps:
+    """A line when something else is done and LINE_S have passed since the last, with the seconds since the start."""
+
+    LINE_S = 1.5
+
+    def __init__(self, began: float) -> None:
+        self.began, self.last, self.text = began, 0.0, ""
+        self.stopped = threading.Event()
+        self.thread = threading.Thread(target=self._tick, daemon=True)
+
+    def __enter__(self) -> "Steps":
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stopped.set()
+        self.thread.join()
+
+    def __call__(self, text: str) -> None:
+        self.text = text
+
+    def _tick(self) -> None:
+        """Something on the screen every LINE_S, whatever the work does meanwhile."""
+        while not self.stopped.wait(self.LINE_S):
+            click.echo(f"[{time.monotonic() - self.began:4.0f} s] {self.text}", err=True)
 
 
 def cells(some: Iterable[Cell], title: str) -> Table:
