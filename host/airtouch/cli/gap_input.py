@@ -9,9 +9,10 @@ import click
 from airtouch import logs, vehicle
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.rosbag import is_bag
 from airtouch.vehicle import Vehicle
 
-ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin")
+ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")
 DEFAULT = "crazyflie-2.1-flow"
 MANIFEST = "manifest.csv"
 
@@ -50,7 +51,9 @@ def files_of(names: Sequence[str]) -> list[Path]:
     found: dict[Path, None] = {}
     for name in names:
         path = Path(name)
-        if path.is_dir():
+        if path.is_dir() and is_bag(path):
+            some = [path]
+        elif path.is_dir():
             some = [p for p in sorted(path.iterdir())
                     if p.name.endswith(ENDINGS) and p.name != MANIFEST]
         elif path.exists():

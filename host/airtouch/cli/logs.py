@@ -13,8 +13,10 @@ import click
 from airtouch import logs
 from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError, shown
+from airtouch.logs.rosbag import is_bag
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
+FOREIGN = (".ulg",)  #: read in folders as well
 FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
 #: what the table calls a group of channels -> the column that tells whether it is there
 GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
@@ -82,9 +84,13 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
               help="Folder for the converted files; made when missing.")
 @click.option("--format", "ending", type=click.Choice([e[1:] for e in ENDINGS]), default="csv.gz",
               show_default=True, help="Kind of file to write.")
+@click.option("--columns", "mapping", type=click.Path(), metavar="MAP.toml",
+              help="Read CSVs of someone else's by this file, which says which of their columns is which of ours.")
+@click.option("--plain", is_flag=True, help="With csv: a header and numbers alone, as PlotJuggler and spreadsheets want it.")
 @click.option("--rate", type=float, help="Resample to exactly this rate in Hz (else samples stay as logged).")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
-def convert(files: tuple[str, ...], out: str, ending: str, rate: float | None, force: bool) -> None:
+def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, plain: bool, rate: float | None,
+            force: bool) -> None:
     """Write flights in the canonical schema, SI units in the column names.
 
     Nothing is resampled unless --rate is given: then a low-pass comes first when
@@ -94,6 +100,13 @@ def convert(files: tuple[str, ...], out: str, ending: str, rate: float | None, f
     Example:
       airtouch logs convert log00 log01 --out converted --rate 100
     """
+    from airtouch.logs import canonical, mapped
+    from airtouch.logs.files import write_bytes
+
+    if plain and ending != "csv":
+        raise AirTouchError("--plain is for --format csv")
+    if mapping:
+        mapped.load(mapping)
     folder = Path(out)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -107,8 +120,12 @@ def convert(files: tuple[str, ...], out: str, ending: str, rate: float | None, f
             raise AirTouchError(f"{path}: another file of this call is {target} already; rename one of them")
         if os.path.exists(target) and os.path.exists(path) and target.samefile(path):
             raise AirTouchError(f"{path}: would be replaced by its own conversion; choose another --out")
-        log = logs.read(path)
-        logs.write(log if rate is None else logs.resample(log, rate), target, force)
+        log = mapped.read(path, mapping) if mapping else logs.read(path)
+        log = log if rate is None else logs.resample(log, rate)
+        if plain:
+            write_bytes(canonical.plain_csv(log), target, force)
+        else:
+            logs.write(log, target, force)
         written.add(target)
         return target
 
@@ -130,14 +147,14 @@ def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], 
 
 def _expand(files: Iterable[str]) -> Iterator[Path]:
     for name in files:
-        if not os.path.isdir(name):
+        if not os.path.isdir(name) or is_bag(name):
             yield Path(name)
             continue
         try:
             inside = sorted(Path(name).iterdir())
         except OSError as error:
             raise AirTouchError(f"{name}: cannot be listed: {error.strerror}; check its rights") from None
-        yield from (p for p in inside if p.name.endswith(ENDINGS) and p.name != "manifest.csv")
+        yield from (p for p in inside if p.name.endswith((*ENDINGS, *FOREIGN)) and p.name != "manifest.csv")
 
 
 def _progress(paths: list[Path]) -> Iterable[Path]:

@@ -51,6 +51,13 @@ def to_bytes(log: FlightLog, compress: bool = False) -> bytes:
     return gzip.compress(data, mtime=0) if compress else data
 
 
+def plain_csv(log: FlightLog) -> bytes:
+    """A header line and numbers alone, missing ones empty: for PlotJuggler, spreadsheets and other readers."""
+    names = ordered_names(log)
+    cells = [[_shortest(v) if v == v else "" for v in log.columns[name].tolist()] for name in names]
+    return ("\n".join([",".join(names), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n").encode()
+
+
 def ordered_names(log: FlightLog) -> list[str]:
     """Column names as they are written: the schema's order, then any others.
 

@@ -17,10 +17,15 @@ PIECE_BYTES = 1 << 14  #: read or unpacked at a time
 
 
 def read(path: str | Path) -> FlightLog:
-    """A flight log from any known file, `.gz` or not; the content decides, not the name.
+    """A flight log from any known file, `.gz` or not, or the folder of a ROS 2 bag; the content decides, not the name.
 
     Raises AirTouchError with file, place and remedy when it cannot be read.
     """
+    if Path(path).is_dir():
+        from airtouch.logs import rosbag
+
+        if rosbag.is_bag(path):
+            return checked(rosbag.read(path))
     return parse(_bytes(path), str(path))
 
 
@@ -89,6 +94,10 @@ def _by_content(data: bytes, source: str) -> FlightLog:
         from airtouch.logs import parquet
 
         return parquet.read(data, source)
+    if data[:7] == b"ULog\x01\x12\x35":
+        from airtouch.logs import ulog
+
+        return ulog.read(data, source)
     if data[0] == usd.MAGIC:
         return usd.read(data, source)
     return _by_header(sheet(_text(data, source)), source)

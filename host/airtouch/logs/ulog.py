@@ -1,0 +1,66 @@
+"""PX4 ULog files, read by `pyulog` (extra 'ulog').
+
+PX4 counts body axes forward, right, down and the world north, east, down; motors 1 front right, 2 rear left, 3 front
+left, 4 rear right. Here y is left, z up and the motors go round from the front right.
+"""
+
+import io
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.extras import need
+from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
+from airtouch.logs.quaternion import euler
+from airtouch.logs.streams import Stream, log_of
+
+MAGIC = b"ULog\x01\x12\x35"
+FLIP = (1.0, -1.0, -1.0)  #: of forward, right, down to forward, left, up
+MOTORS = (0, 3, 1, 2)  #: PX4's number of our motors 1 to 4, from 0
+TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position", "distance_sensor", "battery_status", "actuator_motors",
+          "actuator_outputs")
+
+
+def read(data: bytes, source: str) -> FlightLog:
+    """A flight log at 100 Hz. Raises AirTouchError where pyulog is missing or the file has no IMU.
+
+    Motors are those of `actuator_motors` (0 to 1) or, where that is missing, of `actuator_outputs` (1000 to 2000 us),
+    both as 0..65535.
+    """
+    need("ulog", f"{source}: reading PX4 logs")
+    from pyulog import ULog
+
+    try:
+        topics = {d.name: d.data for d in reversed(ULog(io.BytesIO(data), list(TOPICS)).data_list)}  # the first instance counts
+    except Exception as error:  # whatever a damaged file makes the library raise
+        raise AirTouchError(f"{source}: not a whole ULog file: {type(error).__name__}: {error}") from None
+    streams: dict[str, Stream] = {}
+
+    def add(topic: str, names: tuple[str, ...], fields: tuple[str, ...], signs: tuple[float, ...]) -> None:
+        table = topics.get(topic, {})
+        for name, field, sign in zip(names, fields, signs, strict=True):
+            if field in table:
+                streams[name] = table["timestamp"] * 1e-6, sign * np.asarray(table[field], float)
+
+    add("sensor_combined", ACC, tuple(f"accelerometer_m_s2[{i}]" for i in range(3)), FLIP)
+    add("sensor_combined", GYRO, tuple(f"gyro_rad[{i}]" for i in range(3)), FLIP)
+    add("vehicle_local_position", POSITION, ("x", "y", "z"), FLIP)
+    add("vehicle_local_position", VELOCITY, ("vx", "vy", "vz"), FLIP)
+    add("distance_sensor", ("zrange_m",), ("current_distance",), (1.0,))
+    add("battery_status", ("vbat_V",), ("voltage_v",), (1.0,))
+    if "q[0]" in topics.get("vehicle_attitude", {}):
+        table = topics["vehicle_attitude"]
+        w, x, y, z = (np.asarray(table[f"q[{i}]"], float) for i in range(4))
+        turned = np.column_stack([x, -y, -z, w])  # both frames are turned by half a turn about x
+        streams |= {name: (table["timestamp"] * 1e-6, v) for name, v in zip(ATTITUDE, euler(turned), strict=True)}
+    streams |= _motors(topics)
+    return log_of(streams, {"source": source, "format": "ulog", "vehicle": "", "acc_frame": "body"})
+
+
+def _motors(topics: dict) -> dict[str, Stream]:
+    for topic, field, low, high in (("actuator_motors", "control", 0.0, 1.0), ("actuator_outputs", "output", 1000.0, 2000.0)):
+        table = topics.get(topic, {})
+        if all(f"{field}[{i}]" in table for i in MOTORS):
+            share = [np.clip((np.asarray(table[f"{field}[{i}]"], float) - low) / (high - low), 0.0, 1.0) for i in MOTORS]
+            return {name: (table["timestamp"] * 1e-6, np.nan_to_num(65535.0 * s)) for name, s in zip(PWM, share, strict=True)}
+    return {}

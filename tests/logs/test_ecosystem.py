@@ -1,0 +1,189 @@
+"""Files of PX4 and ROS 2, written by pyulog and rosbags, and CSVs of others by a map."""
+
+import csv
+import struct
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from airtouch import logs
+from airtouch.cli.logs import command
+from airtouch.errors import AirTouchError
+from airtouch.logs import mapped, streams, ulog
+
+N, HZ = 1000, 250.0  #: samples of the IMU
+T = np.arange(N) / HZ
+
+
+def run(*arguments):
+    return CliRunner().invoke(command, [str(a) for a in arguments])
+
+
+def topic(number, name, fields, rows):
+    """Definition, subscription and data messages of one ULog topic; fields {name: count}."""
+    kinds = ";".join(f"float{f'[{n}]' if n > 1 else ''} {f}" for f, n in fields.items())
+    out = message("F", f"{name}:uint64_t timestamp;{kinds};".encode())
+    subscription = message("A", struct.pack("<BH", 0, number) + name.encode())
+    data = [message("D", struct.pack("<HQ", number, int(t * 1e6)) + np.asarray(v, "<f4").tobytes()) for t, *v in rows]
+    return out, subscription + b"".join(data)
+
+
+def message(kind, body):
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
+@pytest.fixture
+def px4(tmp_path):
+    """A log that pyulog has written: rolling right at 1 rad/s, 9.81 up, climbing, motors 10, 20, 30, 40 %."""
+    pyulog = pytest.importorskip("pyulog", reason="PX4 logs need the extra 'ulog'")
+    topics = [
+        topic(0, "sensor_combined", {"gyro_rad": 3, "accelerometer_m_s2": 3}, [(t, 1.0, 0.2, 0.3, 0.1, 0.5, -9.81) for t in T]),
+        topic(1, "vehicle_local_position", {"x": 1, "y": 1, "z": 1, "vx": 1, "vy": 1, "vz": 1},
+              [(t, 1.0, 2.0, -t, 0.1, 0.2, -1.0) for t in T[::5]]),
+        topic(2, "vehicle_attitude", {"q": 4}, [(t, np.cos(0.1), np.sin(0.1), 0.0, 0.0) for t in T[::5]]),
+        topic(3, "actuator_motors", {"control": 12}, [(t, 0.1, 0.2, 0.3, 0.4, *[np.nan] * 8) for t in T]),
+        topic(4, "distance_sensor", {"current_distance": 1}, [(t, t) for t in T[::20]]),
+        topic(5, "battery_status", {"voltage_v": 1}, [(t, 15.5) for t in T[::25]])]
+    seed = tmp_path / "seed.ulg"
+    seed.write_bytes(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + b"".join(d for d, _ in topics) + b"".join(s for _, s in topics))
+    path = tmp_path / "px4.ulg"
+    pyulog.ULog(str(seed)).write_ulog(str(path))
+    seed.unlink()
+    return path
+
+
+def test_a_px4_log_comes_in_our_axes_and_motor_order(px4):
+    log = logs.read(px4)
+    assert log.meta["format"] == "ulog" and np.allclose(np.diff(log["t_s"]), 0.01)
+    row = len(log) // 2
+    for name, value in {"gyro_x_radps": 1.0, "gyro_y_radps": -0.2, "gyro_z_radps": -0.3, "acc_x_mps2": 0.1, "acc_y_mps2": -0.5,
+                        "acc_z_mps2": 9.81, "y_m": -2.0, "vy_mps": -0.2, "vz_mps": 1.0, "roll_rad": 0.2, "vbat_V": 15.5}.items():
+        assert log[name][row] == pytest.approx(value, abs=1e-5), name
+    assert log["z_m"][row] == pytest.approx(log["t_s"][row], abs=0.03)
+    # PX4: 1 front right, 2 rear left, 3 front left, 4 rear right
+    assert [log[f"m{i}_pwm"][row] / 65535 for i in (1, 2, 3, 4)] == pytest.approx([0.1, 0.4, 0.2, 0.3])
+
+
+def test_a_px4_log_is_read_by_the_commands(px4, tmp_path):
+    shown = run("info", px4)
+    assert shown.exit_code == 0 and "ulog" in shown.output
+    px4.write_bytes(px4.read_bytes()[:60])
+    with pytest.raises(AirTouchError, match="px4.ulg: (not a whole ULog|neither accelerations)"):
+        logs.read(px4)
+
+
+def test_without_pyulog_its_extra_is_named(monkeypatch):
+    monkeypatch.setitem(__import__("airtouch.extras", fromlist=["EXTRAS"]).EXTRAS, "ulog", ("no_such_module_of_this_name",))
+    with pytest.raises(AirTouchError, match=r"reading PX4 logs needs .*airtouch\[ulog\]"):
+        ulog.read(ulog.MAGIC, "x.ulg")
+
+
+@pytest.fixture
+def bag(tmp_path):
+    """A ROS 2 bag that rosbags has written."""
+    pytest.importorskip("rosbags", reason="ROS 2 bags need the extra 'ros'")
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kind = lambda name: store.types[name]
+    stamp, header = kind("builtin_interfaces/msg/Time"), kind("std_msgs/msg/Header")
+    vector, point, quaternion = (kind(f"geometry_msgs/msg/{n}") for n in ("Vector3", "Point", "Quaternion"))
+    turn = quaternion(0.0, 0.0, np.sin(np.pi / 4), np.cos(np.pi / 4))  # nose to the left
+    place = tmp_path / "bag"
+    with Writer(place, version=9) as writer:
+        names = {"/imu": "sensor_msgs/msg/Imu", "/odom": "nav_msgs/msg/Odometry", "/down": "sensor_msgs/msg/Range",
+                 "/motors_pwm": "std_msgs/msg/UInt16MultiArray"}
+        connections = {t: writer.add_connection(t, name, typestore=store) for t, name in names.items()}
+        for i in range(200):
+            time = header(stamp(i // 100, (i % 100) * 10_000_000), "body")
+            zeros = np.zeros(9)
+            imu = kind(names["/imu"])(time, turn, zeros, vector(0.1, 0.2, 0.3), zeros, vector(0.0, 0.5, 9.81), zeros)
+            pose = kind("geometry_msgs/msg/PoseWithCovariance")(kind("geometry_msgs/msg/Pose")(point(1.0, 2.0, 3.0), turn), np.zeros(36))
+            twist = kind("geometry_msgs/msg/TwistWithCovariance")(kind("geometry_msgs/msg/Twist")(
+                vector(1.0, 0.0, 0.0), vector(0.0, 0.0, 0.0)), np.zeros(36))
+            odometry = kind(names["/odom"])(time, "base", pose, twist)
+            down = kind(names["/down"])(time, 0, 0.1, 0.0, 4.0, 0.75)
+            layout = kind("std_msgs/msg/MultiArrayLayout")([], 0)
+            motors = kind(names["/motors_pwm"])(layout, np.array([1, 2, 3, 4], np.uint16))
+            for topic_name, made in zip(names, (imu, odometry, down, motors), strict=True):
+                writer.write(connections[topic_name], i * 10_000_000, store.serialize_cdr(made, names[topic_name]))
+    return place
+
+
+def test_a_ros_bag_is_read_by_message_type(bag):
+    log = logs.read(bag)
+    row = 100
+    assert log.meta["format"] == "rosbag2" and len(log) == 200
+    for name, value in {"gyro_y_radps": 0.2, "acc_y_mps2": 0.5, "acc_z_mps2": 9.81, "x_m": 1.0, "zrange_m": 0.75, "m3_pwm": 3.0,
+                        "vx_mps": 0.0, "vy_mps": 1.0, "yaw_rad": np.pi / 2}.items():
+        assert log[name][row] == pytest.approx(value, abs=1e-9), name
+    shown = run("info", bag)
+    assert shown.exit_code == 0 and "rosbag2" in shown.output
+
+
+@pytest.fixture
+def theirs(tmp_path):
+    path = tmp_path / "nano.csv"
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["time_us", "imu.gyro.x", "imu acc z", "motor 1"])
+        rows.writerows([[i * 10_000, 90.0, 1.0, 0.5] for i in range(50)])
+    return path
+
+
+MAP = '''vehicle = "crazyflie-2.1"
+[columns.t_s]
+from = "time_us"
+scale = 1e-6
+[columns.gyro_x_radps]
+from = "imu.gyro.x"
+scale = 0.017453292519943295
+[columns.acc_z_mps2]
+from = "imu acc z"
+scale = 9.81
+[columns.m1_pwm]
+from = "motor 1"
+offset = 0.5
+scale = 65535
+'''
+
+
+def test_someone_elses_csv_by_a_map(theirs, tmp_path):
+    (tmp_path / "map.toml").write_text(MAP)
+    shown = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv")
+    assert shown.exit_code == 0, shown.output
+    log = logs.read(tmp_path / "out/nano.csv")
+    assert log["t_s"][49] == pytest.approx(0.49) and log["gyro_x_radps"][0] == pytest.approx(np.pi / 2)
+    assert log["acc_z_mps2"][3] == pytest.approx(9.81) and log["m1_pwm"][7] == pytest.approx(65535) and log.meta["vehicle"] == "crazyflie-2.1"
+
+
+@pytest.mark.parametrize(("right", "wrong", "said"), [
+    ("columns.gyro_x_radps", "columns.gyro_x_rads", "is no column of the flight log; did you mean gyro_x_radps"),
+    ('"imu.gyro.x"', '"imu.gyr.x"', "no column 'imu.gyr.x'; did you mean imu.gyro.x"),
+    ("offset", "ofset", "has no key 'ofset'; did you mean offset"), ('from = "motor 1"', "", "needs from")])
+def test_a_wrong_name_in_a_map_gets_the_nearest(theirs, tmp_path, right, wrong, said):
+    (tmp_path / "map.toml").write_text(MAP.replace(right, wrong))
+    with pytest.raises(AirTouchError) as error:
+        mapped.read(theirs, tmp_path / "map.toml")
+    assert said in str(error.value)
+
+
+def test_a_plain_csv_is_a_header_and_numbers(theirs, tmp_path):
+    (tmp_path / "map.toml").write_text(MAP)
+    shown = run("convert", theirs, "--columns", tmp_path / "map.toml", "--out", tmp_path / "out", "--format", "csv", "--plain")
+    assert shown.exit_code == 0, shown.output
+    pandas = pytest.importorskip("pandas")
+    table = pandas.read_csv(tmp_path / "out/nano.csv")
+    assert list(table.columns) == ["t_s", "acc_z_mps2", "gyro_x_radps", "m1_pwm"] and len(table) == 50 and (table.dtypes != object).all()
+
+
+def test_fast_imu_is_averaged_and_slow_values_are_held_only_so_long():
+    fast = np.arange(0.0, 1.0, 0.001)
+    log = streams.log_of({"acc_x_mps2": (fast, np.sin(2 * np.pi * 200.0 * fast)), "vbat_V": (np.array([0.2]), np.array([4.0]))},
+                         {"source": "x"})
+    assert np.abs(log["acc_x_mps2"][1:-1]).max() < 0.05  # 200 Hz would fold to 0 Hz and stand there
+    assert np.isnan(log["vbat_V"][:20]).all() and (log["vbat_V"][21:44] == 4.0).all() and np.isnan(log["vbat_V"][48:]).all()
+    with pytest.raises(AirTouchError, match="x: neither accelerations nor rates"):
+        streams.log_of({"vbat_V": (np.array([0.2]), np.array([4.0]))}, {"source": "x"})
