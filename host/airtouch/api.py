@@ -159,15 +159,17 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch import vehicle as vehicles
     from airtouch.cli.scores import check_free
     from airtouch.detector import best, dataset
-    from airtouch.detector import evaluate as scoring
+    from airtouch.extras import need
     from airtouch.simulation import scenario
     from airtouch.twin import adapt as module
     from airtouch.twin import files
 
+    need("train", "training")
     out = Path(out)
     check_free(out, force)
-    usable = [module.Flight(f, scoring.read_flight(f, scoring.spare_of(best)))
-              for f in dataset.collect(_several(flights), speed_mps)]
+    usable, left_out = module.readable(dataset.collect(_several(flights), speed_mps))
+    if not usable:
+        raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")
     craft = vehicles.load(Path(twin) / files.VEHICLE if twin else DEFAULT_VEHICLE)
     found = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed, hold_out=hold_out,

@@ -11,6 +11,7 @@ import click
 from airtouch.cli.progress import Bar
 from airtouch.cli.scores import check_free
 from airtouch.errors import AirTouchError
+from airtouch.extras import need
 
 ROUNDS, BATCH = 8, 160  #: of a twin that is fitted on the way
 MORE = 5  #: flights that the outlook is given for
@@ -46,6 +47,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     from airtouch.detector import best, dataset, summary
     from airtouch.twin import adapt
 
+    need("train", "training")
     started = time.monotonic()
     check_free(out, force)
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))

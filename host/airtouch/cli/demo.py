@@ -14,6 +14,7 @@ from airtouch.detector import dataset, evaluate, registry
 from airtouch.detector.dataset import FlightFile
 from airtouch.detector.summary import summarise
 from airtouch.errors import AirTouchError
+from airtouch.extras import need
 
 TRAIN, TEST, EPOCHS, STEPS = 52, 18, 8, 800  #: as much as fits in the time on two cores
 SCORED = ("best", "paper", "baseline")  #: detectors
@@ -36,6 +37,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     Takes under five minutes on two cores. You will see a score table of the paper's detector
     beside its baseline on flights that neither has seen, and get an HTML report with plots.
     """
+    need("train", "the demo trains a detector (airtouch gap demo needs nothing more), which")
     started = time.monotonic()
     report = out / "report.html"
     if report.exists() and not force:

@@ -17,6 +17,7 @@ from airtouch.cli.scores import check_free
 from airtouch.detector import dataset, evaluate, registry, sensors
 from airtouch.detector import free_air as air
 from airtouch.errors import AirTouchError
+from airtouch.extras import need
 from airtouch.logs.flight_log import FlightLog
 
 
@@ -64,6 +65,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         raise click.UsageError("--scenario and --without need --simulated N")
     if detector != "best" and (start or labelled or free_air or silence):
         raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
+    need("train", "training")
     check_free(out, force)
     module = registry.get(detector)
     if detector == "baseline":
