@@ -1,6 +1,7 @@
 """Training the streaming network: long crops, one cycle, three goals, pruning on the way."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,21 +41,51 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
     free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
     Call `detector.train.use_tensorflow(seed)` before.
     """
-    import keras
     import tensorflow as tf
 
     rng = np.random.default_rng(seed)
+    drawn = build(recipe).get_weights()
+    model, masks, learn = _learner(recipe, drawn if start is None else [
+        start[name].reshape(value.shape) for name, value in zip(_names(recipe), drawn, strict=True)])
+    for name, variable, mask in zip(_names(recipe), model.trainable_variables, masks, strict=True):
+        mask.assign(_mask(variable.numpy(), start is not None and name in _pruned(recipe)))
+
+    losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
+    for step in range(recipe.steps):
+        losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
+        if start is None and (step % RANK_EVERY == 0 or step == last_rank):
+            _rank(model, masks, recipe, step / recipe.steps)
+        if (step + 1) % 50 == 0:
+            progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
+    for variable, mask in zip(model.trainable_variables, masks):
+        variable.assign(variable * mask)
+    shapes = recipe.weight_shapes()  # the head's kernel has a tap for each layer that it reads
+    return {name: v.numpy().reshape(shapes[name])
+            for name, v in zip(_names(recipe), model.trainable_variables, strict=True)}
+
+
+def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
+    """(model with these weights, masks, learn(x, y) -> loss), as if nothing had been learnt yet."""
+    model, optimizer, untouched, masks, learn = _compiled(recipe)
+    model.set_weights(weights)
+    for variable, value in zip(optimizer.variables, untouched, strict=True):
+        variable.assign(value)
+    return model, masks, learn
+
+
+@lru_cache(maxsize=4)  # of a cross-validation all folds are of one recipe, and compiling takes as long as a hundred steps
+def _compiled(recipe: Recipe) -> tuple:
+    """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning."""
+    import keras
+    import tensorflow as tf
+
     model = build(recipe)
-    if start is not None:
-        model.set_weights([start[name].reshape(v.shape)
-                           for name, v in zip(_names(recipe), model.trainable_variables, strict=True)])
     rise = recipe.steps // 6
     rate = keras.optimizers.schedules.CosineDecay(
         recipe.peak_rate / 20, recipe.steps - rise, alpha=1e-3, warmup_target=recipe.peak_rate, warmup_steps=rise)
     optimizer = keras.optimizers.AdamW(rate, weight_decay=recipe.weight_decay, global_clipnorm=1.0)
     optimizer.build(model.trainable_variables)
-    masks = [tf.Variable(_mask(v.numpy(), start is not None and name in _pruned(recipe)), trainable=False)
-             for name, v in zip(_names(recipe), model.trainable_variables, strict=True)]
+    masks = [tf.Variable(tf.ones_like(v), trainable=False) for v in model.trainable_variables]
     weight = tf.constant([1.0, recipe.event_weight, recipe.event_weight])
     scored = recipe.warm_up // STRIDE
 
@@ -69,18 +100,7 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
             variable.assign(variable * mask)
         return loss
 
-    losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
-    for step in range(recipe.steps):
-        losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
-        if start is None and (step % RANK_EVERY == 0 or step == last_rank):
-            _rank(model, masks, recipe, step / recipe.steps)
-        if (step + 1) % 50 == 0:
-            progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
-    for variable, mask in zip(model.trainable_variables, masks):
-        variable.assign(variable * mask)
-    shapes = recipe.weight_shapes()  # the head's kernel has a tap for each layer that it reads
-    return {name: v.numpy().reshape(shapes[name])
-            for name, v in zip(_names(recipe), model.trainable_variables, strict=True)}
+    return model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn
 
 
 def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
