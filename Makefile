@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
 
-.PHONY: help setup demo test fuzz bench firmware emulate gap8 flash clean
+.PHONY: help setup demo test docs fuzz bench firmware emulate gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -24,6 +24,11 @@ demo: setup  ## the main job: train, prune, export, detect through the C kernels
 
 test: setup  ## every test, sanitizers included
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
+
+docs:  ## build the site of host/docs, strictly: build/site
+	$(PYTHON) -m venv build/docs-env
+	build/docs-env/bin/python -m pip install --quiet -c tools/docs-constraints.txt mkdocs-material
+	build/docs-env/bin/mkdocs build --strict -f host/mkdocs.yml -d $(CURDIR)/build/site
 
 fuzz:  ## fuzz the C that flies for long: [TARGET="parser app"] [RUNS=1000000]
 	$(PYTHON) tools/fuzz.py $(TARGET) $(if $(RUNS),--runs $(RUNS))

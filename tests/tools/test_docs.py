@@ -1,0 +1,54 @@
+"""Pages agree with one another and link to what is there."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "host/docs"
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.glob("*.md")])
+
+
+def anchors(page):
+    """GitHub's anchors of a page's headings."""
+    heads = re.findall(r"^#+ (.*)$", re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.S), re.M)
+    return {re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", h).lower()).strip().replace(" ", "-") for h in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page):
+    text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.S)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"https?:|mailto:", target):
+            continue
+        name, _, anchor = target.partition("#")
+        file = (page.parent / name).resolve() if name else page
+        assert file.exists(), f"{page.name}: {target}"
+        if anchor and file.suffix == ".md":
+            assert anchor in anchors(file), f"{page.name}: {target}; has {sorted(anchors(file))}"
+
+
+def test_tables_of_the_readme_are_those_of_the_results():
+    rows = lambda path: {re.sub(r"\((?:host/docs/)?", "(", line) for line in path.read_text("utf-8").splitlines() if line.startswith("|")}
+    text = (ROOT / "README.md").read_text("utf-8")
+    part = text[text.index("## What it reaches"):text.index("## Use\n")]
+    shown = {re.sub(r"\((?:host/docs/)?", "(", line) for line in part.splitlines() if line.startswith("|")}
+    assert len(shown) > 8 and shown <= rows(DOCS / "results.md"), shown - rows(DOCS / "results.md")
+
+
+def test_every_page_can_be_reached_from_the_readme():
+    linked = set(re.findall(r"\(host/docs/([\w-]+\.md)", (ROOT / "README.md").read_text("utf-8")))
+    seen, todo = set(), list(linked)
+    while todo:
+        name = todo.pop()
+        if name not in seen and (DOCS / name).exists():
+            seen.add(name)
+            todo += re.findall(r"\(([\w-]+\.md)", (DOCS / name).read_text("utf-8"))
+    assert {p.name for p in DOCS.glob("*.md")} <= seen, {p.name for p in DOCS.glob("*.md")} - seen
+
+
+def test_lines_are_no_longer_than_they_may():
+    for name in ("tutorial", "python", "glossary", "dask"):
+        long = [line for line in (DOCS / f"{name}.md").read_text("utf-8").splitlines() if len(line) > 170 and not line.startswith("|")]
+        assert not long, (name, long)
