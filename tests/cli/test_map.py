@@ -55,3 +55,25 @@ def test_without_position_the_edges_lie_along_the_track(tmp_path):
     points = [f for f in json.loads((tmp_path / "map.geojson").read_text())["features"]
               if f["properties"]["role"] == "edge"]
     assert points[1]["geometry"]["coordinates"][0] == pytest.approx(0.8, abs=0.02)
+
+
+def test_the_picture_is_a_map_platform_scale_start_and_end():
+    from shapely.geometry import Point
+
+    from airtouch.detector.edge_map import EdgePoint, Platform
+    from airtouch.report import map_figure
+
+    xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.zeros(500)])
+    points = [EdgePoint(200, "entry", 0.0, 0.0, 0.02), EdgePoint(300, "exit", 1.0, 0.0, 0.02)]
+    one_pass = Platform(Point(0.0, 0.0), Point(1.0, 0.0), None, None, 0.02)
+    figure = map_figure.drawn(xy, points, [one_pass], "a flight")
+    (ax,) = figure.axes
+    labels = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert {"start", "end", "track", "platform (its width is not known)", "entry (1)", "exit (1)"} <= labels
+    (strip,) = ax.patches
+    corners = strip.get_xy()
+    assert corners[:, 0].min() == 0.0 and corners[:, 0].max() == 1.0 and np.ptp(corners[:, 1]) == pytest.approx(map_figure.STRIP_M)
+    bar = ax.lines[-1].get_xydata()
+    shown = ax.transAxes.inverted().transform(ax.transData.transform(bar))
+    assert (shown > 0.0).all() and (shown[:, 1] < 0.2).all() and shown[1, 0] < 0.5  # at the lower left
+    assert [t.get_text() for t in ax.texts if t.get_text()] == [f"{bar[1, 0] - bar[0, 0]:g} m"]

@@ -17,7 +17,13 @@ COLOURS = {"entry": FOUND, "exit": OTHER, "edge": TRUE}
 
 
 def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Platform], title: str) -> bytes:
-    """PNG of the track (n, 2), the edges felt with 2-sigma bars along the track, and fitted outlines."""
+    """PNG of the track (n, 2), the edges felt with 2-sigma bars along the track, platforms and a scale bar."""
+    with style():
+        return png(drawn(xy, points, platforms, title))
+
+
+def drawn(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Platform], title: str) -> Figure:
+    """The map as a figure."""
     with style():
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
@@ -48,11 +54,12 @@ def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Pl
             if at:
                 ax.scatter(*np.array(at).T, s=14, color=colour, zorder=3, label=f"{kind} ({len(at)})")
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
-        _scale_bar(ax)
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
-        return png(figure)
+        figure.draw_without_rendering()  # settles the limits, which equal axes change
+        _scale_bar(ax)
+        return figure
 
 
 def _strip(near: np.ndarray, far: np.ndarray) -> np.ndarray:
@@ -81,7 +88,7 @@ def _ends(ax: Axes, xy: np.ndarray) -> None:
 
 def _scale_bar(ax: Axes) -> None:
     """A bar of a round length at the lower left."""
-    ax.autoscale_view()
+    ax.autoscale(False)
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * (x1 - x0)), 0.05)
     x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
