@@ -59,8 +59,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     data = _data(study, some)
     found = select(data, candidates.every(without), say, tuple(without))
     say("how far")
-    ranking, overall, verdict = _ranking(data, found)
-    effects = _effects(data, found) if verdict == "effect" else []
+    ranking, overall, verdict, effects = _ranking(data, found)
     named = [candidates.term_of(e) for e in effects]
     made = gap_map(study, seen, nominal, named)
     first = summary.headline(made.cells, bool(named))
@@ -92,10 +91,10 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     """
     data = _data(study, flights) if data is None else data
     found = select(data, candidates.every(without), without=tuple(without))
-    ranking, overall, verdict = _ranking(data, found)
+    ranking, overall, verdict, effects = _ranking(data, found)
     named = verdict == "effect"
     return Diagnosis(
-        verdict, tuple(_effects(data, found)) if named else (), tuple(ranking), _alike(found), (),
+        verdict, tuple(effects), tuple(ranking), _alike(found), (),
         {"before": overall.before, "after": overall.after if named else overall.before, "floor": 1.0},
         overall.share if named else None, _control(data, found) if named else {}, "",
         flights=tuple(f.name for f in flights))
@@ -195,12 +194,13 @@ def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray
     return covariance + apart + doubt
 
 
-def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink, str]:
-    """Every candidate with probability and shrink, best first; the shrink of what was chosen; the verdict."""
+def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink, str, list[Found]]:
+    """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
     parts = found.parts
     overall = shrink_of(data, parts, found.chosen)
     verdict = _verdict(found, overall.before)
-    answer = found.named[0].name if verdict == "effect" else verdict
+    effects = _effects(data, found) if verdict == "effect" else []
+    answer = effects[0].name if effects else verdict
     chance = agreeing(probabilities(found, found.chosen is None and overall.before <= AT_FLOOR), answer)
     out = []
     for name, p in chance.items():
@@ -213,7 +213,7 @@ def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink, str]:
         out.append(Ranked(name, float(p), share, why_not(found, name, verdict)))
     order = {n: j.gain for n, j in found.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
-    return out, overall, verdict
+    return out, overall, verdict, effects
 
 
 def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
