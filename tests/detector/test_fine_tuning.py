@@ -112,3 +112,26 @@ def test_a_model_without_hashes_knows_names():
     assert training_set.contains({"flights": ["made0.csv"]}, log)
     assert not training_set.contains({"flights": ["made0.csv"], "flight_hashes": ["0" * 16]}, log)
     assert not training_set.contains({}, log)
+
+
+def test_a_training_that_was_stopped_goes_on_to_the_same_bits(tmp_path, monkeypatch):
+    pytest.importorskip("tensorflow")
+    from airtouch.detector.stream import training
+
+    monkeypatch.setattr(training, "KEEP_EVERY", 10)
+    flights, recipe = [made_flight(0), made_flight(1)], replace(SMALL, steps=60)
+    whole = best.fit(flights, seed=3, recipe=recipe)
+    seen = []
+
+    def stop(stage, done, _total, _note):
+        seen.append((stage, done))
+        if (stage, done) == ("steps", 50):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        best.fit(flights, seed=3, recipe=recipe, work=tmp_path, progress=stop)
+    assert len(list(tmp_path.iterdir())) == 1 and ("steps", 50) in seen
+    seen.clear()
+    again = best.fit(flights, seed=3, recipe=recipe, work=tmp_path, progress=stop)
+    assert ("steps", 50) not in seen and not list(tmp_path.iterdir())
+    assert again.to_bytes() == whole.to_bytes()

@@ -57,7 +57,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
 
     Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights; with --simulated N, flights of the simulator.
     Flights that cannot be used are named and left out, and the exit code is 2. `paper` holds a share of the
-    flights out, to stop in time and to choose its decoding; `best` trains on all of them.
+    flights out, to stop in time and to choose its decoding; `best` trains on all of them, and the same command goes on
+    after a stop: where it stands is kept beside --out, in a folder that ends in .training.
     """
     if simulated and flights:
         raise click.UsageError("either FLIGHTS or --simulated, not both")
@@ -93,10 +94,14 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         if simulated:
             chosen, what = _simulate(simulated, scenario, without, seed, progress)
             failures = 0
+        if detector == "best":
+            options["work"] = out.with_suffix(".training")
         model = module.fit([sensors.without(log, silence) for log in chosen], seed=seed, progress=progress, command=_command(), **options)
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)
+    if options.get("work") and options["work"].is_dir() and not any(options["work"].iterdir()):
+        options["work"].rmdir()
     _report(model.metadata, time.monotonic() - began)
     click.echo(f"written: {out} ({out.stat().st_size} bytes)")
     if failures:

@@ -4,6 +4,7 @@ One step a sample in C (`firmware/kernels/stream_detector.h`): motion channels, 
 (`gap8/kernels/stream_int8.h`), decoder. Nothing waits for a window to fill.
 """
 
+import hashlib
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
@@ -102,7 +103,7 @@ def fit(
     flights: Sequence[FlightLog], seed: int = 0, *, start: StreamModel | None = None,
     pseudo_labels: Sequence[Sequence[logs.Edge] | None] | None = None, free_air: Sequence[FlightLog] = (),
     recipe: Recipe | None = None, decoder: DecoderConfig | None = None, most_flights: int | None = None,
-    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", **changes: Any
+    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", work: Path | None = None, **changes: Any
 ) -> StreamModel:
     """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
 
@@ -111,7 +112,8 @@ def fit(
     stay, FINE_TUNING in place of a full training. free_air: flights without edges (`free_air.read`).
     recipe: shape and training, changed by `changes` (fields of `Recipe`: steps, peak_rate, ...). decoder: its settings;
     `start`'s, else DECODER. most_flights: train on so many at most, drawn by seed. A sensor that no flight has is
-    silent for good. The flights' names and hashes go into the model's metadata.
+    silent for good. work: a folder in which the training is kept, so that the same call goes on after a stop.
+    The flights' names and hashes go into the model's metadata.
     Raises AirTouchError without TensorFlow, without flights with edges and for unknown fields.
     """
     from airtouch.detector.stream import quantisation, training
@@ -139,7 +141,7 @@ def fit(
         raise AirTouchError("training: the flights hold no edges; give flights over a platform, with down range")
     weights = training.fit(prepared, recipe, seed, lambda done, total, note: told("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in free_air],
-                           start=start.weights if start else None)
+                           start=start.weights if start else None, kept=_kept(work, flights, free_air, labels, recipe, seed, start))
     int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in prepared], recipe))
     settings = _decoders(decoder, start)
     model = StreamModel(recipe, weights, int8, tflite, {
@@ -160,6 +162,17 @@ def pseudo_labels(flights: Sequence[FlightLog], model: StreamModel) -> list[list
     return [None if evaluate.truth(log) is not None else
             [logs.Edge(max(edge.sample - lag, 0), edge.kind, np.nan, np.nan) for edge in run(log, model).edges]
             for log in flights]
+
+
+def _kept(work: Path | None, flights: Sequence[FlightLog], free_air: Sequence[FlightLog], labels: Sequence[Any], recipe: Recipe,
+          seed: int, start: StreamModel | None) -> Path | None:
+    """The file of a training with these arguments, None without a folder."""
+    if work is None:
+        return None
+    work.mkdir(parents=True, exist_ok=True)
+    said = [repr(recipe), str(seed), repr(labels), *(training_set.flight_hash(f) for f in (*flights, *free_air))]
+    weights = b"" if start is None else b"".join(np.ascontiguousarray(v).tobytes() for v in start.weights.values())
+    return work / f"training_{hashlib.sha256('|'.join(said).encode() + weights).hexdigest()[:16]}.npz"
 
 
 def _decoders(decoder: DecoderConfig | None, start: StreamModel | None) -> dict[str, Any]:

@@ -1,15 +1,20 @@
 """Training the streaming network: long crops, one cycle, three goals, pruning on the way."""
 
+import io
+import json
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
 from airtouch.detector.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.detector.stream.batches import Flight, batch
 from airtouch.detector.stream.recipe import STRIDE, Recipe
+from airtouch.logs.files import write_bytes
 
 PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
+KEEP_EVERY = 100  #: steps between two states that are kept
 RANK_EVERY = 20  #: steps between two rankings of the weights
 
 Weights = dict[str, np.ndarray]
@@ -35,42 +40,50 @@ def build(recipe: Recipe):  # noqa: ANN201 - a keras.Model
 
 def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
         progress: Callable[[int, int, str], None] = lambda *_: None, *,
-        free_air: Sequence[Flight] = (), start: Weights | None = None) -> Weights:
+        free_air: Sequence[Flight] = (), start: Weights | None = None, kept: Path | None = None) -> Weights:
     """Float weights (`Recipe.weight_shapes`) trained on the flights; same arguments, same bits.
 
     free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
+    kept: file in which the state is kept every KEEP_EVERY steps; a call with the same arguments goes on from there,
+    to the same bits. It is removed at the end.
     Call `detector.train.use_tensorflow(seed)` before.
     """
     import tensorflow as tf
 
     rng = np.random.default_rng(seed)
     drawn = build(recipe).get_weights()
-    model, masks, learn = _learner(recipe, drawn if start is None else [
+    model, optimizer, masks, learn = _learner(recipe, drawn if start is None else [
         start[name].reshape(value.shape) for name, value in zip(_names(recipe), drawn, strict=True)])
     for name, variable, mask in zip(_names(recipe), model.trainable_variables, masks, strict=True):
         mask.assign(_mask(variable.numpy(), start is not None and name in _pruned(recipe)))
 
     losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
-    for step in range(recipe.steps):
+    state = [*model.trainable_variables, *optimizer.variables, *masks]
+    first = _go_on(kept, state, rng) if kept else 0
+    for step in range(first, recipe.steps):
         losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
         if start is None and (step % RANK_EVERY == 0 or step == last_rank):
             _rank(model, masks, recipe, step / recipe.steps)
+        if kept and (step + 1) % KEEP_EVERY == 0:
+            _keep(kept, state, rng, step + 1)
         if (step + 1) % 50 == 0:
             progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
     for variable, mask in zip(model.trainable_variables, masks):
         variable.assign(variable * mask)
+    if kept:
+        kept.unlink(missing_ok=True)
     shapes = recipe.weight_shapes()  # the head's kernel has a tap for each layer that it reads
     return {name: v.numpy().reshape(shapes[name])
             for name, v in zip(_names(recipe), model.trainable_variables, strict=True)}
 
 
 def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
-    """(model with these weights, masks, learn(x, y) -> loss), as if nothing had been learnt yet."""
+    """(model with these weights, optimizer, masks, learn(x, y) -> loss), as if nothing had been learnt yet."""
     model, optimizer, untouched, masks, learn = _compiled(recipe)
     model.set_weights(weights)
     for variable, value in zip(optimizer.variables, untouched, strict=True):
         variable.assign(value)
-    return model, masks, learn
+    return model, optimizer, masks, learn
 
 
 @lru_cache(maxsize=4)  # of a cross-validation all folds are of one recipe, and compiling takes as long as a hundred steps
@@ -101,6 +114,25 @@ def _compiled(recipe: Recipe) -> tuple:
         return loss
 
     return model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn
+
+
+def _keep(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
+    """Write where the training stands, whole or not at all."""
+    arrays = {f"v{i}": np.asarray(v) for i, v in enumerate(state)}
+    made = io.BytesIO()
+    np.savez(made, step=step, rng=json.dumps(rng.bit_generator.state), **arrays)
+    write_bytes(made.getvalue(), path, force=True)
+
+
+def _go_on(path: Path, state: Sequence, rng: np.random.Generator) -> int:
+    """Set variables and random numbers to what was kept; the step to go on with, 0 where nothing was."""
+    if not path.is_file():
+        return 0
+    with np.load(path) as kept:
+        for i, variable in enumerate(state):
+            variable.assign(kept[f"v{i}"])
+        rng.bit_generator.state = json.loads(str(kept["rng"]))
+        return int(kept["step"])
 
 
 def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
