@@ -2,6 +2,8 @@
 
     python -m tools.emulate ~/crazyflie-firmware                    # two recorded flights through the log variables
     python -m tools.emulate ~/crazyflie-firmware flight.csv --steps 2400
+    python -m tools.emulate ~/crazyflie-firmware --fly              # its stabilizer flies the simulator's drone
+    python -m tools.emulate ~/crazyflie-firmware --height           # with and without the height over a platform
 """
 
 import argparse
@@ -16,7 +18,8 @@ from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
-from tools.emulate import build
+from tools.emulate import build, height
+from tools.emulate.compare import report
 from tools.emulate.replay import Replay, replay
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
@@ -28,6 +31,8 @@ CHANGES = {100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 25
 def recorded(count: int) -> list[FlightLog]:
     """So many recorded flights, or a simulated one where none are here."""
     folder = Path(os.environ.get("AIRTOUCH_FLIGHTS", build.ROOT.parent / "shared" / "flights"))
+    if given.height:
+        return 0 if height.report(elf) else 1
     logs = [read(path) for path in sorted(folder.glob(RECORDED))[:count]]
     if logs:
         return logs
@@ -53,11 +58,17 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
     parser.add_argument("--steps", type=int, default=2400, help="of each flight (2400)")
     parser.add_argument("--built", action="store_true", help="take what `make firmware` built last")
+    parser.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
+    parser.add_argument("--height", action="store_true", help="closed loop over edges of every kind: the height kept or not")
     given = parser.parse_args(arguments)
     build.tools()
     if not given.built:
-        build.compile_firmware(given.base.expanduser().resolve())
+        build.compile_firmware(given.base.expanduser().resolve(), "app-config-height" if given.height else "app-config")
     elf = build.link()
+    if given.fly:
+        return 0 if report(elf) else 1
+    if given.height:
+        return 0 if height.report(elf) else 1
     logs = [read(path) for path in given.flights] or recorded(2)
     different = 0
     for i, log in enumerate(logs):

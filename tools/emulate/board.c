@@ -42,17 +42,20 @@ enum { OPEN = 1, WRITE = 5, READ = 6, EXIT = 0x18 };  // semihosting
 static int input, output;      // of the desktop
 static uint8_t mode;           // FLYING, or rows of a recorded flight
 static uint8_t appRuns;
+static uint8_t wholeMilliseconds;  // of the microseconds' clock
 static TaskHandle_t app;
 static block_t block;
 static int millisecond;        // of the block
 static int16_t counts[2];      // of the optical flow, since it was last read
+static bool ending;            // a task is to report the stacks and stop
 static bool sensing;           // the gyro's interrupt is set up
 static logVarId_t watched[VARIABLES];
 static int watchedCount;
 static logVarId_t fed[ROW];
 static uint8_t frame[BYTES];
 static uint8_t memory[EEPROM_SIZE];
-static uint32_t worstLatency;  // us, sensor interrupt to motors, since the last report
+static logVarId_t latency;     // us, sensor interrupt to motors: the stabilizer's own
+static uint32_t worstLatency;  // since the last report
 static uint32_t appOut;
 
 static int semihost(int operation, const void *arguments) {
@@ -285,10 +288,11 @@ static void listen(void) {
     switch (head[0]) {
       case 'G':  // go on
         return;
-      case 'B':  // begin: mode, whether the app runs, whether an AI-deck is there
+      case 'B':  // begin: mode, whether the app runs, whether an AI-deck is there, whether time goes in whole milliseconds
         mode = frame[0];
         appRuns = frame[1];
         deckThere = frame[2];
+        wholeMilliseconds = frame[3];
         break;
       case 'N':  // names to report
         names(frame, length, watched, &watchedCount);
@@ -323,9 +327,8 @@ static void listen(void) {
         }
         break;
       case 'E':
-        stacks();
-        stop(0);
-        break;
+        ending = true;
+        return;
       default:
         stop(6);
     }
@@ -337,6 +340,7 @@ static void meet(void) {
   static bool met;
   if (!met) {
     met = true;
+    latency = find("stabilizer.intToOut");
     say('R', NULL, 0);
     listen();
   }
@@ -381,6 +385,9 @@ void __wrap_usecTimerInit(void) {}
 
 uint64_t __wrap_usecTimestamp(void) {
   uint32_t tick, left;
+  if (wholeMilliseconds) {
+    return 1000ull * xTaskGetTickCountFromISR();
+  }
   do {
     tick = xTaskGetTickCountFromISR();
     left = SysTick->VAL;
@@ -574,6 +581,21 @@ void __wrap_vTaskDelayUntil(TickType_t *due, const TickType_t period) {
   if (step && mode != FLYING) {
     listen();
   }
+  if (ending) {
+    stacks();
+    stop(0);
+  }
+}
+
+/** QEMU's EXTI raises no line by software: the gyro's is asked for here. */
+static bool gyroWaits;
+ITStatus __real_EXTI_GetITStatus(uint32_t line);
+ITStatus __wrap_EXTI_GetITStatus(uint32_t line) {
+  if (line == EXTI_Line14 && gyroWaits) {
+    gyroWaits = false;
+    return SET;
+  }
+  return __real_EXTI_GetITStatus(line);
 }
 
 /** Every millisecond: the gyro's interrupt; every second one new samples, and the motors go out. */
@@ -581,15 +603,20 @@ BaseType_t __real_xTaskIncrementTick(void);
 BaseType_t __wrap_xTaskIncrementTick(void) {
   static bool odd;
   const BaseType_t woken = __real_xTaskIncrementTick();
-  if (mode == FLYING && sensing) {
+  if (mode == FLYING && sensing && !ending) {
     odd = !odd;
     millisecond = 1;
     if (odd) {
       meet();
+    }
+    const uint32_t now = logGetUint(latency);
+    worstLatency = now > worstLatency ? now : worstLatency;
+    if (odd) {
       report('M');
       listen();
     }
-    EXTI->SWIER = EXTI_Line14;
+    gyroWaits = true;
+    NVIC_SetPendingIRQ(EXTI15_10_IRQn);
   }
   return woken;
 }

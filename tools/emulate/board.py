@@ -27,13 +27,15 @@ FLOAT, SIGNED = 7, (4, 5, 6)  #: types of the firmware's log
 class Board:
     """`with Board(elf, FLY, names) as board`: it starts, and stops with the block.
 
-    names: log variables that each report holds. console: what the firmware said so far. `hear` gives a frame and
+    names: log variables that each report holds. app: whether its task runs. whole_milliseconds: the firmware's clock of
+    microseconds goes in thousands, so that nobody's run time shows in anybody's time stamps. console: what the firmware said so far. `hear` gives a frame and
     `say` sends one; `go` lets it run on.
     """
 
-    def __init__(self, elf: Path, mode: bytes, names: Sequence[str], app: bool = True, ai_deck: bool = False) -> None:
+    def __init__(self, elf: Path, mode: bytes, names: Sequence[str], app: bool = True, ai_deck: bool = False,
+                 whole_milliseconds: bool = False) -> None:
         self.elf, self.names, self.console = elf, list(names), ""
-        self._mode, self._app, self._ai_deck = mode, app, ai_deck
+        self._begin = mode + bytes([app, ai_deck, whole_milliseconds])
         self._handlers: dict[str, Callable[[bytes], None]] = {}
 
     def __enter__(self) -> Self:
@@ -46,7 +48,7 @@ class Board:
                    "-kernel", str(self.elf)]
         self._qemu = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         self._to, self._from = self._open(folder / "to_board", os.O_WRONLY), os.open(folder / "from_board", os.O_RDONLY)
-        self.say("B", self._mode + bytes([self._app, self._ai_deck]))
+        self.say("B", self._begin)
         self.go()
         self.hear("R")
         self.types = self.ask("N", self.names)

@@ -93,6 +93,43 @@ def _motors(plant, memory, noise, k, h, volts, stream):
     memory.charge, memory.volts = battery.drain(plant, memory.charge, power, h)
 
 
+@jit
+def move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover, volts, stream):
+    """The vehicle over physics step k under memory.pwm (4,): motors, effects, body. How the flight stands (OK or a reason)."""
+    corners, first, surface, box = ground
+    h, leg = plant.step, plant.range_below_rotors + plant.leg_below_range
+    state, s, force, effect_memory = memory.state[:], memory.signals[:], memory.force[:], memory.effects
+    _motors(plant, memory, noise, k, h, volts, stream)
+
+    # effects, at the middle of the step
+    for i in range(13):
+        memory.middle[i] = state[i] + 0.5 * h * memory.slope[i]
+    for i in range(4):
+        tau = plant.motor_rise if memory.target[i] > memory.speed[i] else plant.motor_fall
+        memory.middle_speed[i] = memory.speed[i] + 0.5 * h / tau * (memory.target[i] - memory.speed[i])
+    surroundings.fill(plant, memory.middle, memory.slope, memory.middle_speed, corners, first, surface, box, h,
+                      k * h + 0.5 * h, hover, s, memory.patch)
+    for i in range(6):
+        force[i] = 0.0
+    for i in range(used):
+        effects[i](parameters[i], s, effect_memory[i], effect_streams[i], force)
+    deepest = contact.legs(plant, memory.middle, s, leg, force)
+
+    rigid_body.advance(plant, constant, state, memory.speed, memory.target, h, force, memory.slope)
+    total = 0.0
+    for i in range(13):
+        total += state[i]
+    if not math.isfinite(total):
+        return NOT_FINITE
+    if s[at.ROTATION + 8] < 0.2:
+        return UPSET
+    if deepest > FLOOR_DEPTH_M:
+        return STRUCK
+    if abs(state[0]) > 1000.0 or abs(state[1]) > 1000.0 or abs(state[2]) > 100.0:
+        return LOST
+    return OK
+
+
 _LOOP = types.Tuple((int64, int64))(
     from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[::1],
     float64[:, ::1], types.UniTuple(WrenchFunction, SLOTS), int64, float64[:, ::1],
@@ -115,10 +152,9 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     ground = (corners, first, surface, box)
     h = plant.step
     hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
-    leg = plant.range_below_rotors + plant.leg_below_range
     constant = rigid_body.constants(plant, h)
     noise = _noise(plant, h)
-    state, s, force, effect_memory = memory.state[:], memory.signals[:], memory.force[:], memory.effects
+    state = memory.state[:]
     rows = table.shape[0]
     begun = memory.step
     for n in range(rows * LOG_STEPS):
@@ -136,33 +172,9 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         autopilot.steer(plant, memory, setpoints[row], 2 * k)
         if n % LOG_STEPS == 0:
             _log(plant, memory, k * h, volts, table[row])
-        _motors(plant, memory, noise, k, h, volts, streams[0])
-
-        # effects, at the middle of the step
-        for i in range(13):
-            memory.middle[i] = state[i] + 0.5 * h * memory.slope[i]
-        for i in range(4):
-            tau = plant.motor_rise if memory.target[i] > memory.speed[i] else plant.motor_fall
-            memory.middle_speed[i] = memory.speed[i] + 0.5 * h / tau * (memory.target[i] - memory.speed[i])
-        surroundings.fill(plant, memory.middle, memory.slope, memory.middle_speed, corners, first, surface, box, h,
-                          k * h + 0.5 * h, hover, s, memory.patch)
-        for i in range(6):
-            force[i] = 0.0
-        for i in range(used):
-            effects[i](parameters[i], s, effect_memory[i], effect_streams[i], force)
-        deepest = contact.legs(plant, memory.middle, s, leg, force)
-
-        rigid_body.advance(plant, constant, state, memory.speed, memory.target, h, force, memory.slope)
-        total = 0.0
-        for i in range(13):
-            total += state[i]
-        if not math.isfinite(total):
-            return NOT_FINITE, row
-        if s[at.ROTATION + 8] < 0.2:
-            return UPSET, row + 1
-        if deepest > FLOOR_DEPTH_M:
-            return STRUCK, row + 1
-        if abs(state[0]) > 1000.0 or abs(state[1]) > 1000.0 or abs(state[2]) > 100.0:
-            return LOST, row + 1
+        ending = move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover, volts,
+                      streams[0])
+        if ending != OK:
+            return ending, row + (ending != NOT_FINITE)
     memory.step = begun + rows * LOG_STEPS
     return OK, rows

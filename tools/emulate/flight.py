@@ -1,0 +1,148 @@
+"""The shipped image flies: its stabilizer, estimator and controllers closed-loop around the simulator's vehicle.
+
+Every two milliseconds the board hands over the motors that it drives, and gets what its sensors read. Set-points, voltage
+and parameters reach it as packets of its radio.
+"""
+
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.kernels.app_core import EDGES
+from airtouch.simulation import loop, setpoint
+from airtouch.simulation.flight import choose
+from airtouch.simulation.scenario import Scenario, draw_flight
+from airtouch.vehicle import Vehicle
+from tools.emulate import plant as at
+from tools.emulate.board import FLY, Board
+from tools.emulate.plant import Plant
+
+BOOT_S = 4.0  #: on the floor before the mission begins: self-tests, calibration, and the estimator at rest
+REST = 0.2  #: the IMU's noise there over that in flight; the firmware takes no bias from noise of 10 LSB and more
+GYRO_LSB, ACC_LSB = np.deg2rad(4000.0 / 65536.0), 48.0 / 65536.0 * 9.81  #: of the BMI088 as the firmware sets it
+NO_RANGE_MM = 8190  #: what a VL53L1 says where it sees nothing
+RADIO_RAW, BATTERY_STATE, COMMANDER, STOP, HOVER = 0x00, 0x13, 7, 0, 5  #: syslink and CRTP
+PARAM, BY_NAME, UINT8, FLOAT = 2, 3, 0x08, 0x06
+MOTORS = tuple(f"motor.m{i}" for i in range(1, 5))
+ESTIMATE = tuple(f"stateEstimate.{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw"))
+WATCHED = (*MOTORS, *ESTIMATE, "range.zrange", "pm.vbat", "airtouch.steps", "airtouch.edges", "airtouch.edge",
+           "airtouch.late", "airtouch.loadMax", "airtouch.health", "supervisor.info")
+
+
+@dataclass
+class Flown:
+    """A flight in emulation: rows at 100 Hz and what happened.
+
+    table: t_s (mission), true x, y, z, four motors, the nine of ESTIMATE, down range m, height of what is below it.
+    pwm: (n, 4) motors every 2 ms, from the first tick on. edges: (s of the mission, kind, true x).
+    """
+
+    table: np.ndarray = field(default_factory=lambda: np.zeros((0, 19)))
+    pwm: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint16))
+    edges: list[tuple[float, str, float]] = field(default_factory=list)
+    latency_us: int = 0
+    latencies_us: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
+    late: int = 0
+    load_us: int = 0
+    left: dict[str, int] = field(default_factory=dict)
+    ending: str = "ok"
+    console: str = ""
+
+
+def crtp(port: int, channel: int, data: bytes) -> bytes:
+    """A syslink packet from the radio."""
+    return struct.pack("<BBB", RADIO_RAW, 1 + len(data), port << 4 | 3 << 2 | channel) + data
+
+
+def set_parameter(name: str, value: float) -> bytes:
+    """The packet that sets a parameter by its name: a byte for a whole number, else a float."""
+    kind, raw = (UINT8, bytes([value])) if isinstance(value, int) else (FLOAT, struct.pack("<f", value))
+    return crtp(PARAM, BY_NAME, b"\0" + name.replace(".", "\0").encode() + b"\0" + bytes([kind]) + raw)
+
+
+def _order(row: np.ndarray) -> bytes:
+    """The set-point packet of a mission's row: velocities about the drone's own heading, a height; or stop."""
+    if row[setpoint.MOTORS] < 0.5:
+        return crtp(COMMANDER, 0, bytes([STOP]))
+    c, s = np.cos(row[setpoint.YAW]), np.sin(row[setpoint.YAW])
+    ahead, left = c * row[setpoint.VX] + s * row[setpoint.VY], c * row[setpoint.VY] - s * row[setpoint.VX]
+    return crtp(COMMANDER, 0, struct.pack("<Bffff", HOVER, ahead, left, 0.0, row[setpoint.Z]))
+
+
+def _block(readings: np.ndarray, rest: np.ndarray) -> bytes:
+    """What the board's sensors are given. rest (2,): parts of counts of the flow that are still owed."""
+    gyro = np.clip(np.round(readings[at.GYRO:at.GYRO + 6] / GYRO_LSB), -32768, 32767).astype("<i2")
+    acc = np.clip(np.round(readings[at.ACC:at.ACC + 6] / ACC_LSB), -32768, 32767).astype("<i2")
+    down = readings[at.RANGE]
+    rest += readings[at.FLOW:at.FLOW + 2]
+    whole = np.round(rest)
+    rest -= whole
+    flow = np.array([-whole[1], -whole[0]]).astype("<i2")  # as flowdeck_v1v2.c turns the PMW3901's axes
+    millimetres = NO_RANGE_MM if np.isnan(down) else min(int(round(1000.0 * down)), NO_RANGE_MM)
+    return gyro.tobytes() + acc.tobytes() + struct.pack("<H", millimetres) + flow.tobytes()
+
+
+def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: int = 0, *, app: bool = True,
+        whole_milliseconds: bool = False, parameters: Mapping[str, float] | None = None,
+        blind_s: Sequence[tuple[float, float]] = ()) -> Flown:
+    """One flight of a scenario by the emulated firmware.
+
+    app, whole_milliseconds: Board. parameters: set by radio before take-off. blind_s: seconds of the mission in which the down range
+    sees nothing.
+    """
+    plan = draw_flight(scenario, seed, flight)
+    plant = Plant(plan, vehicle, seed, flight, choose(plan))
+    found, rows, pwm, latencies = Flown(), [], [], []
+    plant.memory["gyro_rms"] *= REST
+    plant.memory["acc_rms"] *= REST
+    rest, wait = np.zeros(2), int(BOOT_S / at.STEP_S)
+    app_rows: list[dict[str, float]] = []
+    with Board(elf, FLY, WATCHED, app=app, whole_milliseconds=whole_milliseconds) as board:
+        board.on("S", lambda content: app_rows.append(board.values(content)))
+        board.go()
+        edges = 0
+        for step in range(wait + len(plan.setpoints) * loop.LOG_STEPS):
+            values = board.values(board.hear("M"))
+            motors = np.array([values[name] for name in MOTORS])
+            pwm.append(motors)
+            if step > wait:
+                latencies.append(values["latency_us"])
+            if step == wait:
+                plant.memory["gyro_rms"] /= REST
+                plant.memory["acc_rms"] /= REST
+            ending = plant.step(motors)
+            if ending != loop.OK:
+                found.ending = f"{loop.ENDINGS[ending]} after {(step - wait) * at.STEP_S:.2f} s"
+                break
+            if any(begin <= (step - wait) * at.STEP_S < end for begin, end in blind_s):
+                plant.readings[at.RANGE] = np.nan
+            board.say("I", _block(plant.readings, rest))
+            now = (step - wait) * at.STEP_S
+            if step % loop.LOG_STEPS == 0:
+                state = struct.pack("<BBBff", BATTERY_STATE, 9, 0, plant.readings[at.VOLTS], 0.0)
+                board.say("L", state)
+                if step == wait // 2:
+                    for name, value in (parameters or {}).items():
+                        board.say("L", set_parameter(name, value))
+                if step >= wait:
+                    board.say("L", _order(plan.setpoints[(step - wait) // loop.LOG_STEPS]))
+                rows.append([now, *plant.place, *motors, *(values[n] for n in ESTIMATE), values["range.zrange"] / 1000.0, plant.top])
+            if values["airtouch.edges"] > edges:
+                edges = int(values["airtouch.edges"])
+                found.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))
+            board.go()
+        found.late, found.load_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
+        if found.ending == "ok":
+            board.hear("M")
+            found.left = board.end()
+        found.console = board.console
+    found.table, found.pwm = np.array(rows), np.array(pwm, np.uint16)
+    found.latencies_us = np.array(latencies)
+    found.latency_us = int(found.latencies_us.max(initial=0))
+    if "Self test passed!" not in found.console:
+        raise AirTouchError("the firmware's self-test failed; the console said:\n" + found.console[-1000:])
+    return found

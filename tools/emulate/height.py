@@ -1,0 +1,81 @@
+"""Height over a platform, flown: the same missions by the firmware as it ships and with atHeight.enable."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.simulation import scenario
+from airtouch.simulation.scenario import Scenario
+from tools.emulate.compare import SCENARIO, vehicle
+from tools.emulate.flight import Flown, fly
+
+CRUISE_M, SETTLED_S, LAND_S = 0.8, 4.5, 3.5  #: of there-and-back: height, end of the take-off's swing, landing at the end
+_PLATFORM = """[[platform]]
+shape = "rectangle"
+size_m = [{size}, 4.0]
+centre_m = [{at}, 0.0]
+top_m = {top}
+material = "acrylic"
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mission: surfaces (from, to, top; m), speed, and seconds without a down range."""
+
+    name: str
+    surfaces: tuple[tuple[float, float, float], ...]
+    speed: float = 0.3
+    blind_s: tuple[tuple[float, float], ...] = ()
+
+
+def stairs(begin: float, end: float, top: float, count: int) -> tuple[tuple[float, float, float], ...]:
+    """Steps up from 0 to top and down again beyond the platform between them."""
+    edge, far = (end - begin) / count, 0.4
+    up = [(begin + i * edge, begin + (i + 1) * edge, top * (i + 1) / (count + 1)) for i in range(count)]
+    down = [(2 * end + far - b, 2 * end + far - a, h) for a, b, h in up]
+    return (*up, (end, end + far, top), *down)
+
+
+PLATFORM = ((0.575, 1.325, 0.76),)
+CASES = (
+    Case("platform 0.76 m high", PLATFORM),
+    Case("platform 0.30 m high", ((0.575, 1.325, 0.30),)),
+    Case("soft edges, 2 cm wide", stairs(0.555, 0.575, 0.76, 2)),
+    Case("twice as fast, tilted", PLATFORM, speed=0.6),
+    Case("ramp of 0.2 m over 0.4 m", stairs(0.4, 0.8, 0.2, 20)),
+    Case("no down range for 0.3 s, over the platform", PLATFORM, blind_s=((7.5, 7.8),)),
+)
+
+
+def mission(case: Case) -> Scenario:
+    """There-and-back over these surfaces."""
+    text = SCENARIO.read_text()
+    head, rest = text.split("[[platform]]", 1)
+    platforms = "".join(_PLATFORM.format(size=b - a, at=0.5 * (a + b), top=h) for a, b, h in case.surfaces)
+    return scenario.parse(head + platforms + "\n[mission]" + rest.split("[mission]", 1)[1].replace("0.3\n", f"{case.speed}\n"),
+                          case.name)
+
+
+def kept(one: Flown) -> tuple[float, float]:
+    """Least and greatest true height over the floor between take-off and landing, m."""
+    t = one.table[:, 0]
+    cruise = one.table[(t >= SETTLED_S) & (t < t[-1] - LAND_S), 3] if one.ending == "ok" else one.table[t >= SETTLED_S, 3]
+    return (float(cruise.min()), float(cruise.max())) if len(cruise) else (np.nan, np.nan)
+
+
+def report(elf: Path, seed: int = 1) -> bool:
+    """Fly and print; whether every flight with it ended well."""
+    well = True
+    print(f"true height over the floor, m, of {CRUISE_M} ordered: as it ships | with atHeight.enable")
+    for case in CASES:
+        said = []
+        for on in (0, 1):
+            one = fly(elf, mission(case), vehicle(), seed, parameters={"atHeight.enable": on}, blind_s=case.blind_s)
+            low, high = kept(one)
+            edges = " ".join(f"{kind}@{t:.2f}" for t, kind, _ in one.edges) or "none"
+            said.append(f"{low:.2f} to {high:.2f}, {one.ending}, felt {edges}, worst stabilizer {one.latency_us} us")
+            well = well and (on == 0 or one.ending == "ok")
+        print(f"{case.name}: " + " | ".join(said), flush=True)
+    return well
