@@ -28,8 +28,8 @@ class Board:
     """`with Board(elf, FLY, names) as board`: it starts, and stops with the block.
 
     names: log variables that each report holds. app: whether its task runs. whole_milliseconds: the firmware's clock of
-    microseconds goes in thousands, so that nobody's run time shows in anybody's time stamps. console: what the firmware said so far. `hear` gives a frame and
-    `say` sends one; `go` lets it run on.
+    microseconds goes in thousands, so that nobody's run time shows in anybody's time stamps. console: what the
+    firmware said so far. `hear` gives a frame and `say` sends one; `go` lets it run on.
     """
 
     def __init__(self, elf: Path, mode: bytes, names: Sequence[str], app: bool = True, ai_deck: bool = False,
