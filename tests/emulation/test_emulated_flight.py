@@ -13,7 +13,7 @@ from airtouch import vehicle as vehicles
 from airtouch.simulation import loop, scenario, setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import draw_flight
-from tools.emulate import build, compare, flight
+from tools.emulate import build, compare, flight, height
 from tools.emulate import plant as at
 from tools.emulate.plant import Plant
 
@@ -102,3 +102,12 @@ def test_the_firmware_flies_and_the_app_changes_no_command(image):
     assert compare.differing(on, off)[:2] == (0, len(off.pwm)) and len(on.pwm) == len(off.pwm)
     assert (on.pwm == again.pwm).all() and on.pwm.max() > 20_000
     assert on.late == 0 and min(on.left.values()) > 0
+
+
+@pytest.mark.slow
+def test_the_height_is_kept_over_a_platform_where_it_is_asked_for(image):
+    case = height.CASES[0]
+    low, high = height.kept(flight.fly(image, height.mission(case), compare.vehicle(), 1, parameters={"atHeight.enable": 1}))
+    assert 0.7 < low < high < 0.95
+    stock = flight.fly(image, height.mission(case), compare.vehicle(), 1)
+    assert height.kept(stock)[1] > 1.2, "the shipped firmware climbs"
