@@ -106,6 +106,17 @@ def test_time_jitter_has_its_rms_and_never_runs_backwards():
     assert np.all(np.diff(radio.received(table, 0.05, 0.0, 1.0, np.random.default_rng(1))[:, 0]) >= 0.0)
 
 
+def test_where_a_row_lies_in_the_controllers_cycle(sweep):
+    """The kick of a velocity step lasts 2 ms: a row at the position controller's run has it, one 4 ms behind has not."""
+    def kick(behind):
+        log = sweep({"time_jitter": {"rms": 0.0, "behind": behind}})
+        pitch = (log["m1_pwm"] - log["m2_pwm"] - log["m3_pwm"] + log["m4_pwm"])[400:1400]
+        return np.abs(pitch[1:-1] - 0.5 * (pitch[:-2] + pitch[2:])).max()
+    at, behind = kick(0.0), kick(0.004)
+    print(f"kick of the velocity step: {at:.0f} PWM at the run, {behind:.0f} behind it")
+    assert at > 3.0 * behind
+
+
 def test_packet_loss_has_its_share_and_bursts():
     table = 0.01 * np.arange(100_000)[:, None]
     out = radio.received(table, 0.0, 0.05, 4.0, np.random.default_rng(0))[:, 0]

@@ -1,5 +1,7 @@
 """Simulated flights of made-up courses: their truth is known."""
 
+from dataclasses import replace
+
 import pytest
 
 from airtouch import vehicle as vehicles
@@ -17,8 +19,9 @@ def vehicle():
 @pytest.fixture(scope="session")
 def fly_course(vehicle):
     """fly_course(course, effects, number) -> a log that ended well, or None."""
-    def flown(course, effects=PLAIN, number=0, seed=3, craft=vehicle, height_m=0.0):
-        log = fly(missions.one(course, effects, height_m=height_m), craft, seed, number)
+    def flown(course, effects=PLAIN, number=0, seed=3, craft=vehicle, pulse_s=0.0, **mission):
+        course = replace(course, pulse_s=pulse_s) if pulse_s else course
+        log = fly(missions.one(course, effects, **mission), craft, seed, number)
         return None if isinstance(log, Diverged) else log
     return flown
 

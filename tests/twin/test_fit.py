@@ -20,7 +20,9 @@ TRUTH = {"motor_lag.factor": 1.3, "vehicle.gyro_noise_ratio.0": 0.9, "ground_eff
 
 @pytest.fixture(scope="module")
 def chosen(vehicle):
-    return tuple(lever for lever in levers.default(vehicle) if lever.name in TRUTH)
+    """Started up to four steps from the truth, the lift three."""
+    return tuple(replace(lever, start=1.45) if lever.name == "ground_effect.strength" else lever
+                 for lever in levers.default(vehicle) if lever.name in TRUTH)
 
 
 @pytest.fixture(scope="module")
@@ -55,11 +57,18 @@ def test_withheld_levers_are_recovered(fitted, chosen):
         assert abs(off) < 1.5 or lever.of == "ground_effect", lever.name
 
 
-@pytest.mark.xfail(reason="comes out too strong by about three steps of 0.15; probably because courses are read at the height to "
-                          "which the lift has raised the drone, and flown again there", strict=False)
+@pytest.mark.xfail(reason="stays too strong where it starts three steps of 0.15 too strong; to take off the lift that the drone has "
+                          "had before its range is read did not mend it", strict=False)
 def test_withheld_lift_is_recovered(fitted, chosen):
     strength = next(v for lever, v in zip(chosen, fitted.values, strict=True) if lever.of == "ground_effect")
     assert strength == pytest.approx(TRUTH["ground_effect.strength"], abs=0.25)
+
+
+def test_the_best_round_is_the_one_with_the_least_misfit(fitted):
+    def total(h):
+        return sum((fit.GROUP_WEIGHT[name] * off) ** 2 for name, off in h["misfit"].items())
+    entry = next(h for h in fitted.history if h["values"] == fit.best(fitted).tolist())
+    assert total(entry) == min(map(total, fitted.history)) < total(fitted.history[0])
 
 
 def test_misfit_falls(fitted):

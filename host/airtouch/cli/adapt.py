@@ -89,8 +89,8 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
     listed = levers.default(craft)
     with Bar("fitting a twin") as bar:
         state = fit.fit(fit.target(recorded.courses, recorded.features), craft, listed, rounds=ROUNDS, flights=BATCH,
-                        seed=seed, kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
-    made = files.write(kept, craft, listed, state.values, recorded.courses, force=True)
+                        seed=seed, fixed=levers.FIXED, kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
+    made = files.write(kept, craft, listed, fit.best(state), recorded.courses, levers.FIXED, force=True)
     return scenario.load(made[1]), vehicles.load(made[0]), f"twin fitted to {len(recorded.courses)} of them"
 
 

@@ -67,17 +67,19 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     listed = levers.default(craft)
     workers = workers or available_cores()
     with Bar("fitting") as bar:
-        state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers,
+        state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers, fixed=levers.FIXED,
                         kept=out / FIT, progress=lambda done, total, now: bar(done, total, _misfit(now)))
-    files.write(out, craft, listed, state.values, recorded.courses, force=True)
+    values = fit.best(state)
+    files.write(out, craft, listed, values, recorded.courses, levers.FIXED, force=True)
     with Bar("flying the twin") as bar:
-        flown, lost = compare.flown(recorded.courses, craft, listed, state.values, seed, progress=bar)
+        flown, lost = compare.flown(recorded.courses, craft, listed, values, seed, levers.FIXED, progress=bar)
     with Bar("telling apart") as bar:
         phases: list[str] = []
         found = compare.compare(recorded, aim, flown, lost, seed, lambda name: (phases.append(name), bar(len(phases), 6, name)))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
-    write_bytes(json.dumps(_summary(found, listed, state, recorded, typed), indent=1).encode(), out / SUMMARY, force=True)
-    twin_report.write_report(out / REPORT, recorded, found, listed, state.values, state.history[0]["misfit"],
+    by_name = {lever.name: float(value) for lever, value in zip(listed, values, strict=True)}
+    write_bytes(json.dumps(_summary(found, by_name, state.history, recorded, typed), indent=1).encode(), out / SUMMARY, force=True)
+    twin_report.write_report(out / REPORT, recorded, found, listed, values, state.history[0]["misfit"],
                              command=typed, force=True)
     click.echo(f"{len(recorded.courses)} flights; misfit in scatters: {_misfit(state.history[0]['misfit'])} "
                f"-> {_misfit(found.misfit)}")
@@ -102,11 +104,10 @@ def _misfit(now: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.2f}" for name, value in now.items())
 
 
-def _summary(found: Any, listed: Any, state: Any, recorded: Any, typed: str) -> dict[str, Any]:
+def _summary(found: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
     """What the report shows, as plain values."""
     return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": found.misfit,
             "auroc": [asdict(a) for a in found.auroc], "lost": found.lost,
             "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,
                       "difference": g.difference, "scatters": g.scatters, "flights": g.flights} for g in found.gaps],
-            "levers": {lever.name: float(v) for lever, v in zip(listed, state.values, strict=True)},
-            "history": state.history}
+            "levers": levers, "history": history}

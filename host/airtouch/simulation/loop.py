@@ -153,7 +153,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
     h = plant.step
     hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
     constant = rigid_body.constants(plant, h)
-    noise = _noise(plant, h)
+    noise, ahead = _noise(plant, h), int(plant.controller_ahead / h + 1e-6) % LOG_STEPS
     state = memory.state[:]
     rows = table.shape[0]
     begun = memory.step
@@ -169,7 +169,7 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
             ranging.range_reading(plant, memory, ground, tick, state, k * h, streams[2], memory.reading)
             ranging.flow_reading(plant, memory, tick, state, k * h, streams[2], memory.reading)
             autopilot.estimate(plant, memory, tick, volts)
-        autopilot.steer(plant, memory, setpoints[row], 2 * k)
+        autopilot.steer(plant, memory, setpoints[row], 2 * (k + ahead))
         if n % LOG_STEPS == 0:
             _log(plant, memory, k * h, volts, table[row])
         ending = move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover, volts,

@@ -13,13 +13,14 @@ from airtouch.simulation.world import World, first_below, top_at
 RATE_HZ = 100
 MAX_SPEED_MPS = 1.0  #: the firmware's own limit (PID_POS_VEL_X_MAX)
 KEYS = {
-    "wait": {"time_s"}, "take-off": {"height_m", "time_s"}, "hover": {"time_s"},
+    "wait": {"time_s"}, "take-off": {"height_m", "time_s"}, "hover": {"time_s", "pulse_mps", "every_s"},
     "go": {"to_m", "distance_m", "direction_deg", "height_m", "speed_mps"},
     "zigzag": {"size_m", "spacing_m", "speed_mps"}, "land": {"time_s"},
 }
 NEEDED = {"take-off": {"height_m"}, "hover": {"time_s"}, "wait": {"time_s"}, "go": {"speed_mps"},
           "zigzag": {"size_m", "spacing_m", "speed_mps"}}
 MAX_FLIGHT_S = 3600.0
+PULSE_ROWS = 2  #: set-point rows of a velocity pulse in hover: 20 ms, as of the authors' pilot program
 
 
 class _Pen:
@@ -103,6 +104,11 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
         pen.move(np.array([pen.at[0], pen.at[1], step["height_m"]]), step.get("time_s", 2.0))
     elif kind == "hover":
         pen.move(pen.at, step["time_s"])
+        if step.get("pulse_mps"):
+            if pen.position or step.get("every_s", 0.0) < 0.1:
+                raise AirTouchError(f"{place}: pulses need velocity control and every_s of 0.1 or more")
+            place_in = np.arange(len(pen.rows[-1])) % round(step["every_s"] * RATE_HZ)
+            pen.rows[-1][place_in >= place_in.max() + 1 - PULSE_ROWS, c.VX] = step["pulse_mps"]
     elif kind == "go":
         to = pen.at.copy()
         if "to_m" in step:

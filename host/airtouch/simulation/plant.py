@@ -75,6 +75,7 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("range_kick", 1, 0.0, "m, error of the one reading on which an edge is noticed"),
     ("sensor_delay", 1, 0.0, "s, from IMU to controller"),
     ("time_jitter", 1, 0.0, "s rms, on logged time"),
+    ("controller_ahead", 1, 0.0, "s, of the position controller's run before a row is logged, whole 2 ms"),
     ("packet_loss", 1, 0.0, "share of logged samples lost"),
     ("loss_burst", 1, 1.0, "samples lost in a row, mean"),
     ("thrust_base", 1, 36000.0, "command in hover, of 65535"),

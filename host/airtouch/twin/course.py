@@ -17,6 +17,7 @@ from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM, VELOCITY, FlightLog
 from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import LEVEL_PART, PLATFORM_STEP_M
+from airtouch.twin import pulses
 
 RATE_HZ = 100.0
 LEAST_FREE_S = 3.0  #: free air before the platform; spectra need it
@@ -33,10 +34,11 @@ class Course:
     """One flight. Times in s, heights in m as the down range shows them, samples of the log.
 
     cruise_m: level height before the platform. clearance_m: median height over the platform. before_m, entered_m: just
-    before and just after the entry. climb_s: from
-    the motors' start to level flight; hover_s: to the velocity step; before_s: to the entry; over_s: to the
-    exit; stop_s: to the end of the forward flight; after_s: from the exit to the landing. speed_mps: of the velocity step; speed_from: "stated",
-    "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated.
+    before and just after the entry. climb_s: from the motors' start to level flight; hover_s: to the velocity step;
+    before_s: to the entry; over_s: to the exit; stop_s: to the end of the forward flight; after_s: from the exit to
+    the landing. speed_mps: of the velocity step; speed_from: "stated",
+    "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated. pulse_s: period of
+    velocity pulses in the hover, 0: none.
     """
 
     source: str
@@ -59,6 +61,7 @@ class Course:
     entry: int
     exit: int
     landing: int
+    pulse_s: float = 0.0
 
     def as_dict(self) -> dict[str, float | int | str]:
         """Plain values, for files."""
@@ -118,7 +121,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
                   (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
                   (landing - leave.sample) / RATE_HZ, speed,
                   "stated" if speed_mps is not None else how, angle_deg or 0.0, start, level, step,
-                  entry.sample, leave.sample, landing)
+                  entry.sample, leave.sample, landing, pulses.period(log, level, step))
 
 
 def platform_edges(log: FlightLog) -> list[Edge]:

@@ -28,9 +28,9 @@ def vehicle_text(vehicle: Vehicle) -> str:
 
 
 def scenario_text(courses: Sequence[Course], effects: Mapping[str, Any], name: str,
-                  height_m: float = 0.0) -> str:
-    """A scenario as TOML: each flight draws one of the courses."""
-    return tomli_w.dumps(missions.table(courses, effects, name, height_m))
+                  **mission: float) -> str:
+    """A scenario as TOML: each flight draws one of the courses. mission: as of `missions.drawn`."""
+    return tomli_w.dumps(missions.table(courses, effects, name, **mission))
 
 
 def write(out: Path, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, courses: Sequence[Course],
@@ -39,7 +39,7 @@ def write(out: Path, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarr
     craft = replace(lever_set.craft(vehicle, levers, values), name=name)
     texts = {VEHICLE: vehicle_text(craft),
              SCENARIO: scenario_text(courses, lever_set.table(levers, values, fixed), name,
-                                     lever_set.height(levers, values))}
+                                     **lever_set.mission(levers, values))}
     vehicles.parse(texts[VEHICLE], VEHICLE)
     scenario.parse(texts[SCENARIO], SCENARIO)
     for file, text in texts.items():

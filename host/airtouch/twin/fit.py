@@ -86,6 +86,15 @@ def fit(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int =
     return state
 
 
+def best(state: State) -> np.ndarray:
+    """(levers,) of the round whose flights were nearest to the recorded ones: the last step is not always the best.
+
+    Nearest: least sum of squared misfits over the groups, each with its weight.
+    """
+    return np.array(min(state.history, key=lambda entry: sum(
+        (GROUP_WEIGHT[name] * off) ** 2 for name, off in entry["misfit"].items()))["values"])
+
+
 def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever], number: int, rounds: int,
            flights: int, seed: int, fixed: Mapping[str, Any] | None, workers: int) -> None:
     began = time.process_time()

@@ -13,6 +13,8 @@ from airtouch.vehicle import Vehicle
 VEHICLE, MISSION = "vehicle", "mission"
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"
+#: effects that every twin has: rows of the log lie anywhere in the controllers' cycle, otherwise in each flight
+FIXED: dict[str, Any] = {"time_jitter": {"rms": 0.0, "behind": {"low": 0.0, "high": 0.01}}}
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
     gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
     yaw = vehicle.yaw_torque_over_thrust_m
     return (
-        Lever(MISSION, "height", 0.0, -0.1, 0.1, 0.01, "m"),
+        Lever(MISSION, "height_m", 0.0, -0.1, 0.1, 0.01, "m"),
+        Lever(MISSION, "pulse_mps", -0.2, -0.6, 0.6, 0.03, "m/s"),
         Lever("thrust_coefficient", "loss", 0.0, -0.3, 0.3, 0.02, "1", 0.03),
         *(Lever("trim", key, 0.0, -0.15, 0.15, 0.01, TRIM_UNIT, 0.02) for key in ROTOR_SIGNS),
         Lever("battery_sag", "capacity", 0.6, 0.2, 2.0, 0.1, "1"),
@@ -72,7 +75,7 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
         Lever(VEHICLE, "flow_noise_time_s", vehicle.flow_noise_time_s, 0.02, 3.0, 0.1, "s"),
         Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "1"),
         Lever(VEHICLE, "range_drift_time_s", vehicle.range_drift_time_s, 0.05, 3.0, 0.1, "s"),
-        Lever("ground_effect", "strength", 1.45, 0.0, 3.0, 0.15, "1"),
+        Lever("ground_effect", "strength", 0.9, 0.0, 3.0, 0.15, "1"),
         Lever("ground_effect", "fade", 0.0875, 0.03, 0.3, 0.01, "m"),
         Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1"),
         Lever("ground_effect", "turbulence", 0.6, 0.0, 3.0, 0.1, "1"),
@@ -84,11 +87,11 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
         Lever("flow_scale", "transient", 0.0, -1.0, 1.0, 0.05, "1"),
         Lever("flow_scale", "focus", 0.08, 0.01, 0.3, 0.008, "m"),
         Lever("flow_latency", "delay", 0.02, 0.0, 0.2, 0.008, "s"),
-        Lever("range_bias", "near", -0.02, -0.1, 0.1, 0.008, "m"),
+        Lever("range_bias", "near", -0.045, -0.1, 0.1, 0.008, "m"),
         Lever("range_bias", "fade", 0.03, 0.01, 0.2, 0.006, "m"),
-        Lever("range_bias", "dip", -0.01, -0.1, 0.1, 0.006, "m"),
+        Lever("range_bias", "dip", 0.0, -0.1, 0.1, 0.006, "m"),
         Lever("range_bias", "time", 0.15, 0.03, 1.0, 0.02, "s"),
-        Lever("range_bias", "delay", 0.025, 0.0, 0.15, 0.008, "s"),
+        Lever("range_bias", "delay", 0.035, 0.0, 0.15, 0.008, "s"),
         Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.008, "m", 0.01),
     )
 
@@ -119,9 +122,9 @@ def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float]) ->
     return replace(vehicle, **changes)
 
 
-def height(levers: Sequence[Lever], values: Sequence[float]) -> float:
-    """What the set height of a mission is raised by, m."""
-    return float(sum(v for lever, v in zip(levers, values, strict=True) if lever.name == f"{MISSION}.height"))
+def mission(levers: Sequence[Lever], values: Sequence[float]) -> dict[str, float]:
+    """What `missions.drawn` takes: what the set height is raised by (height_m), speed of pulses in hover (pulse_mps)."""
+    return {lever.key: float(v) for lever, v in zip(levers, values, strict=True) if lever.of == MISSION}
 
 
 def table(levers: Sequence[Lever], values: Sequence[float], fixed: Mapping[str, Any] | None = None,

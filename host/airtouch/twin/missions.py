@@ -20,15 +20,18 @@ LEAST_CLEARANCE_M = 0.012  #: true distance at an entry; the legs end 6 mm below
 SETTLED_S = 0.15  #: after an entry, when the reading just after it is taken
 LAND_MPS = 0.2  #: of the firmware's landing
 #: what a flight draws together, from one recorded course
-KEYS = ("cruise", "clearance", "top", "speed", "angle", "climb", "hover", "before", "length", "stop", "after")
+KEYS = ("cruise", "clearance", "top", "speed", "angle", "climb", "hover", "before", "length", "stop", "after", "pulse",
+        "every")
 
 
-def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: float = 0.0) -> dict[str, float]:
+def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: float = 0.0,
+          pulse_mps: float = 0.0) -> dict[str, float]:
     """The values (KEYS) with which the simulator flies a course: m, s, m/s, degrees.
 
     The edges are put where the recorded flight, at its speed and with the same rise, crossed them. The
     platform's height follows from the readings on both sides of the entry, less the error that `effects`
-    give the down range. height_m: added to the set height, for a simulator that flies higher than it is told.
+    give the down range. height_m: added to the set height, for a simulator that
+    flies higher than it is told. pulse_mps: of the pulses in the hover, where the course has some.
     """
     clearance = max(true_distance(course.entered_m, (effects or {}).get("range_bias", {})), LEAST_CLEARANCE_M)
     before = max(course.speed_mps * (course.before_s - 0.5 * RISE_S), LEAST_BEFORE_M)
@@ -38,7 +41,8 @@ def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: fl
               "speed": course.speed_mps, "angle": course.angle_deg, "climb": max(course.climb_s / LEVEL_PART, 1.0),
               "hover": max(course.hover_s, 0.5), "before": before, "length": course.speed_mps * course.over_s,
               "stop": max(course.speed_mps * course.stop_s, LEAST_STOP_M),
-              "after": max(course.after_s - course.stop_s, 0.1)}
+              "after": max(course.after_s - course.stop_s, 0.1),
+              "pulse": pulse_mps if course.pulse_s else 0.0, "every": course.pulse_s or 1.0}
     return {name: round(float(value), 4) for name, value in values.items()}
 
 
@@ -54,12 +58,12 @@ def true_distance(reading_m: float, bias: Mapping[str, float]) -> float:
 
 
 def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME,
-          height_m: float = 0.0) -> dict[str, Any]:
-    """A scenario's table: each flight draws one of the courses and flies it with these effects."""
+          **mission: float) -> dict[str, Any]:
+    """A scenario's table: each flight draws one of the courses and flies it with these effects. mission: as of `drawn`."""
     return {
         "name": name,
         "summary": f"{len(courses)} recorded courses, flown again.",
-        "values": {"course": {"choice": [drawn(c, effects, height_m) for c in courses]}},
+        "values": {"course": {"choice": [drawn(c, effects, **mission) for c in courses]}},
         "platform": [{
             "shape": "rectangle", "size_m": ["= length * cos(angle)", WIDTH_M],
             "centre_m": ["= before + 0.5 * length", 0.0], "angle_deg": "= angle",
@@ -67,13 +71,13 @@ def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAM
         "mission": {"control": "velocity", "step": [
             {"do": "wait", "time_s": WAIT_S},
             {"do": "take-off", "height_m": "= cruise", "time_s": "= climb"},
-            {"do": "hover", "time_s": "= hover"},
+            {"do": "hover", "time_s": "= hover", "pulse_mps": "= pulse", "every_s": "= every"},
             {"do": "go", "distance_m": "= before + length + stop", "speed_mps": "= speed"},
             {"do": "hover", "time_s": "= after"},
             {"do": "land", "time_s": f"= cruise / {LAND_MPS}"}]},
         "effects": dict(effects)}
 
 
-def one(course: Course, effects: Mapping[str, Any], name: str = NAME, height_m: float = 0.0) -> Scenario:
-    """A scenario of one course."""
-    return Scenario(name, "", table([course], effects, name, height_m))
+def one(course: Course, effects: Mapping[str, Any], name: str = NAME, **mission: float) -> Scenario:
+    """A scenario of one course. mission: as of `drawn`."""
+    return Scenario(name, "", table([course], effects, name, **mission))

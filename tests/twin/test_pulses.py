@@ -1,0 +1,75 @@
+"""Velocity pulses in the hover: flown by a mission, read off a log."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.simulation import mission, setpoint, world
+from airtouch.twin import missions, pulses
+from airtouch.twin.course import course
+from twin_courses import PLAIN, made_course
+
+
+@pytest.fixture(scope="module")
+def pulsing(fly_course):
+    """Six flights with pulses of 0.2 m/s backwards every 0.52 s in the hover: (course read, log)."""
+    found = []
+    for number in range(6):
+        planned = made_course(number, 0.06)
+        log = fly_course(planned, PLAIN, number, pulse_mps=-0.2, pulse_s=0.52)
+        if log is not None:
+            found.append((course(log), log))
+    assert len(found) >= 5
+    return found
+
+
+def test_their_period_is_read_off_the_log(pulsing):
+    periods = [read.pulse_s for read, _ in pulsing]
+    print(periods)
+    assert np.abs(np.array(periods) - 0.52).max() < 0.01
+
+
+def test_flights_without_pulses_have_none(made):
+    assert [course(log).pulse_s for _, log, _ in made] == [0.0] * len(made)
+
+
+def test_they_move_the_drone(pulsing, made):
+    """The pitch rate of the hover swings by more than 1.3 times what it does without pulses."""
+    def swing(read, log):
+        return np.std(log["gyro_y_radps"][read.phases()["hover"]])
+    with_pulses = np.median([swing(read, log) for read, log in pulsing])
+    assert with_pulses > 1.3 * np.median([swing(course(log), log) for _, log, _ in made])
+
+
+def test_recorded_flights(flights):
+    """Of folds 0 to 2 more than half have pulses, all with one period."""
+    with open(flights / "airtouch" / "manifest.csv") as file:
+        rows = [r for r in csv.DictReader(file) if r["use"] == "clean" and r["fold"] in "012"]
+    found = []
+    for row in rows:
+        read = course(logs.read(flights / "airtouch" / row["file"]))
+        found.append(read.pulse_s)
+    some = np.array([p for p in found if p])
+    print(f"{len(some)} of {len(found)} flights, {some.min():.3f} to {some.max():.3f} s")
+    assert 25 <= len(some) <= 40
+    assert np.abs(some - 0.521).max() < 0.006
+
+
+def test_pulses_need_velocity_control_and_a_period():
+    step = [{"do": "take-off", "height_m": 0.5}, {"do": "hover", "time_s": 2.0, "pulse_mps": 0.2, "every_s": 0.5}]
+    rows = mission.setpoints({"step": step}, world.build([]), "test")
+    assert set(np.unique(rows[:, setpoint.VX])) == {0.0, 0.2}
+    assert (rows[:, setpoint.VX] > 0).sum() == 4 * mission.PULSE_ROWS
+    with pytest.raises(AirTouchError, match="velocity control"):
+        mission.setpoints({"step": step, "control": "position"}, world.build([]), "test")
+    step[1].pop("every_s")
+    with pytest.raises(AirTouchError, match="every_s"):
+        mission.setpoints({"step": step}, world.build([]), "test")
+
+
+def test_a_course_without_pulses_draws_none():
+    assert missions.drawn(made_course(0, 0.05), pulse_mps=-0.2)["pulse"] == 0.0
+    assert pulses.period(None, 0, 50) == 0.0
