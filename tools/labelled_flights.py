@@ -6,7 +6,8 @@
 Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
 that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained on the
 same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of learning.
---start must not know a flight that is scored. What is in --out already is not done again, so a run that was stopped goes on.
+--start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the second the
+other: a twin's detector, whose twin was fitted to the other half. What is in --out already is not done again, so a run that was stopped goes on.
 Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the flights scored, each with all its draws.
 """
 
@@ -106,7 +107,8 @@ def main() -> None:
     """Each row as soon as its last draw is done."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+")
-    parser.add_argument("--start", type=Path, help="model to go on from; the rows without it if left out")
+    parser.add_argument("--start", type=Path, action="append", default=[],
+                        help="model to go on from, one for all groups or one for each in their order; the rows without it if left out")
     parser.add_argument("--by", choices=("halves", "day"), default="halves")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"))
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
@@ -121,8 +123,11 @@ def main() -> None:
     readable, left_out = crossval.readable_flights(files, best.SPARE_SENSORS)
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
-    start = best.load(options.start) if options.start else None
     groups = sorted({group_of(file, options.by) for file in files})
+    if len(options.start) not in (0, 1, len(groups)):
+        raise SystemExit(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one for each")
+    models = [best.load(path) for path in options.start]
+    starts = dict(zip(groups, models if len(models) > 1 else models * len(groups)))
 
     def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
         scores: list[FlightScore] = []
@@ -130,16 +135,16 @@ def main() -> None:
             for group in groups:
                 held = [f for f in files if group_of(f, options.by) == group]
                 pool = [readable[f.path] for f in files if group_of(f, options.by) != group]
-                scores += cell(kind, count, draw, seed, group, held, pool, readable, start, options)
+                scores += cell(kind, count, draw, seed, group, held, pool, readable, starts.get(group), options)
         print(line(title, scores, len(draws)), flush=True)
 
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute |\n|---|---|---|---|---|---|---|",
           flush=True)
     every = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
-    if start:
+    if starts:
         row("as it is", "start", 0, [(0, 0)])
     for count in options.labelled or (2, 5, 10, 20):
-        if start:
+        if starts:
             row(f"and {count} labelled", "labelled", count, every)
         if options.alone_steps:
             row(f"{count} labelled alone", "alone", count, every)

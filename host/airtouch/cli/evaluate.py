@@ -7,6 +7,7 @@ import click
 
 from airtouch.cli import scores as show
 from airtouch.detector import dataset, evaluate, registry
+from airtouch.errors import AirTouchError
 
 
 @click.command(name="evaluate")
@@ -16,10 +17,11 @@ from airtouch.detector import dataset, evaluate, registry
               help="Trained model (.npz); the shipped one if left out.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
               help="Commanded speed of flights whose manifest does not say.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
 @click.option("--force", is_flag=True, help="Replace the JSON file.")
 def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed: float | None,
-            json_path: Path | None, force: bool) -> None:
+            folds: tuple[int, ...], json_path: Path | None, force: bool) -> None:
     """Score a detector on FLIGHTS: files, or folders (the clean flights of its manifest.csv, else all).
 
     Errors are detection distances: time error times speed, delay included, positive when early.
@@ -28,7 +30,9 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     show.check_free(json_path, force)
     module = registry.get(detector)
     trained = module.load(model)
-    files = dataset.collect(flights, speed)
+    files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
+    if not files:
+        raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest")
     said: dict[str, list[str]] = {}
     with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
         def done(result: evaluate.Result | Exception) -> None:
