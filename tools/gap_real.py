@@ -1,10 +1,12 @@
-"""The diagnosis on recorded flights, each row of the table in host/docs/gap-real.md.
+"""The diagnosis on recorded flights and on other people's simulators, each row of the table in host/docs/gap-real.md.
 
-    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm] [--jobs 2] [--keep cases.jsonl]
+    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep cases.jsonl]
+    python tools/gap_real.py --quick          # a few flights of each row; fails where the diagnosis is broken
 
-build: the authors' folds 0 to 2 and neural-swarm's days 19 and 20, on which settings may be chosen; view: the rest, of
-which each look is a line of host/docs/looks.md. Each flight is diagnosed alone: the authors' against five others of the
-same day and condition, neural-swarm's against the nominal flights of the same drone and day. Labels are read afterwards.
+build: the flights on which settings may be chosen: the authors' folds 0 to 2, neural-swarm's days 19 and 20, three of
+CrazyPAD's conditions in four. view: the rest, of which each look is a line of host/docs/looks.md, and the peers, on
+which nothing is ever chosen. Each flight is diagnosed alone: the authors' against five others of the same day and
+condition, neural-swarm's and CrazyPAD's against the nominal flights of the same drone. Labels are read afterwards.
 """
 
 import argparse
@@ -16,28 +18,39 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import gap_crazypad
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
+from airtouch.gap.blind import alike
+from airtouch.gap.blind_score import wilson
 from airtouch.gap.diagnose import diagnose
 from airtouch.logs import read
+from gap_authors import questions
+from gap_peers import NAMES
 
 OTHERS = 5  #: of the authors' flights, that one is held against
 PER_GROUP = 4  #: flights tested of a day and condition
 BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")
+COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
+QUICK = {("authors", "none"): 2, ("swarm", "ground_effect"): 2, ("swarm", "downwash"): 2, ("swarm", "none"): 2,
+         ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 3, ("peers", "weak_motor"): 1, ("peers", "inertia"): 1}
+QUICK_WRONG = 3  #: of the flights of --quick, at most: it tells a broken diagnosis, not a slightly worse one
 
 
 @dataclass(frozen=True)
 class Case:
-    """One flight to be diagnosed."""
+    """One flight to be diagnosed: truth is only read afterwards."""
 
     row: str
     truth: str
     vehicle: str
     flight: str
     baseline: tuple[str, ...]
+    condition: str = ""
 
 
 def authors(folder: Path, part: str) -> Iterator[Case]:
@@ -46,13 +59,13 @@ def authors(folder: Path, part: str) -> Iterator[Case]:
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and _wanted(part, r["fold"] in BUILD_FOLDS):
             made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(str(folder / "airtouch" / r["file"]))
-    for (day, height, angle), files in made.items():
+    for files in made.values():
         if len(files) <= OTHERS:
             continue
         step = max(len(files) // PER_GROUP, 1)
         for flight in files[::step][:PER_GROUP]:
             others = [f for f in files if f != flight][:OTHERS]
-            yield Case("authors' nominal flights", "none", "crazyflie-2.1-flow", flight, tuple(others))
+            yield Case("authors", "none", "crazyflie-2.1-flow", flight, tuple(others))
 
 
 def swarm(folder: Path, part: str) -> Iterator[Case]:
@@ -63,47 +76,121 @@ def swarm(folder: Path, part: str) -> Iterator[Case]:
         base[r["group"]].append(str(own / "flights" / r["file"]))
     for r in csv.DictReader((own / "manifest.csv").open()):
         if _wanted(part, r["day"] in BUILD_DAYS):
-            yield Case(f"neural-swarm, {r['vehicle']}", r["truth"], str(own / f"{r['vehicle']}.toml"),
-                       str(own / "flights" / r["file"]), tuple(base[r["group"]]))
+            yield Case("swarm", r["truth"], str(own / f"{r['vehicle']}.toml"), str(own / "flights" / r["file"]),
+                       tuple(base[r["group"]]), r["vehicle"])
+
+
+def crazypad(folder: Path, part: str) -> Iterator[Case]:
+    """CrazyPAD's flights against the other normal ones of the same drone; truth is the family of the defect."""
+    own = folder / "crazypad"
+    rows = list(csv.DictReader((own / "manifest.csv").open()))
+    normal = [r for r in rows if gap_crazypad.family(r["condition"]) == "normal"]
+    defects = sorted({r["condition"] for r in rows} - {r["condition"] for r in normal})
+    for r in rows:
+        if _wanted(part, r in normal or defects.index(r["condition"]) % 4 != 3):
+            others = tuple(str(own / o["file"]) for o in normal if o["drone"] == r["drone"] and o["file"] != r["file"])
+            yield Case("crazypad", gap_crazypad.family(r["condition"]), "crazyflie-2.1", str(own / r["file"]), others,
+                       r["condition"])
+
+
+def fan(folder: Path, part: str) -> Iterator[Case]:
+    """The authors' flight past a fan, against five calm flights of its day."""
+    flights, calm = questions(folder / "airtouch")["wind"]
+    if _wanted(part, True):
+        for flight in flights:
+            yield Case("fan", "comes and goes", "crazyflie-2.1-flow", flight, tuple(calm[:OTHERS]))
+
+
+def peers(folder: Path, part: str) -> Iterator[Case]:
+    """Flights of other people's simulators."""
+    own = folder / "peers"
+    for r in csv.DictReader((own / "manifest.csv").open()):
+        if not r["file"].startswith("cal") and _wanted(part, False):
+            yield Case("peers", NAMES.get(r["effect"], r["effect"]), str(own / f"vehicle_{r['vehicle'].lower()}.toml"),
+                       str(own / r["file"]), tuple(str(own / f"cal_{r['vehicle']}_{i}.csv.gz") for i in (0, 1)))
 
 
 def _wanted(part: str, build: bool) -> bool:
     return part == "all" or build == (part == "build")
 
 
-ROWS = {"authors": authors, "swarm": swarm}
+ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "peers": peers}
 
 
 def answered(case: Case) -> dict:
     """A case with its diagnosis."""
     started = time.perf_counter()
-    out = {**asdict(case), "flight": Path(case.flight).name, "baseline": len(case.baseline)}
+    out = {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
+           "baseline": len(case.baseline), "effects": []}
     try:
         told = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline])
     except AirTouchError as error:
-        return {**out, "verdict": "refused", "names": [], "why": str(error)}
-    return {**out, "verdict": told.verdict, "names": [e.name for e in told.effects],
-            "strengths": {e.name: {k: q.value for k, q in e.parameters.items()} for e in told.effects},
-            "gap": told.gap["before"], "after": told.gap["after"],
+        return {**out, "verdict": "refused", "why": str(error)}
+    found = told.plain()
+    return {**out, "verdict": told.verdict, "effects": found["effects"], "gap": told.gap,
             "ranking": {r.name: round(r.probability, 4) for r in told.ranking[:6]},
             "seconds": time.perf_counter() - started}
 
 
 def answer(case: dict) -> str:
-    """The first name of a diagnosis, or its verdict."""
-    return case["names"][0] if case["verdict"] == "effect" else case["verdict"]
+    """What a diagnosis says first, in the words of its row's truths."""
+    if case["row"] == "crazypad":
+        return gap_crazypad.answer(case)[0]
+    if case["verdict"] != "effect":
+        return case["verdict"]
+    first = case["effects"][0]
+    if case["row"] == "fan" and first["name"] in COMES_AND_GOES and first.get("seconds"):
+        return "comes and goes"
+    if case["row"] == "peers" and alike(first["name"], case["truth"]):
+        return case["truth"]
+    return first["name"]
 
 
-def main() -> None:
+def show(cases: list[dict]) -> None:
+    """One line for each row and truth: hits, their share with its 95 % interval, and every answer."""
+    table = defaultdict(lambda: defaultdict(int))
+    for c in cases:
+        kind = f"{c['row']}, {c['condition']}" if c["row"] == "swarm" else c["row"]
+        table[kind, "any effect" if c["row"] == "peers" else c["truth"]]["right" if c["row"] == "peers"
+                                                                        and answer(c) == c["truth"] else answer(c)] += 1
+    print("| flights | truth | right | every answer |\n|---|---|---|---|")
+    for (row, truth), answers in sorted(table.items()):
+        n, hits = sum(answers.values()), answers["right" if row == "peers" else truth]
+        share = wilson(hits, n)
+        told = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]) if k)
+        print(f"| {row} | {truth} | {hits} of {n} [{share['low']:.0%}, {share['high']:.0%}] | {told} |")
+    pads = [{**c, "drone": c["flight"].split("_")[-2]} for c in cases if c["row"] == "crazypad"]
+    if pads:
+        figures = {"family, balanced": gap_crazypad.balanced, "only damaged rotors named": gap_crazypad.some_named,
+                   "severity, Spearman": gap_crazypad.severity}
+        for text, figure in figures.items():
+            low, high = gap_crazypad.interval(pads, figure)
+            print(f"CrazyPAD, {len(pads)} flights: {text} {figure(pads):.2f} (90 % interval {low:.2f} to {high:.2f})")
+
+
+def quick(cases: list[Case]) -> list[Case]:
+    """The first few of each row and truth that QUICK names, evenly chosen."""
+    out = []
+    for (row, truth), many in QUICK.items():
+        some = [c for c in cases if c.row == row and c.truth == truth]
+        out += some[::max(len(some) // many, 1)][:many]
+    return out
+
+
+def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", nargs="?", type=Path,
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
     parser.add_argument("--part", choices=("build", "view", "all"), default="build")
-    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=sorted(ROWS))
+    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=list(ROWS))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
-    args = parser.parse_args()
-    cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
+    parser.add_argument("--quick", action="store_true", help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
+    args = parser.parse_args(arguments)
+    if args.quick:  # of the parts for building, and two peers
+        cases = quick([c for row, make in ROWS.items() for c in make(args.flights, "view" if row == "peers" else "build")])
+    else:
+        cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
     done = {}
     if args.keep and args.keep.exists():
         done = {c["flight"]: c for c in map(json.loads, args.keep.read_text().splitlines())}
@@ -115,14 +202,14 @@ def main() -> None:
                 with args.keep.open("a") as out:
                     out.write(json.dumps(case) + "\n")
             print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
-    table = defaultdict(lambda: defaultdict(int))
-    for c in cases:
-        case = done[Path(c.flight).name]
-        table[case["row"], case["truth"]][answer(case)] += 1
-    for (row, truth), answers in sorted(table.items()):
-        told = ", ".join(f"{name} {n}" for name, n in sorted(answers.items(), key=lambda x: -x[1]))
-        print(f"{row} | {truth} | {answers[truth]} of {sum(answers.values())} right | {told}")
+    told = [done[Path(c.flight).name] for c in cases]
+    show(told)
+    wrong = [c["flight"] for c in told if answer(c) != c["truth"]]
+    if args.quick and len(wrong) > QUICK_WRONG:
+        print(f"gap_real: {len(wrong)} of {len(told)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}", file=sys.stderr)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

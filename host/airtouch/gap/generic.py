@@ -204,8 +204,7 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
         _, usually = _factors(*one, middle, spread)
         found, freely = _factors(*one, middle, LOOSE[1])
         used = freely - usually > CHANCE
-        if data.study.usual is None:  # quieter than its data sheet is no gap
-            used &= found > 0.0
+        used &= found > middle  # quieter than nominal flights, or than its data sheet, is no gap
         gained = _factors(*two, found, spread)[1] - _factors(*two, middle, spread)[1]
         power += float(_perhaps(gained[used]).sum())
     return linear, power

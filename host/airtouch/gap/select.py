@@ -38,9 +38,11 @@ UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectr
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
+WORTH_AGAIN = 0.25  #: of what the first effect must gain, below which a candidate is not judged again beside a deviation
 HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
+BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
 BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
 Hypothesis = tuple[Term, ...]
 
@@ -93,8 +95,8 @@ class Selection:
 
     @property
     def named(self) -> tuple[Judged, ...]:
-        """The steps whose effects are named."""
-        return tuple(s for s in self.steps if s.named)
+        """The steps whose effects are named, first what stands out most from nominal flights."""
+        return tuple(sorted((s for s in self.steps if s.named), key=lambda s: -s.evidence))
 
     @property
     def chosen(self) -> Judged | None:
@@ -172,7 +174,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
             singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
         steps.append(replace(best, named=best.evidence >= need[best.name]))
         if sum(s.named for s in steps) < MOST_EFFECTS:
-            tried, need = _beside(data, parts, base, screen, candidates, steps, singles, progress)
+            tried, need = _beside(data, parts, base, screen, candidates, steps,
+                                  {n: replace(j, gain=j.gain - so_far) for n, j in tried.items()}, progress)
     before = _nameless(data, parts, None)
     after = _nameless(data, parts, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
@@ -203,10 +206,12 @@ def _beside(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]
             progress: Callable[[str], None]) -> tuple[dict[str, Judged], dict[str, float]]:
     """Candidates judged beside the steps so far, and the gain that each needs.
 
-    Beside a deviation of nominal flights only those are judged that gained something without it.
+    first: as judged before the newest step. Beside a deviation of nominal flights only those are judged again that
+    gained something without it: a deviation takes gain from others, it seldom lends any.
     """
     named = any(s.named for s in steps)
-    worth = candidates if named else {n: v for n, v in candidates.items() if n not in first or first[n].gain > 0.0}
+    gained = lambda n: n in first and first[n].gain > WORTH_AGAIN * FIRST_GAIN
+    worth = candidates if named else {n: v for n, v in candidates.items() if gained(n)}
     tried = _round(data, parts, base, screen, worth, steps[-1], progress)
     need = {n: _needed_beside(data, steps[-1], j) if named else needed(data, j.terms[len(steps[-1].terms):])
             for n, j in tried.items()}
@@ -298,7 +303,7 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         problem, values, power = left_over(data, part, chosen.fits[1 - k].terms if chosen and chosen.fits else ())
         left.append(values)
         added.append(power - problem.power)
-    looked, sure = [], []
+    looked, sure, mixed = [], [], []
     for name, variants in candidates.items():
         progress(name)
         hopeless = False
@@ -312,10 +317,15 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
                 k = len(terms[0].free)
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
                                      strength=np.mean(fitted, axis=0)[:k], variance=_of_mean(variances)[:k]))
+            elif len(terms) > 1 and terms[0].kind == MEAN:
+                mixed.append((name, terms, choice))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
                 hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
     looked = _best_variants(looked)
+    alone = {j.name: j.terms[-1] for j in looked if len(j.terms) == len(held) + 1}
+    sure += [_crossed(data, parts, base, name, held, terms, chosen, choice) for name, terms, choice in mixed
+             if _same(terms[0], alone[name])]  # with its random part the variant that is best without
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
     fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen, j.choice) for j in worth]
     best: dict[str, Judged] = {}
@@ -329,6 +339,12 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         if both and alone and len(both.terms) > len(held) + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))  # it is the companion that gains
     return _with_evidence(data, best, before)
+
+
+def _same(one: Term, other: Term) -> bool:
+    """Whether two terms are the same variant of an effect."""
+    fixed = [{k: v for k, v in t.values.items() if k not in t.free} for t in (one, other)]
+    return one.name == other.name and one.free == other.free and fixed[0] == fixed[1]
 
 
 def _with_evidence(data: Data, best: Mapping[str, Judged], before: float) -> dict[str, Judged]:
@@ -441,7 +457,8 @@ def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
         first = selection.named[0]
         for n in names:
             if out[n] >= 0.0:
-                out[n] = max(out[first.name] + singles[n].gain - first.gain, -TEMPERATURE)
+                behind = max(singles[first.name].gain - singles[n].gain, BEHIND) if n != first.name else 0.0
+                out[n] = max(out[first.name] - behind, -TEMPERATURE)
     return [out[n] for n in names]
 
 

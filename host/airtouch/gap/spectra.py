@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.channels import CHANNELS, COUNT
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.hardness import Slopes, hardness_of, slopes_of
 
 AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples
@@ -86,6 +87,15 @@ class Floor:
     offset: np.ndarray
     clock_s: float
     lost: float
+    slopes: Slopes | None = None  #: with how hard it is flown, of the power in the air
+    least: np.ndarray | float = 0.0  #: (bins, COUNT) in the air, of the sensors alone
+
+    def level(self, flight: Flight, first: np.ndarray, regime: str) -> np.ndarray:
+        """Power (blocks, bins, COUNT) of the blocks of a flight that begin at samples `first`."""
+        power = self.power[regime]
+        if self.slopes is None or regime != AIR:
+            return np.broadcast_to(power, (len(first), *power.shape))
+        return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least)
 
 
 def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra: Sequence[dict[str, np.ndarray]],
@@ -96,13 +106,18 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra
     that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of its difference),
     below which the floor never goes.
     """
-    power, count = {}, {}
+    power, count, slopes = {}, {}, None
     for regime in (AIR, REST):
         every = np.concatenate([s[regime] for s in spectra]) if spectra else np.zeros((0, 1, COUNT))
         sensor = sensor_power(least, regime)
         count[regime] = len(every)
         if len(every) >= 4:
-            mean = np.nan_to_num(np.nanmean(np.abs(every) ** 2, axis=0))
+            each = np.abs(every) ** 2
+            if regime == AIR:
+                hardness = np.concatenate([hardness_of(f, starts(f, AIR), LENGTH[AIR]) for f in flights])
+                slopes = slopes_of(each, hardness, frequencies(AIR))
+                each = each / slopes.level(hardness)
+            mean = np.nan_to_num(np.nanmean(each, axis=0))
             power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
         else:
             power[regime] = 2.0 * sensor
@@ -111,7 +126,7 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra
     offset = np.nan_to_num(means.std(axis=0, ddof=1)) if len(means) > 1 else np.zeros(COUNT)
     clock = np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2)) if flights else 0.0
     lost = float(np.mean(np.concatenate([f.lost for f in flights]))) if flights else 0.0
-    return Floor(power, count, offset, float(clock), lost)
+    return Floor(power, count, offset, float(clock), lost, slopes, 0.5 * sensor_power(least, AIR))
 
 
 def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:

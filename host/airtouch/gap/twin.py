@@ -18,6 +18,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.edge_response import EdgeFloor, floor_of
 from airtouch.gap.flight import PERIOD_S, Flight
+from airtouch.gap.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.loop_model import (
     AXES,
     Controller,
@@ -75,7 +76,8 @@ class Change(NamedTuple):
 class Twin:
     """The nominal loops: a controller, noise strengths (sources,) and floor (bins,) for each of AXES.
 
-    floor: PSD of the commands, N^2/Hz, of `blocks` blocks; known: axes whose model fits.
+    floor: PSD of the commands, N^2/Hz, of `blocks` blocks as hard as nominal ones; slopes: of its power with how
+    hard the vehicle is flown.
     """
 
     vehicle: Vehicle
@@ -85,7 +87,13 @@ class Twin:
     strengths: tuple[np.ndarray, ...]
     floor: np.ndarray
     blocks: int
+    slopes: Slopes
     edges: EdgeFloor | None = None
+
+    def spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
+        """First samples and spectra (blocks, bins, AXES) of a flight's commands, as if flown as hard as nominal ones."""
+        first, every = block_spectra(flight, self.vehicle)
+        return first, every / np.sqrt(self.slopes.level(hardness_of(flight, first, LENGTH)))
 
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
@@ -284,10 +292,13 @@ def _calm(power: np.ndarray) -> np.ndarray:
 
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> Twin | None:
     """Controller, noise and floor of flights declared nominal; None where they have too few blocks."""
-    every = np.concatenate([block_spectra(f, vehicle)[1] for f in flights]) if flights else np.zeros((0, 1, 3))
-    if len(every) < FEWEST:
+    made = [block_spectra(f, vehicle) for f in flights]
+    if sum(len(first) for first, _ in made) < FEWEST:
         return None
-    power = typical(np.abs(every) ** 2)
+    hardness = np.concatenate([hardness_of(f, first, LENGTH) for f, (first, _) in zip(flights, made, strict=True)])
+    every = np.abs(np.concatenate([s for _, s in made])) ** 2
+    slopes = slopes_of(every, hardness, frequencies())
+    power = typical(every / slopes.level(hardness))
     row = prepare(vehicle, calibration)[0][0]
     documented = [_fit(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
     found = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
@@ -295,7 +306,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
     chosen = documented if by_firmware else found
     twin = Twin(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
-                tuple(c[0] for c in chosen), power, len(every), floor_of(flights, vehicle, calibration))
+                tuple(c[0] for c in chosen), power, len(every), slopes, floor_of(flights, vehicle, calibration))
     model = twin._nominal()
     return replace(twin, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
 

@@ -14,7 +14,7 @@ from airtouch.gap import edge_response
 from airtouch.gap.flight import Flight
 from airtouch.gap.spectra import LENGTH as AIR_LENGTH
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT
-from airtouch.gap.twin import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, Twin, block_spectra, frequencies, shapes
+from airtouch.gap.twin import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, Twin, frequencies, shapes
 from airtouch.simulation.effects import Active
 
 FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
@@ -37,7 +37,7 @@ class TwinView:
             for i, regime, chosen in pieces:
                 if regime != AIR or not chosen.any():
                     continue
-                begin, every = block_spectra(flights[i], twin.vehicle)
+                begin, every = twin.spectra(flights[i])
                 middle = first[i][AIR] + AIR_LENGTH[AIR] // 2
                 nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1) if len(begin) else []
                 mine = every[chosen[nearest]] if len(begin) else every

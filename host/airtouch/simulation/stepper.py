@@ -8,7 +8,7 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import kept, loop
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import PARAMETERS, handle, wrench
+from airtouch.simulation.effects.effect import PARAMETERS, Wrenches, wrench
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
 from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan
@@ -57,7 +57,7 @@ class Stepper:
         self.world, self.room = plan.world, plan.room
         self.used = len(acting)
         idle = loop.SLOTS - len(acting)
-        self.functions = tuple(handle(a.effect.wrench) for a in acting) + (handle(_nothing),) * idle
+        self.functions = Wrenches([a.effect.wrench for a in acting] + [_nothing] * idle)
         self.parameters = np.zeros((loop.SLOTS, PARAMETERS))
         self.effect_streams = np.zeros((loop.SLOTS, 1), np.uint64)
         seen: dict[str, int] = {}

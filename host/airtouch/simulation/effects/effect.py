@@ -2,13 +2,14 @@
 
 import functools
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numba
 import numpy as np
 from numba import float64, types, uint64
+from numba.core.typing.typeof import typeof_impl
 from numba.experimental.function_type import _get_wrapper_address
 
 from airtouch.errors import AirTouchError
@@ -49,9 +50,25 @@ class _Address:
 
 
 @functools.cache
-def handle(function: Any) -> Any:
-    """What compiled code takes for a `wrench`."""
+def _handle(function: Any) -> _Address:
     return _Address(function)
+
+
+class Wrenches(tuple):
+    """Several `wrench` functions as compiled code takes them: a tuple whose type numba need not work out at each call."""
+
+    def __new__(cls, functions: Sequence[Any]) -> "Wrenches":
+        return super().__new__(cls, [_handle(f) for f in functions])
+
+
+@functools.cache
+def _slots(count: int) -> types.UniTuple:
+    return types.UniTuple(WrenchFunction, count)
+
+
+@typeof_impl.register(Wrenches)
+def _typeof_wrenches(value: Wrenches, _context: Any) -> types.UniTuple:
+    return _slots(len(value))
 
 
 @dataclass(frozen=True)
