@@ -95,8 +95,9 @@ class Selection:
 
     @property
     def named(self) -> tuple[Judged, ...]:
-        """The steps whose effects are named, first what stands out most from nominal flights."""
-        return tuple(sorted((s for s in self.steps if s.named), key=lambda s: -s.evidence))
+        """The steps whose effects are named, as found; what the log has done to itself comes after the vehicle's."""
+        of_the_log = lambda s: any(t.name == s.name and t.kind == CLOCK for t in s.terms)
+        return tuple(sorted((s for s in self.steps if s.named), key=of_the_log))
 
     @property
     def chosen(self) -> Judged | None:
