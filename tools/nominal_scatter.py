@@ -14,12 +14,13 @@ import os
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import blind, calibrate, measure
+from airtouch.gap import blind, calibrate, measure, nominal_scatter
 from airtouch.gap.data import Data
 from airtouch.gap.nominal_scatter import Apparent, Scatter, measured
 from airtouch.gap.select import apparent
@@ -53,7 +54,7 @@ def groups(folder: Path) -> Iterator[tuple[str, str, Vehicle, list[Log]]]:
     flown = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
         logs = blind.nominal(flown, blind.CAL_FIRST, blind.CAL, seed)
-        yield "simulated", f"seed {seed}", flown, [(f"simulated {seed} {i}", lambda log=log: log)
+        yield nominal_scatter.SIMULATED, f"seed {seed}", flown, [(f"simulated {seed} {i}", lambda log=log: log)
                                                    for i, log in enumerate(logs)]
 
 
@@ -76,7 +77,8 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     lines = ["# Root mean square of the apparent strength of every effect, in its natural steps (candidates.Term), in",
              "# nominal flights held against others; made by tools/nominal_scatter.py.", ""]
     for name, s in classes.items():
-        lines += [f'["{name}"]  # {counts[name]}', f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
+        lines += [f'["{name}"]  # {counts[name]}', *([f'vehicle = "{s.vehicle}"'] if s.vehicle else []),
+                  f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
                   f"root_passing_rate = [{s.passing_rate[0]:.3f}, {s.passing_rate[1]:.3f}]", f'["{name}".rms]']
         lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.rms.items()]
         lines.append("")
@@ -93,11 +95,12 @@ def main() -> None:
     done = {}
     if args.keep and args.keep.exists():
         done = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
-    cases, groups_of = defaultdict(list), defaultdict(set)
+    cases, groups_of, flown_by = defaultdict(list), defaultdict(set), {}
     for of, group, flown, files in groups(args.flights):
         if len(files) < LEAST:
             continue
         groups_of[of].add(group)
+        flown_by[of] = "" if of == nominal_scatter.SIMULATED else flown.name
         if any(name not in done for name, _ in files):
             for name, one in held_out(files, flown):
                 done[name] = {"file": name, "rate": one.rate, "passing_rate": one.passing_rate,
@@ -110,7 +113,7 @@ def main() -> None:
         for row in (done[name] for name, _ in files):
             cases[of].append(Apparent(*({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors")),
                                       row["rate"], row["passing_rate"]))
-    classes = {of: measured(flights) for of, flights in cases.items()}
+    classes = {of: replace(measured(flights), vehicle=flown_by[of]) for of, flights in cases.items()}
     counts = {of: f"{len(flights)} flights in {len(groups_of[of])} groups" for of, flights in cases.items()}
     new = args.out.with_suffix(".new")
     new.write_text(text_of(classes, counts))

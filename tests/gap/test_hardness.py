@@ -1,10 +1,30 @@
 """A floor that rises with how hard the vehicle is flown: slopes against drawn powers whose law is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from airtouch.gap.hardness import BANDS_HZ, CALMER, HARDER, hardness_of, slopes_of
+from airtouch.gap import measure
+from airtouch.gap.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
 
+FIRST = np.array([0, 128, 256])
 FREQUENCY = np.fft.rfftfreq(256, 0.01)
+
+
+class Rolling:
+    """A vehicle that rolls to and fro by `swing` rad."""
+
+    def __init__(self, swing):
+        roll = swing * np.sin(2.0 * np.pi * np.arange(512) / 128.0)
+        self.turn = np.zeros((512, 3, 3))
+        self.turn[:, 2] = np.stack([np.zeros(512), np.sin(roll), np.cos(roll)], axis=1)
+        self.phase = np.ones(512)
+        self.on_ground = np.zeros(512, bool)
+        self.usable = np.ones(512, bool)
+        self.lost = np.zeros(512, bool)
+
+    def __len__(self):
+        return 512
 
 
 def drawn(slope, blocks, seed=0):
@@ -42,17 +62,20 @@ def test_level_divides_out_hardness_within_the_trusted_range_only():
     assert slopes.level(np.array([-50.0, 50.0])) == pytest.approx(slopes.level(edge))
 
 
+def test_a_flight_flown_unlike_its_baseline_is_said_so():
+    calm, hard, usual = ((name, Rolling(np.radians(swing))) for name, swing in (("calm", 1.0), ("hard", 30.0), ("usual", 10.0)))
+    slopes = Slopes(np.zeros((129, 13)), hardness_of(Rolling(np.radians(5.0)), FIRST, 256).min(),
+                    1.5, hardness_of(Rolling(np.radians(15.0)), FIRST, 256).max())
+    study = SimpleNamespace(floor=SimpleNamespace(slopes=slopes))
+    for name, flight in (calm, hard, usual):
+        flight.name = name
+        said = measure.flown_unlike(study, [flight])
+        assert bool(said) == (name != "usual")
+        assert name == "usual" or {"calm": "calmer", "hard": "harder"}[name] in said[0]
+
+
 def test_hardness_is_the_logarithm_of_how_much_tilt_varies():
-    class Rolling:
-        """A vehicle that rolls to and fro by `swing` rad."""
-
-        def __init__(self, swing):
-            roll = swing * np.sin(2.0 * np.pi * np.arange(512) / 128.0)
-            self.turn = np.zeros((512, 3, 3))
-            self.turn[:, 2] = np.stack([np.zeros(512), np.sin(roll), np.cos(roll)], axis=1)
-
-    first = np.array([0, 128, 256])
-    still, hard = (hardness_of(Rolling(np.radians(s)), first, 256) for s in (0.0, 20.0))
+    still, hard = (hardness_of(Rolling(np.radians(s)), FIRST, 256) for s in (0.0, 20.0))
     assert still == pytest.approx(0.0)
     assert hard == pytest.approx(np.log(20.0 / np.sqrt(2.0)), rel=0.01)
     assert len(hardness_of(Rolling(0.1), np.zeros(0, int), 256)) == 0

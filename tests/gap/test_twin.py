@@ -1,5 +1,7 @@
 """Twin view: the loop model against simulated closed loops, and effects that only the commands show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import welch
@@ -10,7 +12,7 @@ from airtouch.gap.candidates import terms
 from airtouch.gap.data import Data
 from airtouch.simulation import scenario
 from airtouch.simulation.batch import flights as simulated
-from airtouch.simulation.effects import activate
+from airtouch.simulation.effects import Active, activate
 from airtouch.simulation.flight import prepare
 
 VEHICLE = vehicles.load()
@@ -130,3 +132,18 @@ def test_a_loop_that_would_not_fly_is_recognised():
     row = prepare(VEHICLE, ())[0][0]
     assert loop_model.excess_phase(loop_model.firmware(row, "roll"), row, "roll") < 0.0
     assert loop_model.excess_phase(loop_model.firmware(slow, "roll"), slow, "roll") > 0.0
+
+
+@pytest.mark.parametrize("field", ["gyro_lowpass", "rate_scale", "gravity", "thrust_scale", "rotor_y"])
+def test_ratio_and_share_follow_whatever_an_effect_sets_in_the_plant(study, field):
+    """A user's effect may set any field; what was worked out for the vehicle as it is must not be given for it."""
+    def settings(row, values):
+        row[field] = row[field] * values["factor"]
+
+    base = activate({"inertia": {"fraction": 0.0}})[0].effect
+    factor = replace(base.parameters[0], name="factor", default=1.5, low=0.5, high=2.0, neutral=1.0)
+    made = replace(base, name="own", parameters=(factor,), settings=settings, wrench=None)
+    law = study.controller
+    assert law.ratio(()) == pytest.approx(1.0)
+    assert np.abs(np.log(law.ratio((Active(made, {"factor": 1.5}),)))).max() > 0.01
+    assert law.ratio((Active(made, {"factor": 1.0}),)) == pytest.approx(1.0)

@@ -43,3 +43,29 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     left_out = brief(found.held[0], list(measure.usable(real, vehicle, [])), ("magnet",))  # the same calibration
     assert "magnet" not in [r.name for r in left_out.ranking]
     assert left_out.gap["after"] > found.gap["after"]
+
+
+STIFF = '''"""A height loop tuned otherwise: nothing of it is in what the logged commands lead to expect."""
+from airtouch.simulation.effects import Effect, Parameter
+
+
+def settings(plant, v):
+    plant["height_gain"] *= v["factor"]
+
+
+EFFECT = Effect("stiff_climb", "gain of the height loop", (Parameter("factor", "1", 1.5, 0.2, 5.0, 1.0, "of the gain"),),
+                settings=settings)
+'''
+
+
+def test_a_users_effect_that_only_the_commands_show_is_fitted(tmp_path):
+    file = tmp_path / "stiff_climb.py"
+    file.write_text(STIFF, encoding="utf-8")
+    effects.load_file(file)
+    try:
+        vehicle = load("crazyflie-2.1-flow")
+        found = diagnose(fly(1, 4, [("stiff_climb", {"factor": 2.5})]), vehicle, fly(4, 3), without=["controller_gain"])
+    finally:
+        effects.unregister("stiff_climb")
+    assert found.ranking[0].name == "stiff_climb"
+    np.testing.assert_allclose(found.effects[0].parameters["factor"].value, 2.5, rtol=0.35)

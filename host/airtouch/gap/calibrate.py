@@ -77,7 +77,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     study = replace(study, usual=usual_of(Data(study, flights)))
     if scatter:
         study = replace(study, scatter=scatter_of([apparent(Data(study, [f])) for f in _some(flights)],
-                                                    any(_recorded(f) for f in flights)))
+                                                    any(_recorded(f) for f in flights), vehicle.name))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))
 

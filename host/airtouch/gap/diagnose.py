@@ -68,6 +68,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes = [n for f in seen for n in f.notes] + left_out
     notes += list(fitted.notes) if fitted else [NO_BASELINE]
     notes += measure.differences(study, nominal)
+    notes += measure.flown_unlike(study, seen)
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
     control = _control(data, found) if verdict == "effect" else {}

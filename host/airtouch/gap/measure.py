@@ -15,8 +15,10 @@ from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, Flight, ready
 from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of,
                                    where)
+from airtouch.gap.hardness import STILL_RAD, hardness_of
 from airtouch.gap.motion import held
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
+from airtouch.gap.spectra import AIR, LENGTH, starts
 from airtouch.logs.flight_log import RPM, FlightLog
 from airtouch.simulation import replay
 from airtouch.vehicle import Vehicle
@@ -157,6 +159,24 @@ def differences(study: Study, nominal: Sequence[Flight]) -> list[str]:
              if spread[i] > APART[i] and spread[i] > SURE * error[i]]
     return ["the baseline flights are not consistent: among themselves they differ by " + ", ".join(found)
             + "; the floor is that much higher"] if found else []
+
+
+def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
+    """In words, which flights are flown harder or calmer than every baseline flight: their floor is extrapolated."""
+    slopes = study.floor.slopes
+    if slopes is None:
+        return []
+    notes = []
+    for f in flights:
+        hardness = hardness_of(f, starts(f, AIR), LENGTH[AIR])
+        middle = float(np.median(hardness)) if len(hardness) else slopes.usual
+        if not slopes.calmest <= middle <= slopes.hardest:
+            word, end = ("harder", slopes.hardest) if middle > slopes.hardest else ("calmer", slopes.calmest)
+            own, theirs = (np.degrees(STILL_RAD * np.sqrt(np.expm1(2.0 * max(x, 0.0)))) for x in (middle, end))
+            notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, theirs by "
+                         f"{'at most' if word == 'harder' else 'at least'} {theirs:.1f}): the floor is extrapolated; "
+                         "fly the baseline like the test")
+    return notes
 
 
 def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:

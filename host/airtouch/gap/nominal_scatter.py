@@ -49,13 +49,15 @@ class Apparent:
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate, passing_rate: mean and standard deviation of the square root of each.
+    rate, passing_rate: mean and standard deviation of the square root of each. vehicle: whose recorded flights a class
+    of the table was measured on.
     """
 
     rms: Mapping[str, np.ndarray]
     freedom: float
     rate: tuple[float, float]
     passing_rate: tuple[float, float] = (0.0, 0.0)
+    vehicle: str = ""
 
     def evidence(self, name: str, strength: np.ndarray) -> float:
         """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
@@ -84,14 +86,17 @@ class Scatter:
         return least + seconds * (rate[0] + min(sure, MOST_SURE) * rate[1]) ** 2
 
 
-def scatter_of(baseline: Sequence[Apparent], recorded: bool = False) -> Scatter:
-    """What the table knows of the class that the baseline flights fit best, updated by them.
+def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
+    """What the table knows of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
 
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
-    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs.
+    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs, and one
+    that was measured on the vehicle of this name is.
     """
     classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
+    if recorded and any(c.vehicle == vehicle for c in classes.values()):
+        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle}
     n = len(baseline)
     wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
     known = baseline if n > 1 else ()
@@ -166,7 +171,7 @@ def table() -> dict[str, Scatter]:
     """The shipped classes of vehicles by name."""
     text = (resources.files("airtouch") / "gap" / "nominal_scatter.toml").read_text(encoding="utf-8")
     return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
-                          tuple(entry["root_rate"]), tuple(entry["root_passing_rate"]))
+                          tuple(entry["root_rate"]), tuple(entry["root_passing_rate"]), entry.get("vehicle", ""))
             for name, entry in tomllib.loads(text).items()}
 
 

@@ -17,6 +17,7 @@ from airtouch.gap.twin import COMMAND_ONLY
 
 STEP = 0.25  #: of a parameter's natural step, at which the change is taken
 ROUNDS = 3
+NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none
 
 
 @dataclass
@@ -42,6 +43,15 @@ class Screen:
                               for a, b in zip(after, before, strict=True)]
         gathered = problem._gather(self.kept[key])
         return np.where(problem.known, problem._with_twin(gathered), 0.0)
+
+    def shows(self, term: Term) -> bool:
+        """Whether a term changes what is expected of the logged commands, once `column` was asked for all its parameters.
+
+        An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
+        """
+        fixed = tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
+        return any(np.abs(v).max(initial=0.0) > NOTHING for name in term.free
+                   for flight in self.kept[(term.name, name, fixed)] for v in flight.values())
 
     def before(self, problem: Problem, left: np.ndarray, added: np.ndarray) -> tuple[float, float]:
         """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""

@@ -39,7 +39,7 @@ MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
 WORTH_AGAIN = 0.25  #: of what the first effect must gain, below which a candidate is not judged again beside a deviation
-HOPELESS = 0.5  #: gain of a random effect below which its other variants are not tried
+HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
 BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
@@ -315,6 +315,9 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
                 gain, fitted, variances = first_order(screen, parts, left, added, terms, held)
                 gain += before - _price(terms) - choice
+                if gain < before + HOPELESS and _only_in_commands(data, screen, terms):
+                    sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
+                    continue
                 k = len(terms[0].free)
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
                                      strength=np.mean(fitted, axis=0)[:k], variance=_of_mean(variances)[:k]))
@@ -340,6 +343,13 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         if both and alone and len(both.terms) > len(held) + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))  # it is the companion that gains
     return _with_evidence(data, best, before)
+
+
+def _only_in_commands(data: Data, screen: Screen, terms: Hypothesis) -> bool:
+    """Whether effects change what the loop commands, and nothing of what the logged commands lead to expect."""
+    law = data.study.controller
+    moved = [t.active(np.ones(len(t.free))) for t in terms]
+    return law is not None and not any(screen.shows(t) for t in terms) and not np.allclose(law.ratio(moved), 1.0)
 
 
 def _same(one: Term, other: Term) -> bool:

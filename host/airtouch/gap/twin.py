@@ -48,12 +48,9 @@ FREEDOM = 20.0  #: of the tails of a block's power
 STEPPED = 5.0  #: times the usual power of its flight: a block in which a set-point stepped
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
 SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
-#: fields of the plant by which effects change the loop
-FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "height_gain",
-          "motor_rise", "motor_fall", "inertia", "mass", "gain", "gyro_noise")
-#: those of the roll and pitch loops that change it, not its noise
+#: fields of the plant that make the roll and pitch loops, not their noise
 LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
-               "motor_fall", "inertia")
+               "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 SMOOTH = 2.0  #: bins: a block's window and `response.SMOOTH`
 PLANTS = 500  #: hypotheses whose plant is cached
 MOST_CHANGE = 5.0  #: of the share of torque
@@ -98,7 +95,7 @@ class Twin:
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
         row = self._row(active)
-        key = tuple(np.round(np.concatenate([np.ravel(row[k]) for k in FIELDS]), 12))
+        key = row.tobytes()
         kept = self.__dict__.setdefault("_kept", {})
         if key not in kept:
             if len(kept) > 500:
@@ -145,7 +142,7 @@ class Twin:
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
         """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""
-        key = ("share", *np.round(np.concatenate([np.ravel(row[k]) for k in LOOP_FIELDS]), 12))
+        key = ("share", row.tobytes())
         kept = self.__dict__.setdefault("_kept", {})
         if key not in kept:
             made = np.ones((2, len(f), 3), complex)
