@@ -13,7 +13,7 @@ from airtouch.gap import diagnose as module
 from airtouch.gap import example
 from airtouch.simulation.effects import EFFECTS
 
-KEPT = ("weak_motor", "com_offset", "wind")  #: candidates; the others take time
+KEPT = ("weak_motor", "com_offset", "motor_noise")  #: candidates; the others take time
 
 
 def test_the_flights_come_with_the_package_and_do_not_name_their_effect():

@@ -194,7 +194,7 @@ def _passing(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float
         return None
     gated = best_gated(data, without)
     steady = max((j.gain for n, j in singles.items() if j.evidence >= least[n]), default=0.0)
-    if gated is None or gated.gain < data.study.scatter.passing(_seconds(data), LEAST_GAIN) or gated.gain < steady:
+    if gated is None or gated.gain < max(data.study.scatter.passing(_seconds(data), LEAST_GAIN), steady + LEAST_GAIN):
         return None
     shaken = any(t.kind == SPECTRUM for t in gated.fitted.terms)
     gain = sum(judge(data, p, gated.fitted.terms) - before for p, before in zip(parts, base[shaken], strict=True))

@@ -19,6 +19,7 @@ AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples
 OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
 MOST_LOST = 0.1  #: of a block
+TRIM_HZ = 0.6  #: below it torque and rate hold the trim of a flight, which does not go with how hard it is flown
 
 
 def starts(flight: Flight, regime: str) -> np.ndarray:
@@ -116,6 +117,7 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra
             if regime == AIR:
                 hardness = np.concatenate([hardness_of(f, starts(f, AIR), LENGTH[AIR]) for f in flights])
                 slopes = slopes_of(each, hardness, frequencies(AIR))
+                slopes.slope[frequencies(AIR) < TRIM_HZ, 3:] = 0.0
                 each = each / slopes.level(hardness)
             mean = np.nan_to_num(np.nanmean(each, axis=0))
             power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)

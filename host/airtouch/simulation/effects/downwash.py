@@ -38,7 +38,7 @@ def downwash(p, s, memory, stream, out):
 
 EFFECT = Effect(
     "downwash", "the wake of another vehicle overhead, which presses down and shakes",
-    (Parameter("strength", "1", 0.25, -1.0, 2.0, 0.0, "force on the axis over the weight",
+    (Parameter("strength", "1", 0.25, 0.0, 2.0, 0.0, "downward force on the axis over the weight",
                "Crazyflies 0.15 to 0.3 m under another: 0.15 to 0.42"),
      Parameter("x", "m", 0.0, -1000.0, 1000.0, None, "the wake's axis in the world"),
      Parameter("y", "m", 0.0, -1000.0, 1000.0, None, "the wake's axis in the world"),
