@@ -36,7 +36,7 @@ OTHERS = 5  #: of the authors' flights, that one is held against
 PER_GROUP = 4  #: flights tested of a day and condition
 BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
-QUICK = {("swarm", "ground_effect"): 1, ("swarm", "none"): 1, ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 2,
+QUICK = {("swarm", "ground_effect"): 1, ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 2,
          ("crazypad", "slung load"): 1, ("peers", "weak_motor"): 1}
 QUICK_WRONG = 1  #: of the flights of --quick, at most: it tells a broken diagnosis, not a slightly worse one
 

@@ -1,5 +1,6 @@
 """The board behind `monitor`: edges from packets, with and without losses, and from the app's counter."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -93,7 +94,9 @@ def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
         assert felt.at_s == pytest.approx(expected.at_s, abs=0.5)  # a slow entry moves with what is lost
     holed.intake.last_arrival_s = 5.0
     holed.refresh(0.004)
-    assert holed.board.link.lost == pytest.approx(0.3, abs=0.03) and "round trip 4 ms" in str(holed.board.link)
+    assert holed.board.link.lost == pytest.approx(0.3, abs=0.03)
+    assert str(holed.board.link) == "waiting for data"  # this clock stands still: there is no rate
+    assert "round trip 4 ms" in str(replace(holed.board.link, rate_hz=100.0))
 
 
 def test_the_apps_own_edges_are_shown_once_each_at_their_time():

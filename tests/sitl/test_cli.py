@@ -22,7 +22,7 @@ def start(*arguments):
 
 def test_serves_until_ctrl_c_and_records(tmp_path):
     path = tmp_path / "flight.csv"
-    with start("hover", "--port", "0", "--effect", "wind:x=0.3m/s", "--without", "gust",
+    with start("paper-mixed", "--port", "0", "--effect", "wind:x=0.3m/s", "--without", "gust",
                "--fault", "late=1ms", "--record", str(path)) as process:
         uri = process.stdout.readline().split(": ")[0]
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:

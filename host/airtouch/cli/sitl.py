@@ -38,17 +38,18 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
     from airtouch.simulation.flight import refuse_off
     from airtouch.simulation.scenario import draw_flight
     from airtouch.sitl import Server
+    from airtouch.sitl.faults import parse as fault_of
 
     check_free(record, force)
     scene = mission.scene_of(scenario)
     refuse_off(draw_flight(scene, seed, flight), without)
+    acting, given = [effects.parse(text) for text in chosen], [fault_of(text) for text in faults]
     click.echo("starting; the first time compiles the simulator, which takes a minute", err=True)
     server = Server(scene, port=port, host=host, speed=speed, vehicle=vehicle,
-                    effects=[effects.parse(text) for text in chosen], without=without, seed=seed,
-                    flight=flight, faults=faults, ai_deck=not no_ai_deck, record=record, force=force)
+                    effects=acting, without=without, seed=seed, flight=flight, faults=given, ai_deck=not no_ai_deck, record=record, force=force)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.stop())
-    click.echo(f"ready: {server.uri}: {scenario}, {vehicle}; each `airtouch collect` starts at the start; Ctrl-C ends it")
+    click.echo(f"{server.uri}: ready; {scenario}, {vehicle}; each `airtouch collect` starts at the start; Ctrl-C ends it")
     server.run(click.echo)
     if record:
         click.echo(f"{server.drone.now_s:.0f} s of flight log in {record}")

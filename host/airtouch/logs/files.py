@@ -21,7 +21,7 @@ def read(path: str | Path) -> FlightLog:
 
     Raises AirTouchError with file, place and remedy when it cannot be read.
     """
-    if Path(path).is_dir():
+    if os.path.isdir(path):  # unlike Path.is_dir it bears a name too long for any file
         from airtouch.logs import rosbag
 
         if rosbag.is_bag(path):

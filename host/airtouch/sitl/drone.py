@@ -42,7 +42,7 @@ class Drone:
         self.state, self.emergency = PRE_FLIGHT, False
         self.messages: list[str] = []  #: for the console
         self.took_off_s: float | None = None
-        self._thrust_s, self._low_s = -math.inf, 0.0
+        self._thrust_s, self._low_s, self._drained = -math.inf, 0.0, False
         self._begin(self._start)
         self.step()
 
@@ -113,16 +113,19 @@ class Drone:
         self.state, self.emergency = PRE_FLIGHT, False
 
     def start_over(self) -> None:
-        """Put back to where the scenario's mission starts, on the ground, with the battery as at first."""
+        """Put back to where the scenario's mission starts, on the ground, with the battery as at first, or as it was drained."""
         self.commander.reset()
         self.state, self.emergency = PRE_FLIGHT, False
         self._stepper.begin(self._start)
         self._setpoint[0] = self._start
         self._stepper.fly(self._setpoint, self._table)
         self._thrust_s = -math.inf
+        if self._drained:
+            self.drain()
 
     def drain(self) -> None:
         """From now on the battery is nearly empty."""
+        self._drained = True
         self._stepper.plant[0]["battery_strength"] = 1.0
         memory = self._stepper.memory[0]
         memory["charge"] = min(NEARLY_EMPTY, memory["charge"])
