@@ -7,7 +7,8 @@ Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; 
 that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained on the
 same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of learning.
 --start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the second the
-other: a twin's detector, whose twin was fitted to the other half. What is in --out already is not done again, so a run that was stopped goes on.
+other: a twin's detector, whose twin was fitted to the other half. What is in --out already is not done again, so a run that was
+stopped goes on.
 Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the flights scored, each with all its draws.
 """
 

@@ -74,10 +74,10 @@ def detect(flight: "Flight", detector: str = "best", model: str | Path | None = 
     from airtouch.detector import evaluate as scoring
     from airtouch.detector import registry
 
-    module, log = registry.get(detector), read(flight)
-    scoring.check(log, scoring.spare_of(module))
-    trained = module.load(Path(model) if model else None)
-    return module.run(log, module.model_for(trained, log) if hasattr(module, "model_for") else trained)
+    chosen, log = registry.get(detector), read(flight)
+    scoring.check(log, scoring.spare_of(chosen))
+    trained = chosen.load(Path(model) if model else None)
+    return chosen.run(log, chosen.model_for(trained, log) if hasattr(chosen, "model_for") else trained)
 
 
 def evaluate(flights: "Flight | Iterable[Flight]", detector: str = "best", *, speed_mps: float | None = None,
@@ -90,18 +90,18 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: str = "best", *, sp
     from airtouch.detector import evaluate as scoring
     from airtouch.detector.dataset import Condition, FlightFile
 
-    module, given = registry.get(detector), _several(flights)
-    trained = module.load(Path(model) if model else None)
-    named = [f for f in given if isinstance(f, (str, Path))]
-    scores, left_out = scoring.evaluate(dataset.collect(named, speed_mps), module, trained) if named else ([], [])
-    for log in map(read, (f for f in given if not isinstance(f, (str, Path)))):
+    chosen, inputs = registry.get(detector), _several(flights)
+    trained = chosen.load(Path(model) if model else None)
+    paths = [f for f in inputs if isinstance(f, (str, Path))]
+    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), chosen, trained) if paths else ([], [])
+    for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
         speed = speed_mps or log.meta.get("speed_mps")
-        scoring.check(log, scoring.spare_of(module))
+        scoring.check(log, scoring.spare_of(chosen))
         if scoring.truth(log) and speed is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
         file = FlightFile(Path(log.source), Condition(speed_mps=speed))
-        scores.append(scoring.evaluate_flight(file, log, module, trained).score)
-    return scoring.as_json(detector, scores, left_out, module.lag_s(trained), module.parameters(trained))
+        scores.append(scoring.evaluate_flight(file, log, chosen, trained).score)
+    return scoring.as_json(detector, scores, left_out, chosen.lag_s(trained), chosen.parameters(trained))
 
 
 def simulate(scenario: str | Path, flights: int = 1, *, vehicle: "Vehicle | str | Path | None" = None,
@@ -134,11 +134,11 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     from airtouch.report import gap_report
 
     logs = [read(f) for f in _several(flights)]
-    found = module.diagnose(logs, _vehicle(vehicle, logs), [read(f) for f in _several(baseline)], without=without,
-                            pictures=report is not None)
+    diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), [read(f) for f in _several(baseline)], without=without,
+                                pictures=report is not None)
     if report is not None:
-        gap_report.write_diagnosis(Path(report), found, command="airtouch.gap.diagnose(...)", force=force)
-    return found
+        gap_report.write_diagnosis(Path(report), diagnosis, command="airtouch.gap.diagnose(...)", force=force)
+    return diagnosis
 
 
 def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
@@ -157,9 +157,9 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     twin: a folder of `airtouch twin`, the simulator as it is for None. Needs the extra 'train'.
     """
     from airtouch import vehicle as vehicles
-    from airtouch.cli.scores import check_free
     from airtouch.detector import best, dataset
     from airtouch.extras import need
+    from airtouch.logs.files import check_free
     from airtouch.simulation import scenario
     from airtouch.twin import adapt as module
     from airtouch.twin import files
@@ -172,10 +172,10 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")
     craft = vehicles.load(Path(twin) / files.VEHICLE if twin else DEFAULT_VEHICLE)
-    found = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed, hold_out=hold_out,
-                         command="airtouch.adapt(...)")
-    found.model.save(out, force)
-    return found
+    adapted = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed, hold_out=hold_out,
+                           command="airtouch.adapt(...)")
+    adapted.model.save(out, force)
+    return adapted
 
 
 def _several(flights: Any) -> list[Any]:
@@ -188,9 +188,9 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
     from airtouch import vehicle as vehicles
 
     if named is None:
-        said = str(logs[0].meta.get("vehicle") or "") if logs else ""
+        logged = str(logs[0].meta.get("vehicle") or "") if logs else ""
         try:
-            return vehicles.load(said or DEFAULT_VEHICLE)
+            return vehicles.load(logged or DEFAULT_VEHICLE)
         except AirTouchError:
             return vehicles.load(DEFAULT_VEHICLE)
     return vehicles.load(named) if isinstance(named, (str, Path)) else named

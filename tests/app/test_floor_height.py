@@ -193,7 +193,9 @@ def test_any_readings_leave_finite_numbers(library):
 
 
 def test_flow_is_scaled_to_the_platform(flown):
-    flow = lambda height: flown.library.floorHeightFlow(flown.state, height)  # noqa: E731
+    def flow(height):
+        return flown.library.floorHeightFlow(flown.state, height)
+
     assert flow(0.8) == 1.0
     flown.fly(profile((0.0, 40), (0.5, 40)))
     assert flow(0.8) == pytest.approx(0.3 / 0.8, abs=1e-3) == flown.reference.flow(0.8)

@@ -5,10 +5,11 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import logs
-from airtouch.cli import airtouch, demo, scores
+from airtouch.cli import airtouch, demo
 from airtouch.cli.gap_input import files_of
 from airtouch.crazyflie import board, collect, mission
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import check_free
 from airtouch.report import figures
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import refuse_off
@@ -113,5 +114,5 @@ def test_best_comes_first_and_each_detector_keeps_its_colour():
 
 
 def test_check_free_makes_the_folder(tmp_path):
-    scores.check_free(tmp_path / "a" / "b.json", False)
+    check_free(tmp_path / "a" / "b.json", False)
     assert (tmp_path / "a").is_dir()

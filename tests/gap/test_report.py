@@ -220,7 +220,8 @@ def test_rotors_are_told_apart():
 
 
 def test_what_got_worse_is_said():
-    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2), cell("force_y", "ground", 2.6, after=8.8)]
+    cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
+             cell("force_y", "ground", 2.6, after=8.8)]
     said = words.sentences(diagnosis(cells))[2]
     assert "2 of 3 cells still stand out, the largest on the ground in sideways force" in said and "(26 to 88 times the floor)" in said
     assert said.endswith("and 2 got worse.")

@@ -10,6 +10,7 @@ from airtouch.cli import scores as show
 from airtouch.cli.flights import need_flights
 from airtouch.detector import ablation, dataset
 from airtouch.detector.ablation import ABLATIONS
+from airtouch.logs.files import check_free
 
 
 def _names() -> str:
@@ -33,7 +34,7 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
 
     Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Takes two to five minutes an ablation on two cores.
     """
-    show.check_free(json_path, force)
+    check_free(json_path, force)
     folder = need_flights(folder)
     results = ablation.ablate(
         only or tuple(ABLATIONS), dataset.collect([folder]), out, seed=seed,

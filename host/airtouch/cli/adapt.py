@@ -9,9 +9,9 @@ from typing import Any
 import click
 
 from airtouch.cli.progress import Bar
-from airtouch.cli.scores import check_free
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
+from airtouch.logs.files import check_free
 
 ROUNDS, BATCH = 8, 160  #: of a twin that is fitted on the way
 MORE = 5  #: flights that the outlook is given for

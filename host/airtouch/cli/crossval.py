@@ -12,6 +12,7 @@ from airtouch.cli.flights import need_flights
 from airtouch.detector import crossval, dataset, evaluate, sensors
 from airtouch.detector import folds as folds_of
 from airtouch.detector import free_air as free_air_flights
+from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 
 
@@ -55,7 +56,7 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
     training flights of each fold alone. Exit code 2 when a flight was left out.
     """
-    show.check_free(json_path, force)
+    check_free(json_path, force)
     if detector != "best" and (steps or silence or free_air):
         raise click.UsageError("--steps, --silence and --free-air are for --detector best")
     files = dataset.collect(flights or [need_flights()], speed)

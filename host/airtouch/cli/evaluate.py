@@ -8,6 +8,7 @@ import click
 from airtouch.cli import scores as show
 from airtouch.detector import dataset, evaluate, registry
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import check_free
 
 
 @click.command(name="evaluate")
@@ -27,7 +28,7 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     Errors are detection distances: time error times speed, delay included, positive when early.
     Truth is the step of the down range; it is never an input. Exit code 2 when a flight was left out.
     """
-    show.check_free(json_path, force)
+    check_free(json_path, force)
     module = registry.get(detector)
     trained = module.load(model)
     files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]

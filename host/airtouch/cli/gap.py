@@ -12,6 +12,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait for one a
 
 from airtouch.cli import Suggesting, scores
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import check_free
 
 
 @click.group("gap", cls=Suggesting)
@@ -306,7 +307,7 @@ def _scored(found: dict[str, Any], json_path: Path | None, plot: Path | None, fo
 
 def _check_free(report: Path | None, json_path: Path | None, force: bool) -> None:
     for path in (report, json_path):
-        scores.check_free(path, force)
+        check_free(path, force)
 
 
 def _line(name: str, real: tuple[str, ...], baseline: tuple[str, ...], vehicle: str | None) -> str:

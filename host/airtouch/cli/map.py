@@ -9,7 +9,7 @@ from airtouch import logs
 from airtouch.cli import scores as show
 from airtouch.detector import dataset, evaluate, registry
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import check_free, write_bytes
 
 
 @click.command(name="map")
@@ -42,7 +42,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
     picture = out.with_suffix(".png")
     for path in (out, picture):
-        show.check_free(path, force)
+        check_free(path, force)
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
     xy, measured = edge_map.track(log, speed or file.condition.speed_mps, heading)

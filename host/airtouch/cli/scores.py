@@ -1,7 +1,6 @@
 """What `evaluate`, `crossval` and `demo` print and write alike."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +8,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from airtouch.errors import AirTouchError
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
 def table(rows: dict[str, dict[str, Any]], title: str) -> Table:
@@ -41,24 +39,5 @@ def left_out(failures: list[tuple[str, str]], scored: int) -> None:
 
 def write_json(path: Path, content: dict[str, Any], force: bool) -> None:
     """Numbers as JSON, whole or not at all; the folder is made where it is missing."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise AirTouchError(f"{path.parent}: cannot be made: {error.strerror}") from None
+    make_folder(path)
     write_bytes((json.dumps(content, indent=1, allow_nan=False) + "\n").encode(), path, force)
-
-
-def check_free(path: Path | None, force: bool) -> None:
-    """Refuse, before the work and not after it, a file that exists and a folder that cannot be made or written to."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise AirTouchError(f"{path}: is a folder; give the name of a file")
-    if path.exists() and not force:
-        raise AirTouchError(f"{path}: exists already; use --force to replace it")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise AirTouchError(f"{path.parent}: cannot be made: {error.strerror}") from None
-    if not os.access(path.parent, os.W_OK):
-        raise AirTouchError(f"{path.parent}: cannot be written to")

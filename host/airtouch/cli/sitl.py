@@ -32,8 +32,8 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
 
     Connect with cflib, cfclient or `airtouch collect --uri udp://127.0.0.1:19850`.
     """
-    from airtouch.cli.scores import check_free
     from airtouch.crazyflie import mission
+    from airtouch.logs.files import check_free
     from airtouch.simulation import effects
     from airtouch.simulation.flight import refuse_off
     from airtouch.simulation.scenario import draw_flight
@@ -43,10 +43,11 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
     check_free(record, force)
     scene = mission.scene_of(scenario)
     refuse_off(draw_flight(scene, seed, flight), without)
-    acting, given = [effects.parse(text) for text in chosen], [fault_of(text) for text in faults]
+    acting, failures = [effects.parse(text) for text in chosen], [fault_of(text) for text in faults]
     click.echo("starting; the first time compiles the simulator, which takes a minute", err=True)
     server = Server(scene, port=port, host=host, speed=speed, vehicle=vehicle,
-                    effects=acting, without=without, seed=seed, flight=flight, faults=given, ai_deck=not no_ai_deck, record=record, force=force)
+                    effects=acting, without=without, seed=seed, flight=flight, faults=failures,
+                    ai_deck=not no_ai_deck, record=record, force=force)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.stop())
     click.echo(f"{server.uri}: ready; {scenario}, {vehicle}; each `airtouch collect` starts at the start; Ctrl-C ends it")

@@ -13,11 +13,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from airtouch import logs
 from airtouch.cli.flights import need_flights
-from airtouch.cli.scores import check_free
 from airtouch.detector import dataset, evaluate, registry, sensors
 from airtouch.detector import free_air as air
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
+from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 
 

@@ -16,7 +16,7 @@ from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.clock import sample_period
-from airtouch.logs.quality import nothing_logged
+from airtouch.logs.quality import clock_steps, nothing_logged
 
 SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air
 MOST_MISSING = 0.1  #: share of samples of a channel that may be NaN; they hold the last value
@@ -81,12 +81,9 @@ def check(log: FlightLog, spare: int = 0) -> None:
 
 def remarks(log: FlightLog) -> list[str]:
     """What `airtouch logs check` knows of a log that a score may suffer from: its clock, and what the reader found."""
-    said = [str(w) for w in log.meta.get("warnings", [])]
-    if log.has("t_s"):
-        with np.errstate(invalid="ignore"):
-            back = int((np.diff(log["t_s"]) < 0).sum())
-        said += [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
-    return said
+    back = int((clock_steps(log) < 0).sum())
+    clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
+    return [str(w) for w in log.meta.get("warnings", [])] + clock
 
 
 def truth(log: FlightLog) -> list[logs.Edge] | None:

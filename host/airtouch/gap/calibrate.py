@@ -114,7 +114,7 @@ def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[
     first = [{r: starts(f, r) for r in (AIR, REST)} for f in flights]
     made = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(left, first, strict=True)]
     answer = _response(vehicle, calibration, law, flights, first, made)
-    return Study(vehicle, calibration, law, floor_of(flights, left, made, least), answer, nominal=len(flights))
+    return Study(vehicle, calibration, law, floor_of(flights, left, first, made, least), answer, nominal=len(flights))
 
 
 def _response(vehicle: Vehicle, calibration: tuple[Active, ...], law: twin.Twin | None, flights: Sequence[Flight],

@@ -49,8 +49,11 @@ def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:
     return 0.5 * np.log1p(cut.var(axis=1).sum(axis=1) / STILL_RAD ** 2)
 
 
-def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray) -> Slopes:
-    """From the power (blocks, bins, COUNT) of what nominal flights leave; NaN where it is not known."""
+def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray, flat: np.ndarray | bool = False) -> Slopes:
+    """From the power (blocks, bins, COUNT) of what nominal flights leave; NaN where it is not known.
+
+    flat (bins, COUNT): where power does not go with hardness, whatever these flights say.
+    """
     slope = np.zeros(power.shape[1:])
     if len(power) < 4:
         return Slopes(slope, 0.0, 0.0, 0.0)
@@ -61,7 +64,7 @@ def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray) ->
             known = np.isfinite(here).any(axis=1) & (np.nan_to_num(here).sum(axis=1) > 0.0)
             if known.sum() >= 4:
                 slope[band == b, c] = _slope(np.nanmean(here[known], axis=1), hardness[known])
-    return Slopes(slope, float(hardness.min()), float(hardness.mean()), float(hardness.max()))
+    return Slopes(np.where(flat, 0.0, slope), float(hardness.min()), float(hardness.mean()), float(hardness.max()))
 
 
 def _slope(y: np.ndarray, x: np.ndarray) -> float:

@@ -30,8 +30,7 @@ class Screen:
 
     def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
         """Change of the flattened spectra per scaled parameter i of a term at neutral."""
-        fixed = tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
-        key = (term.name, term.free[i], fixed)
+        key = _key(term, term.free[i])
         if key not in self.kept:
             low, high = term.bounds()
             x = np.zeros(len(term.free))
@@ -49,9 +48,8 @@ class Screen:
 
         An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
         """
-        fixed = tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
         return any(np.abs(v).max(initial=0.0) > NOTHING for name in term.free
-                   for flight in self.kept[(term.name, name, fixed)] for v in flight.values())
+                   for flight in self.kept[_key(term, name)] for v in flight.values())
 
     def before(self, problem: Problem, left: np.ndarray, added: np.ndarray) -> tuple[float, float]:
         """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""
@@ -103,6 +101,11 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         found.append(x[:n])
         variances.append(np.diag(covariance)[:n])
     return gain, found, variances
+
+
+def _key(term: Term, parameter: str) -> tuple:
+    """What a column is kept by: the effect's variant and the parameter that is moved."""
+    return term.name, parameter, tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
 
 
 def _changes(term: Term) -> bool:

@@ -99,13 +99,13 @@ class Floor:
         return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least)
 
 
-def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra: Sequence[dict[str, np.ndarray]],
-             least: np.ndarray) -> Floor:
+def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: Sequence[dict[str, np.ndarray]],
+             spectra: Sequence[dict[str, np.ndarray]], least: np.ndarray) -> Floor:
     """The floor of flights declared nominal, from what the calibrated model leaves of them.
 
-    residuals: (n, COUNT) for each flight; spectra: of their blocks by regime; least (COUNT,): white noise
-    that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of its difference),
-    below which the floor never goes.
+    residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first samples and the spectra;
+    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of its
+    difference), below which the floor never goes.
     """
     power, count, slopes = {}, {}, None
     for regime in (AIR, REST):
@@ -115,9 +115,9 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], spectra
         if len(every) >= 4:
             each = np.abs(every) ** 2
             if regime == AIR:
-                hardness = np.concatenate([hardness_of(f, starts(f, AIR), LENGTH[AIR]) for f in flights])
-                slopes = slopes_of(each, hardness, frequencies(AIR))
-                slopes.slope[frequencies(AIR) < TRIM_HZ, 3:] = 0.0
+                hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR]) for f, s in zip(flights, first, strict=True)])
+                trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= 3)
+                slopes = slopes_of(each, hardness, frequencies(AIR), trim)
                 each = each / slopes.level(hardness)
             mean = np.nan_to_num(np.nanmean(each, axis=0))
             power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)

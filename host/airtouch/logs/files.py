@@ -70,6 +70,27 @@ def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
     write_bytes(data, Path(path), force)
 
 
+def make_folder(path: Path) -> None:
+    """The folder that a file is to lie in; AirTouchError where it cannot be made."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AirTouchError(f"{path.parent}: cannot be made: {error.strerror}") from None
+
+
+def check_free(path: Path | None, force: bool) -> None:
+    """Refuse, before the work and not after it, a file that exists and a folder that cannot be made or written to."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise AirTouchError(f"{path}: is a folder; give the name of a file")
+    if path.exists() and not force:
+        raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    make_folder(path)
+    if not os.access(path.parent, os.W_OK):
+        raise AirTouchError(f"{path.parent}: cannot be written to")
+
+
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
     """Bytes into a file through a temporary one beside it."""
     if os.path.exists(path) and not force:

@@ -49,9 +49,7 @@ class Quality:
 
 def check(log: FlightLog) -> Quality:
     """The quality report of a flight log; it never changes the log and never raises for a poor one."""
-    clock = log["t_s"] if log.has("t_s") else np.empty(0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        steps = np.diff(clock)
+    clock, steps = log["t_s"] if log.has("t_s") else np.empty(0), clock_steps(log)
     period = true_period(clock)
     flying, phases, edges = _flight(log)
     missing = {name: int((~np.isfinite(v)).sum()) for name, v in log.columns.items()}
@@ -71,6 +69,12 @@ def check(log: FlightLog) -> Quality:
         duration_s=_duration(clock, len(log), sample_period(log)), rate_hz=1.0 / period if period else None,
         segments=phases, edges=edges, warnings=warnings, **found,
     )
+
+
+def clock_steps(log: FlightLog) -> np.ndarray:
+    """Differences (n - 1,) of the logged times; empty where there are none."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.diff(log["t_s"]) if log.has("t_s") else np.empty(0)
 
 
 def nothing_logged(log: FlightLog) -> bool:

@@ -15,7 +15,7 @@ from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCIT
 from airtouch.simulation import battery, loop, motors, rigid_body, sensors
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import MEMORY, PARAMETERS, Wrenches, WrenchFunction, wrench
+from airtouch.simulation.effects.effect import MEMORY, PARAMETERS, Wrenches, WrenchFunction
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import DTYPE, hover_speed
 from airtouch.simulation.random_stream import stream
@@ -87,11 +87,6 @@ def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, s
         charge, battery_volts = battery.drain(plant, charge, power, h)
 
 
-@wrench
-def _nothing(p, s, memory, stream, out):
-    pass
-
-
 def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (),
                period_s: float = 0.01) -> np.ndarray:
     """The signals (n, COUNT) that effects see, from what a log holds.
@@ -146,7 +141,7 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     volts = np.full(n, np.nan)
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
         volts = log["vbat_V"].copy()
-    functions = Wrenches([a.effect.wrench for a in acting] + [_nothing] * (loop.SLOTS - len(acting)))
+    functions = Wrenches([a.effect.wrench for a in acting], loop.SLOTS)
     parameters, streams = np.zeros((loop.SLOTS, PARAMETERS)), np.zeros((loop.SLOTS, 1), np.uint64)
     for i, a in enumerate(acting):
         parameters[i], streams[i] = a.effect.vector(a.values), stream(seed, 0, a.effect.name)

@@ -8,18 +8,13 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import kept, loop
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import PARAMETERS, Wrenches, wrench
+from airtouch.simulation.effects.effect import PARAMETERS, Wrenches
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
 from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.vehicle import Vehicle
 
 MOST_HOVER_PWM = 62000  #: of 65535; the rest is what attitude control needs
-
-
-@wrench
-def _nothing(p, s, memory, stream, out):
-    pass
 
 
 def prepare(vehicle: Vehicle, active: Sequence[Active]) -> tuple[np.ndarray, list[Active]]:
@@ -56,8 +51,7 @@ class Stepper:
         self.plant, acting = prepare(vehicle, active)
         self.world, self.room = plan.world, plan.room
         self.used = len(acting)
-        idle = loop.SLOTS - len(acting)
-        self.functions = Wrenches([a.effect.wrench for a in acting] + [_nothing] * idle)
+        self.functions = Wrenches([a.effect.wrench for a in acting], loop.SLOTS)
         self.parameters = np.zeros((loop.SLOTS, PARAMETERS))
         self.effect_streams = np.zeros((loop.SLOTS, 1), np.uint64)
         seen: dict[str, int] = {}

@@ -114,8 +114,7 @@ class Drone:
 
     def start_over(self) -> None:
         """Put back to where the scenario's mission starts, on the ground, with the battery as at first, or as it was drained."""
-        self.commander.reset()
-        self.state, self.emergency = PRE_FLIGHT, False
+        self.restart()
         self._stepper.begin(self._start)
         self._setpoint[0] = self._start
         self._stepper.fly(self._setpoint, self._table)

@@ -54,11 +54,19 @@ def _handle(function: Any) -> _Address:
     return _Address(function)
 
 
-class Wrenches(tuple):
-    """Several `wrench` functions as compiled code takes them: a tuple whose type numba need not work out at each call."""
+@wrench
+def _nothing(p, s, memory, stream, out):
+    pass
 
-    def __new__(cls, functions: Sequence[Any]) -> "Wrenches":
-        return super().__new__(cls, [_handle(f) for f in functions])
+
+class Wrenches(tuple):
+    """`wrench` functions as compiled code takes them: always `count`, the places left over filled with one that does nothing.
+
+    A type of its own, so that numba need not work it out at each call.
+    """
+
+    def __new__(cls, functions: Sequence[Any], count: int) -> "Wrenches":
+        return super().__new__(cls, [_handle(f) for f in (*functions, *[_nothing] * (count - len(functions)))])
 
 
 @functools.cache
