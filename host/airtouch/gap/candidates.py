@@ -91,6 +91,12 @@ class Term:
         more = tuple(p for p in _LATER.get(self.name, ()) if p not in self.free)
         return replace(self, free=self.free + more) if more else self
 
+    @property
+    def acts_when_neutral(self) -> bool:
+        """Whether the effect changes anything while its free parameters are neutral (a shape that is not)."""
+        return not all(p.neutral is not None or p.name in self.free for p in self.effect.parameters) \
+            and self.effect.settings is not None
+
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest scaled parameters."""
         low, high = [], []
@@ -103,6 +109,18 @@ class Term:
     def scaled(self, values: Mapping[str, float]) -> np.ndarray:
         """The scaled parameters of given values."""
         return np.array([(values[n] - _neutral(self._parameter(n))) / self.step(n) for n in self.free])
+
+    def among_all(self, x: np.ndarray, other: float = 0.0) -> np.ndarray:
+        """Values (k,) of the first k free parameters in their places among all that its effect may have free.
+
+        other: the value of those that this variant leaves alone.
+        """
+        every = _free(self.effect)
+        out = np.full(len(every), other)
+        for name, value in zip(self.free, x, strict=False):
+            if name in every:
+                out[every.index(name)] = value
+        return out
 
     def step(self, name: str) -> float:
         """The natural step of a parameter."""
@@ -138,11 +156,16 @@ def _neutral(p) -> float:
 def terms(name: str) -> list[Term]:
     """The hypotheses of one effect: one for each variant, all free parameters at neutral."""
     effect = get(name)
-    free = _FREE.get(name) or tuple(p.name for p in effect.parameters if p.neutral is not None)
+    free = _free(effect)
     kind = _KIND.get(name) or (MEAN if name in _FREE or not _random(effect) else SPECTRUM)
     base = effect.scaled(effect.values(), 0.0) | _FIXED.get(name, {})
     alone = [Term(effect, kind, (p,), base) for p in free] if name in _ONE_BY_ONE else []
     return [Term(effect, kind, free, base | variant) for variant in _VARIANTS.get(name, ({},))] + alone
+
+
+def _free(effect: Effect) -> tuple[str, ...]:
+    """Names of the parameters of an effect that a fit begins with."""
+    return _FREE.get(effect.name) or tuple(p.name for p in effect.parameters if p.neutral is not None)
 
 
 def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:

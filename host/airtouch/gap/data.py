@@ -17,7 +17,7 @@ from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
 SCALES_TORQUE = frozenset({"inertia"})  #: what only multiplies torque, and would make less of any trim
-KEPT, KEPT_SAMPLES = 64, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
+KEPT, KEPT_SAMPLES = 96, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
 
 
 @dataclass(frozen=True)
@@ -113,14 +113,12 @@ def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], active: Se
 
 def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],
             ) -> list[dict[str, np.ndarray]]:
-    """Spectra under a hypothesis, made once while it is among the last KEPT; those of no effect always."""
+    """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
     cache = data.__dict__.setdefault(name, {})
     key = tuple((a.effect.name, *a.values.values(), a.gate) for a in active)
-    if key not in cache:
-        made = make()
-        if active and sum(len(f) for f in data.flights) > KEPT_SAMPLES:
-            return made
-        if len(cache) >= KEPT:
+    made = cache.pop(key) if key in cache else make()
+    if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
+        cache[key] = made  # the last one used is the last in it
+        if len(cache) > KEPT:
             cache.pop(next(k for k in cache if k))
-        cache[key] = made
-    return cache[key]
+    return made

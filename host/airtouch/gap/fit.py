@@ -18,6 +18,11 @@ from airtouch.gap.problem import LOOP, Part, Problem, problem_of
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8
+ENOUGH = 0.02  #: gain of a step, nats, below which a fit ends
+STEP = 0.02  #: of a scaled parameter, over which slopes are taken
+TRIES = 5  #: of a step, each shorter than the one before (Levenberg-Marquardt)
+LEAST_DAMPING, CALMED = 0.01, 0.1  #: of a step after one that failed; by what a step that gains multiplies it
+FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew
 ROUNDS = 4  #: in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
@@ -45,16 +50,14 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     terms = tuple(terms)
     mean = tuple(t for t in terms if t.kind == MEAN)
     random = [t for t in terms if t.kind == SPECTRUM]
-    x = _start(problem, mean) if start is None else start
-    added = problem.random_power(random) if random else 0.0
-    offsets, covariance = np.zeros(0), np.zeros((0, 0))
-    for _ in range(2 if mean and random else 1):
+    x = _start(problem, mean, start)
+    offsets, covariance, added = np.zeros(0), np.zeros((0, 0)), 0.0
+    for _ in range(2 if random and mean and start is None else 1):
+        if random and mean and start is not None:
+            added = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
         x, offsets, covariance, values = _gauss_newton(problem, mean, x, added, prior, bool(random))
         told, cost = problem.commanded(_active(mean, x), bool(random))
-        for _ in range(ROUNDS if len(random) > 1 else 1):
-            for i in range(len(random)):
-                random[i] = _strength(problem, random, i, values, told)
-        added = problem.random_power(random) if random else 0.0
+        added = _random_power(problem, random, values, _active(mean, x)) if random else 0.0
     if random:
         told, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
     fitted, place = [], 0
@@ -93,14 +96,27 @@ def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False
     return problem, left, added, penalty + cost
 
 
-def _start(problem: Problem, mean: Sequence[Term]) -> np.ndarray:
-    """Close to neutral; effects of the commands alone where their likelihood is highest on a coarse grid."""
-    x = np.concatenate([np.full(len(t.free), 0.05) for t in mean]) if mean else np.zeros(0)
+def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
+    """Power that random effects add, their strengths in `random` fitted anew, one after another."""
+    told, _ = problem.commanded(mean, True)
+    for _ in range(ROUNDS if len(random) > 1 else 1):
+        for i in range(len(random)):
+            random[i] = _strength(problem, random, i, values, told)
+    return problem.random_power(random)
+
+
+def _start(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:
+    """What is known, or close to neutral; effects of the loop, of which nothing is known, where their likelihood is
+
+    highest on a coarse grid.
+    """
+    size = sum(len(t.free) for t in mean)
+    x = np.full(size, 0.05) if known is None else known
     place = 0
     for t in mean:
         here = range(place, place + len(t.free))
         place += len(t.free)
-        if t.name not in LOOP or not len(problem.twin):
+        if t.name not in LOOP or not len(problem.twin) or (known is not None and known[here].any()):
             continue
         low, high = limits(mean)
         best = -np.inf
@@ -117,17 +133,70 @@ def _start(problem: Problem, mean: Sequence[Term]) -> np.ndarray:
 
 
 def _active(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
+    """Mean effects at scaled parameters x (k,), without those that are neutral there."""
     out, place = [], 0
     for t in mean:
-        out.append(t.active(x[place:place + len(t.free)]))
+        own = x[place:place + len(t.free)]
         place += len(t.free)
+        if own.any() or t.acts_when_neutral:
+            out.append(t.active(own))
     return out
+
+
+class Slopes:
+    """First-order changes of the spectra by the mean effects' parameters, taken anew only where a fit has moved far."""
+
+    def __init__(self, problem: Problem, mean: Sequence[Term], high: np.ndarray) -> None:
+        self.problem, self.mean, self.high = problem, mean, high
+        size = sum(len(t.free) for t in mean)
+        self.at = np.full(size, np.inf)  #: scaled parameters (k,) at which they were taken
+        self.columns = [np.zeros(0)] * size
+        self.rises, self.doubts = [np.zeros(0)] * size, [np.zeros(0)] * size
+        self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
+
+    def take(self, x: np.ndarray) -> None:
+        """Take them at scaled parameters x (k,): all that may have changed much, and always those that bend."""
+        every = self.far(x)
+        before = _active(self.mean, x)
+        for i in range(len(x)) if every else np.flatnonzero(self.bent):
+            step = STEP if x[i] + STEP <= self.high[i] else -STEP
+            there = x.copy()
+            there[i] += step
+            after = _active(self.mean, there)
+            self.columns[i] = (self.problem.values(after) - self.problem.values(before)) / step
+            self.rises[i] = self.problem.twin.rise(before, after) / step
+            self.doubts[i] = (self.problem.doubt(after) - self.problem.doubt(before)) / step
+            self.bent[i] = self.problem.bends(before, after)
+        self.at = x.copy() if every else self.at
+
+    def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
+                 ) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient (k,) and information (k, k) of the likelihood by what the parameters x (k,) do to the expected power.
+
+        values, added: what is left, and the power over the floor, flattened.
+        """
+        problem = self.problem
+        gradient, information = problem.twin.slopes(_active(self.mean, x), np.array(self.rises), wide)
+        doubts = np.array(self.doubts)
+        if doubts.any():
+            push, weight = problem.power_slopes(values, added)
+            gradient = gradient + doubts @ push
+            information = information + (doubts * weight) @ doubts.T
+        return gradient, information
+
+    def far(self, x: np.ndarray) -> bool:
+        """Whether x (k,) lies so far away that they may have changed."""
+        return bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
 
 
 def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
                   spread: np.ndarray | float, wide: bool,
                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Scaled parameters, offsets, covariance of the parameters, and what is left."""
+    """Scaled parameters, offsets, covariance of the parameters, and what is left.
+
+    The slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far
+    from where they were taken, takes them anew.
+    """
     constants = problem.constant()
     low, high = limits(mean)
     x = np.clip(x, low, high)
@@ -136,43 +205,61 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
     prior = np.concatenate([spread, [p for _, p in constants]])
     push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
-    raw = problem.values(_active(mean, x)) if mean else problem.base
-    values = raw - push(offsets)
+    values = problem.values(_active(mean, x)) if mean else problem.base
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
         return x, offsets, covariance, values
     told, price = problem.commanded(_active(mean, x), wide)
     cost = price + cost_of(problem, values, added + told, x, offsets, prior)
+    slopes, stuck, damping = Slopes(problem, mean, high), False, 0.0
     for _ in range(ITERATIONS):
-        columns, others = [], []
-        for i in range(len(x)):
-            step = 0.02 if x[i] + 0.02 <= high[i] else -0.02
-            moved = x.copy()
-            moved[i] += step
-            others.append((_active(mean, moved), step))
-            columns.append((problem.values(others[-1][0]) - raw) / step)
-        columns += [-c for c, _ in constants]
-        change, covariance = bounded_step(
-            columns, prior, values, weights_of(problem, values, added + told), x, offsets, low, high,
-            problem.twin.slopes(_active(mean, x), others, wide))
-        scale, better = 1.0, False
-        while scale > 0.05:
-            new_x = np.clip(x + scale * change[:len(x)], low, high)
-            new_o = offsets + scale * change[len(x):]
-            new_raw = problem.values(_active(mean, new_x)) if mean else problem.base
-            new_values = new_raw - push(new_o)
+        if stuck:
+            slopes.at = np.full(len(x), np.inf)
+        slopes.take(x)
+        weights, power = weights_of(problem, values, added + told), slopes.of_power(x, values, added + told, wide)
+        columns = [*slopes.columns, *(-c for c, _ in constants)]
+        gain, tries = 0.0, 0
+        while gain == 0.0 and tries < TRIES:
+            tries += 1
+            change, covariance = bounded_step(columns, prior, values, weights, x, offsets, low, high, power, damping)
+            new_x, new_o = np.clip(x + change[:len(x)], low, high), offsets + change[len(x):]
+            new_values = (problem.values(_active(mean, new_x)) if mean else problem.base) - push(new_o)
             new_told, price = problem.commanded(_active(mean, new_x), wide)
             new_cost = price + cost_of(problem, new_values, added + new_told, new_x, new_o, prior)
             if new_cost < cost - 1e-9:
-                better = True
+                gain, cost = cost - new_cost, new_cost
+                x, offsets, values, told = new_x, new_o, new_values, new_told
+                damping *= CALMED
+            else:
+                damping = max(damping, LEAST_DAMPING) / CALMED
+        if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(x, slopes.at)):
+            break
+        stuck = gain == 0.0
+    return x, offsets, covariance, values
+    told, price = problem.commanded(_active(mean, x), wide)
+    cost = price + cost_of(problem, values, added + told, x, offsets, prior)
+    slopes = Slopes(problem, mean, high)
+    slopes.take(x)
+    for _ in range(ITERATIONS):
+        change, covariance = bounded_step(
+            [*slopes.columns, *(-c for c, _ in constants)], prior, values, weights_of(problem, values, added + told), x,
+            offsets, low, high, slopes.of_power(x, values, added + told, wide))
+        scale, gain = 1.0, 0.0
+        while scale > 0.05:
+            new_x = np.clip(x + scale * change[:len(x)], low, high)
+            new_o = offsets + scale * change[len(x):]
+            new_values = (problem.values(_active(mean, new_x)) if mean else problem.base) - push(new_o)
+            new_told, price = problem.commanded(_active(mean, new_x), wide)
+            new_cost = price + cost_of(problem, new_values, added + new_told, new_x, new_o, prior)
+            if new_cost < cost - 1e-9:
+                gain, cost = cost - new_cost, new_cost
+                x, offsets, values, told = new_x, new_o, new_values, new_told
                 break
             scale *= 0.4
-        if not better:
-            break
-        gain, cost = cost - new_cost, new_cost
-        x, offsets, raw, values, told = new_x, new_o, new_raw, new_values, new_told
-        if gain < 0.01:
-            break
+        if gain < ENOUGH:
+            if not slopes.far(x) and (gain > 0.0 or np.array_equal(x, slopes.at)):
+                break
+            slopes.take(x)
     return x, offsets, covariance, values
 
 

@@ -45,9 +45,12 @@ def _normal(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, we
 
 
 def bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
-                  x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
-                  twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """A step that leaves parameters at a bound there when it would take them past it."""
+                 x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
+                 twin: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A step that leaves parameters at a bound there when it would take them past it, and the covariance (n, n) of x.
+
+    damping: share of the normal matrix's diagonal that is added to it for the step.
+    """
     at, n = np.concatenate([x, offsets]), len(x)
     free = np.ones(len(at), bool)
     covariance = np.zeros((n, n))
@@ -60,7 +63,8 @@ def bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarra
         if not len(where):
             break
         full = np.linalg.pinv(normal[np.ix_(where, where)], hermitian=True)
-        change[where] = full @ slope[where]
+        damped = normal[np.ix_(where, where)] + damping * np.diag(np.diag(normal)[where])
+        change[where] = np.linalg.solve(damped, slope[where]) if damping else full @ slope[where]
         stuck = np.zeros(len(at), bool)
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():

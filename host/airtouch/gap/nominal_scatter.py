@@ -67,7 +67,7 @@ class Scatter:
         rms = self.rms.get(name)
         if rms is None or not len(strength):
             return math.inf
-        far = float(np.sum((strength[:len(rms)] / rms[:len(strength)]) ** 2)) - (len(strength) - 1)
+        far = float(np.sum((strength / rms) ** 2)) - max(np.count_nonzero(strength) - 1, 0)
         return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
 
     def allowed(self, seconds: float, least: float) -> float:

@@ -121,7 +121,7 @@ class Problem:
     def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
         power, cost = self.twin.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self._doubt(active), power - self.twin.floor]), cost
+        return np.concatenate([self.doubt(active), power - self.twin.floor]), cost
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
         """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
@@ -130,7 +130,7 @@ class Problem:
         told, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + told, cost
 
-    def _doubt(self, active: Sequence[Active]) -> np.ndarray:
+    def doubt(self, active: Sequence[Active]) -> np.ndarray:
         """Power (own,) of what the loop model may be wrong by in the torque that it changes."""
         law = self.data.study.controller
         loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
@@ -138,6 +138,11 @@ class Problem:
             return np.zeros(self.own)
         change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
         return DOUBT ** 2 * np.abs(change) ** 2 * self.torque
+
+    def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
+        """Whether the loops of roll and pitch differ between two hypotheses."""
+        law = self.data.study.controller
+        return law is not None and not law.same_loop(before, after)
 
     def constant(self) -> list[tuple[np.ndarray, float]]:
         """Spectra of a unit offset in each of the OFFSETS channels of each flight, with its prior's deviation."""
@@ -169,6 +174,17 @@ class Problem:
     def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
         """Log likelihood of what is left, over nothing in particular; only differences mean something."""
         return float(self.each(values, added).sum())
+
+    def power_slopes(self, values: np.ndarray, added: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Slope (own,) of the log likelihood against the expected power of each value of the replay view, and its
+
+        expected curvature.
+        """
+        own = slice(self.own)
+        power = self.power[own] + added[own]
+        e = np.abs(values[own]) ** 2 / power
+        share = OVERLAP_WEIGHT * self.known[own] / power
+        return share * ((self.freedom[own] + 1.0) * e / (self.tail[own] + e) - 1.0), share / power
 
     def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
         power = self.power + added

@@ -36,7 +36,7 @@ class Screen:
             x = np.zeros(len(term.free))
             x[i] = STEP if STEP <= high[i] else -STEP
             neutral = [term.active(np.zeros(len(term.free)))]
-            before = spectra(self.data, neutral) if _changes(term) else self.data.base
+            before = spectra(self.data, neutral) if term.acts_when_neutral else self.data.base
             after = spectra(self.data, [term.active(x)])
             self.kept[key] = [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
                               for a, b in zip(after, before, strict=True)]
@@ -106,9 +106,3 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
 def _key(term: Term, parameter: str) -> tuple:
     """What a column is kept by: the effect's variant and the parameter that is moved."""
     return term.name, parameter, tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))
-
-
-def _changes(term: Term) -> bool:
-    """Whether an effect changes anything while its free parameters are neutral (a shape that is not)."""
-    return not all(p.neutral is not None or p.name in term.free for p in term.effect.parameters) \
-        and term.effect.settings is not None

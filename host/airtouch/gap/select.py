@@ -246,7 +246,8 @@ def _error(data: Data, judged: Judged) -> np.ndarray:
     if term.kind == CLOCK:
         return np.zeros(len(judged.strength))
     if term.kind != SPECTRUM:  # at a bound nobody knows how far beyond it would lie
-        return np.where((judged.variance > 0.0) | (judged.strength == 0.0), np.sqrt(judged.variance), NOBODY_KNOWS)
+        known = (judged.variance > 0.0) | (judged.strength == 0.0)
+        return np.where(known, np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS), NOBODY_KNOWS)
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
     variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
@@ -318,9 +319,10 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
                 if gain < before + HOPELESS and _only_in_commands(data, screen, terms):
                     sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
                     continue
-                k = len(terms[0].free)
+                own, k = terms[0], len(terms[0].free)
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
-                                     strength=np.mean(fitted, axis=0)[:k], variance=_of_mean(variances)[:k]))
+                                     strength=own.among_all(np.mean(fitted, axis=0)[:k]),
+                                     variance=own.among_all(_of_mean(variances)[:k], np.inf)))
             elif len(terms) > 1 and terms[0].kind == MEAN:
                 mixed.append((name, terms, choice))
             else:
@@ -413,19 +415,23 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]],
 
 
 def _strength(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray]:
-    """Scaled parameters (k,) of a term as fitted, the mean of both halves, and variances (k,), 0 but for mean effects."""
+    """Scaled parameters (k,) of a term as fitted, the mean of both halves, and variances (k,), 0 but for mean effects.
+
+    k: of all parameters that the effect may have free; those that this variant leaves alone are 0, and nobody knows
+    how far they lie from it.
+    """
     every = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
     same = [next(t for t in terms if t.name == term.name and t.values.get("rotor") == term.values.get("rotor"))
             for terms in every]
     k = len(term.free)
-    strength = np.mean([t.scaled(t.values)[:k] for t in same], axis=0)
+    strength = term.among_all(np.mean([t.scaled(t.values)[:k] for t in same], axis=0))
     if term.kind != MEAN:
-        return strength, np.zeros(k)
+        return strength, np.zeros(len(strength))
     variances = []
     for f, t in zip(fits, same, strict=True):
         place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
         variances.append(np.diag(f.covariance)[place:place + k])
-    return strength, _of_mean(variances)
+    return strength, term.among_all(_of_mean(variances), np.inf)
 
 
 def _of_mean(variances: Sequence[np.ndarray]) -> np.ndarray:
@@ -442,12 +448,12 @@ def _refined(data: Data, part: Part, found: Fit) -> Fit:
 
 
 def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
-    """The parameters found before, and a little of every new effect; None to begin anew."""
-    if chosen is None or not chosen.fits or any(t.name in COMMAND_ONLY for t in terms):
+    """The parameters found before, with nothing of the new effects; None where nothing was found."""
+    if chosen is None or not chosen.fits:
         return None
     known = chosen.fits[train].scaled
     size = sum(len(t.free) for t in terms if t.kind == MEAN)
-    return np.concatenate([known, np.full(size - len(known), 0.05)])
+    return np.concatenate([known, np.zeros(size - len(known))])
 
 
 def _against_none(gain: float, least: float, many: int = 1) -> float:

@@ -120,6 +120,10 @@ class Twin:
         """Whether effects change the roll and pitch loops."""
         return self._plant(active)[1]
 
+    def same_loop(self, one: Sequence[Active], other: Sequence[Active]) -> bool:
+        """Whether the roll and pitch loops are the same under two hypotheses."""
+        return _same_loop(self._row(one), self._row(other))
+
     @cached_property
     def _plain(self) -> Any:
         """Plant row of the vehicle as calibrated."""

@@ -22,6 +22,7 @@ EDGE_FREEDOM = 6.0
 ROUNDS = 4
 WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold
 DOUBT = 0.1  #: of the logarithm of a change of the spectra by effects: the loop model is no better
+SMALL = 1e-3  #: of a scaled parameter, over which the likelihood's slope is taken
 NOTHING = np.zeros(0)
 
 
@@ -98,38 +99,49 @@ class TwinView:
                 self.kept.clear()
             made, cost = [], 0.0
             for s in self.spectra:
-                wrong, price, _ = self._shift(s, ratio, wide)
+                wrong, price, _, _ = self._shift(s, ratio, wide)
                 cost += price
                 made.append(np.broadcast_to(self.twin.floor * ratio * np.exp(wrong), s.shape).ravel())
             made.append(np.ones(len(self.edges) * edge_response.COUNT))
             self.kept[key] = (np.concatenate(made), cost)
         return self.kept[key]
 
-    def slopes(self, active: Sequence[Active], moved: Sequence[tuple[Sequence[Active], float]],
-               wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood for k parameters.
-
-        moved: for each the hypothesis with it moved, and by how much.
-        """
-        k = len(moved)
-        gradient, information = np.zeros(k), np.zeros((k, k))
+    def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
+        """By how much the logarithm of the expected power rises (bins, axes) from one hypothesis to another."""
         if not self.spectra:
-            return gradient, information
-        ratio = self.twin.ratio(active)
-        rise = np.array([np.log(self.twin.ratio(m) / ratio) / step for m, step in moved])
+            return np.zeros((0, len(AXES)))
+        return np.log(self.twin.ratio(after) / self.twin.ratio(before))
+
+    def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient (k,) and information (k, k) of the likelihood for k parameters, each of which lets the log power `rise`."""
+        k = len(rise)
+        gradient, information = np.zeros(k), np.zeros((k, k))
         if not rise.any():
             return gradient, information
+        ratio = self.twin.ratio(active)
+        for i in np.flatnonzero(rise.any(axis=(1, 2))):
+            up, down = (self._level(ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
+            gradient[i] = (up - down) / (2.0 * SMALL)
         for s in self.spectra:
-            _, _, (push, count, covariance) = self._shift(s, ratio, wide)
+            _, _, count, covariance = self._shift(s, ratio, wide)
             for a in range(len(AXES)):
                 j = rise[:, :, a]
-                gradient += j @ push[:, a]
                 cross = count * j @ self.shapes.T
                 information += count * j @ j.T - cross @ covariance @ cross.T
         return gradient, information
 
-    def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, tuple]:
-        """Log of the floor's correction (bins, axes), its cost, and what `slopes` needs."""
+    def _level(self, ratio: np.ndarray, wide: bool) -> float:
+        """Log likelihood of the spectra where power is expected to be a multiple of the floor, less what that costs."""
+        total = 0.0
+        for s in self.spectra:
+            wrong, cost, _, _ = self._shift(s, ratio, wide)
+            power = self.twin.floor * ratio * np.exp(wrong)
+            tails = (FREEDOM + 1.0) * np.log1p(np.abs(s) ** 2 / (power * FREEDOM))
+            total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + cost
+        return total
+
+    def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, float, np.ndarray]:
+        """Log of the floor's correction (bins, axes), its cost, weight of all blocks, covariance of the shapes' amounts."""
         e0 = np.abs(s) ** 2 / (self.twin.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
         spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
@@ -143,7 +155,7 @@ class TwinView:
             amount += covariance @ (self.shapes @ push - amount / spread[:, None] ** 2)
         cost = 0.5 * float(((amount / spread[:, None]) ** 2).sum())
         cost += 0.5 * len(AXES) * float(np.linalg.slogdet(normal)[1] + 2.0 * np.log(spread).sum())
-        return self.shapes.T @ amount, cost, (push, count, covariance)
+        return self.shapes.T @ amount, cost, count, covariance
 
 
 def _shape(spectra: np.ndarray) -> tuple[int, int]:
