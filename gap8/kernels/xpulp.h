@@ -3,7 +3,7 @@
 // On the chip (AIRTOUCH_PULP_BUILTINS) they are its compiler's builtins, one instruction each. With
 // `__riscv_xcvsimd` they are CORE-V's instructions, which are XPULP's under another
 // encoding: upstream compilers have those, so that the path can be compiled, run and
-// counted on a desktop. With AIRTOUCH_XPULP_EMULATION they are plain C, for every machine.
+// counted on a desktop. With AIRTOUCH_XPULP_EMULATION they are plain C, for every little-endian machine.
 // Elsewhere AIRTOUCH_XPULP is 0 and the kernels multiply byte by byte. All give the same bits.
 // A vector of four int8 is one int32 here, the first in its lowest byte.
 #pragma once
@@ -94,6 +94,8 @@ static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
 #elif defined(AIRTOUCH_XPULP_EMULATION)
 #define AIRTOUCH_XPULP 1
 
+#include <string.h>
+
 static inline int32_t xpulpByte(int32_t word, int32_t i) {
   return (int8_t)((uint32_t)word >> (8 * i));
 }
@@ -104,13 +106,13 @@ static inline int32_t xpulpPack4(int8_t a, int8_t b, int8_t c, int8_t d) {
 }
 
 static inline int32_t xpulpLoad4(const int8_t *p) {
-  return xpulpPack4(p[0], p[1], p[2], p[3]);
+  int32_t four;
+  memcpy(&four, p, sizeof(four));  // the lowest byte first, as on the chip
+  return four;
 }
 
 static inline void xpulpStore4(int8_t *p, int32_t four) {
-  for (int32_t i = 0; i < 4; i++) {
-    p[i] = (int8_t)xpulpByte(four, i);
-  }
+  memcpy(p, &four, sizeof(four));
 }
 
 static inline int32_t xpulpDot4(int32_t a, int32_t b, int32_t sum) {

@@ -90,6 +90,18 @@ static inline float takeFinite(bytes_t *bytes, float usual, float limit) {
   return value == value ? fminf(fmaxf(value, -limit), limit) : 0.0f;
 }
 
+/**
+ * Whether this input is one of those, one in @p n, that may cost more. A hash of all bytes says so: a bit of the input
+ * would be set in nearly the whole corpus, since inputs that run for longer reach more.
+ */
+static inline bool oneIn(uint32_t n, const uint8_t *data, size_t size) {
+  uint32_t hash = 2166136261u;
+  for (size_t i = 0; i < size; i++) {
+    hash = (hash ^ data[i]) * 16777619u;
+  }
+  return (hash >> 16) % n == 0;
+}
+
 /** Uniform noise, -1 to 1, from a seed: long runs of samples from few bytes. */
 static inline float noise(uint32_t *seed) {
   *seed = *seed * 1664525u + 1013904223u;

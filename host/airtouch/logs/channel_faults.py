@@ -22,20 +22,17 @@ def duplicates(log: FlightLog) -> list[tuple[str, str]]:
 
     The world accelerations that stand in for missing body ones are no fault.
     """
-    names, columns = [], []
-    for name, values in log.columns.items():
-        finite = bool(np.isfinite(values).all())
-        if name == "t_s" or not finite or len(values) < 3 or np.ptp(values) == 0:
-            continue
-        with np.errstate(over="ignore", invalid="ignore"):
-            centred = values - values.mean()
-            norm = np.linalg.norm(centred)
-        if np.isfinite(norm) and norm > 0:
-            names.append(name)
-            columns.append(centred / norm)
-    if len(columns) < 2:
+    if len(log) < 3:
         return []
-    similarity = np.abs(np.array(columns) @ np.array(columns).T)
+    names = [name for name in log.columns if name != "t_s"]
+    values = np.array([log.columns[name] for name in names]).reshape(len(names), len(log))
+    with np.errstate(over="ignore", invalid="ignore"):
+        centred = values - values.mean(axis=1, keepdims=True)
+        norm = np.linalg.norm(centred, axis=1)
+        moves = np.isfinite(values).all(axis=1) & (np.ptp(values, axis=1) > 0) & np.isfinite(norm) & (norm > 0)
+    names = [name for name, one in zip(names, moves, strict=True) if one]
+    columns = centred[moves] / norm[moves, None]
+    similarity = np.abs(columns @ columns.T)
     allowed = set(zip(ACC, ACC_WORLD, strict=True))
     pairs = []
     for i, j in zip(*np.nonzero(np.triu(similarity > 1 - 1e-12, 1)), strict=True):
@@ -69,7 +66,7 @@ def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
             found.append((name, 0, len(values)))
         elif name in limits:
             moves = (np.diff(values) != 0) | ~flying[1:] | ~flying[:-1]
-            bounds = np.r_[0, np.flatnonzero(moves) + 1, len(values)]
+            bounds = np.concatenate(([0], np.flatnonzero(moves) + 1, [len(values)]))
             for start in np.flatnonzero(np.diff(bounds) * period > limits[name]):
                 found.append((name, int(bounds[start]), int(bounds[start + 1])))
     return found
@@ -92,17 +89,23 @@ def spikes(log: FlightLog) -> dict[str, list[int]]:
 
     The motors are left out: their kicks come from set-point steps and are real.
     """
-    found = {}
-    for name, floor in SPIKE_FLOOR.items():
-        values = log.columns.get(name)
-        if values is None or len(values) < 5:
-            continue
-        with np.errstate(invalid="ignore", over="ignore"):
-            left, right = np.diff(values)[:-1], -np.diff(values)[1:]
-            noise = np.nanmedian(np.abs(left)) if np.isfinite(left).any() else 0.0
-            limit = max(floor, SPIKE_NOISE * 1.4826 * noise)
-            out = (np.minimum(np.abs(left), np.abs(right)) > limit) & (left * right > 0)
-            out &= np.abs(left - right) < limit / 3
-        if out.any():
-            found[name] = (np.flatnonzero(out) + 1).tolist()
-    return found
+    names = [name for name in SPIKE_FLOOR if name in log.columns]
+    if not names or len(log) < 5:
+        return {}
+    floors = np.array([SPIKE_FLOOR[name] for name in names])
+    with np.errstate(invalid="ignore", over="ignore"):
+        steps = np.diff([log.columns[name] for name in names])
+        left, right = steps[:, :-1], -steps[:, 1:]
+        limits = np.maximum(floors, SPIKE_NOISE * 1.4826 * _medians(np.abs(left)))[:, None]
+        out = (np.minimum(np.abs(left), np.abs(right)) > limits) & (left * right > 0)
+        out &= np.abs(left - right) < limits / 3
+    return {name: (np.flatnonzero(one) + 1).tolist() for name, one in zip(names, out, strict=True) if one.any()}
+
+
+def _medians(values: np.ndarray) -> np.ndarray:
+    """The median of each row of (k, n), NaN left out; 0 where a row has no number."""
+    ordered = np.sort(values, axis=1)  # NaN come last
+    count = (~np.isnan(values)).sum(axis=1)
+    below, above = np.maximum(count - 1, 0) // 2, count // 2
+    rows = np.arange(len(values))
+    return np.where(count > 0, 0.5 * (ordered[rows, below] + ordered[rows, np.minimum(above, values.shape[1] - 1)]), 0.0)

@@ -9,7 +9,9 @@
 #include "stream_window.h"
 #include "toy_network.h"
 
-#define STEPS 700      // of an input before the quiet flight, at most
+// Steps of an input before the quiet flight, at most: few in most, and a window of samples and more in an eighth.
+#define FEW_STEPS 120
+#define MANY_STEPS 700
 // Steps of the quiet flight, at most: the longest wait for a try, a window of new samples, and a few more.
 #define QUIET (LINK_RETRY_MOST + 330)
 
@@ -240,10 +242,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   gap8Lives = transportTakes = true;
   makeGap8();
   start(mode);
-  while (bytes.left > 0 && steps < STEPS) {
+  const uint32_t most = oneIn(8, data, size) ? MANY_STEPS : FEW_STEPS;
+  while (bytes.left > 0 && steps < most) {
     doOne(&bytes);
   }
-  if (end & 1) {
+  if (end & 1 && oneIn(5, data, size)) {  // it costs more than all before it
     core->noSensor = false;
     flyQuietly(end / 4 % 5, end & 2);
   }

@@ -88,7 +88,10 @@ static inline uint16_t packSamples(uint8_t session, uint32_t first, int count, u
   edgeLinkPacket_t packet = {.type = EDGE_LINK_FEATURES, .session = session, .sequence = first};
   packet.features.count = (uint8_t)count;
   packet.features.back = back;
-  return withSamples(packed, edgeLinkPack(&packet, packed), sampleOf);
+  for (int i = 0; i < count; i++) {
+    sampleOf(first + (uint32_t)i, packet.features.sample[i]);
+  }
+  return edgeLinkPack(&packet, packed);
 }
 
 /** A packet that begins a session. */

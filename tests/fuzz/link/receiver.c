@@ -151,8 +151,9 @@ static void streamAnew(uint32_t from) {
   deliver(packed, packReset(session, 0xfeedbeef, EDGE_LINK_PAPER, digests[1], packed));
   CHECK(receiver->network == &receiver->networks[1] && receiver->empty, "a new session begins, whatever was said before");
   // The network begins on a multiple of its stride, and answers on one.
-  for (uint32_t i = 0; i < toy->window + 2u * (toy->stride - 1u); i++) {
-    send(from + i, 1, 0);
+  const uint32_t count = 1 + from % EDGE_LINK_SAMPLES;
+  for (uint32_t i = 0; i < toy->window + 2u * (toy->stride - 1u); i += count) {
+    send(from + i, (int)count, 0);
   }
   CHECK(receiver->answers > 0 && receiver->filled >= toy->window, "answers come once the window is full");
 }
