@@ -163,7 +163,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   const int which = (int)(salt / 16 % GAP8_NETWORKS);
   deliver(packed, packReset(1, 1, core->networks[which].algorithm, digests[which], packed));
   static const uint32_t whole[GAP8_NETWORKS] = {BEST_SAMPLES, PAPER_SAMPLES, STREAM_SAMPLES};
-  most = salt % 16 > 1 ? FEW_SAMPLES : whole[which];
+  most = oneIn(12, data, size) ? whole[which] : FEW_SAMPLES;
   while (bytes.left > 0 && core->receiver.taken < most) {
     doOne(&bytes);
   }
