@@ -1,9 +1,11 @@
 """A vehicle: mass, geometry, thrust curve and noise, read from a TOML file."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -95,11 +97,25 @@ def parse(text: str, source: str) -> Vehicle:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise AirTouchError(f"{source}: not valid TOML: {error}") from None
+    values = numbers(table, source)
+    try:
+        vehicle = Vehicle(**values)
+    except TypeError:
+        required = [n for n in ("name", "mass_kg", "arm_m", "inertia_kg_m2", "thrust_of_pwm_n",
+                                "yaw_torque_over_thrust_m", "motor_time_constant_s", "rotor_radius_m")
+                    if n not in values]
+        raise AirTouchError(f"{source}: missing {', '.join(required)}") from None
+    check_firmware(vehicle.firmware, vehicle.range_module, source)
+    return vehicle
+
+
+def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Fields of a vehicle from a TOML table, as `Vehicle` takes them. Raises AirTouchError for a wrong name or value."""
     fields = Vehicle.__dataclass_fields__
     unknown = sorted(set(table) - set(fields))
     if unknown:
         raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(fields)}")
-    values = {}
+    values: dict[str, Any] = {}
     for name, value in table.items():
         if name in LISTS:
             if not (isinstance(value, list) and len(value) == LISTS[name] and all(_is_number(v) for v in value)):
@@ -113,17 +129,9 @@ def parse(text: str, source: str) -> Vehicle:
             values[name] = float(value)
         else:
             raise AirTouchError(f"{source}: {name} must be a number")
-    try:
-        vehicle = Vehicle(**values)
-    except TypeError:
-        required = [n for n in ("name", "mass_kg", "arm_m", "inertia_kg_m2", "thrust_of_pwm_n",
-                                "yaw_torque_over_thrust_m", "motor_time_constant_s", "rotor_radius_m")
-                    if n not in values]
-        raise AirTouchError(f"{source}: missing {', '.join(required)}") from None
-    check_firmware(vehicle.firmware, vehicle.range_module, source)
-    if vehicle.mass_kg <= 0 or min(vehicle.inertia_kg_m2) <= 0:
+    if values.get("mass_kg", 1.0) <= 0 or min(values.get("inertia_kg_m2", (1.0,))) <= 0:
         raise AirTouchError(f"{source}: mass and inertia must be positive")
-    return vehicle
+    return values
 
 
 def check_firmware(firmware: str, range_module: str, source: str) -> None:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import airtouch as at
 from airtouch.crazyflie import mission
 from airtouch.errors import AirTouchError
 from airtouch.simulation import setpoint as c
@@ -67,3 +68,12 @@ def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
     (tmp_path / "m.toml").write_text('[mission]\nstep = [{ do = "wait", time_s = 1.0 }]\n')
     with pytest.raises(AirTouchError, match="never takes off"):
         mission.load(tmp_path / "m.toml")
+
+
+@pytest.mark.parametrize("name", ["sweep", "there-and-back"])
+def test_the_shipped_detector_feels_the_edges_of_a_first_flight(name):
+    """Six virtual flights, drawn anew: at most every fifth edge is missed (of 20 flights: results.md)."""
+    flown = [log.with_columns({}, speed_mps=0.3) for log in at.simulate(mission._folder() / f"{name}.toml", 6, seed=7)]
+    score = at.evaluate(flown)
+    assert score["edges"] == 6 * {"sweep": 2, "there-and-back": 4}[name]
+    assert score["missed"] <= 0.2

@@ -30,3 +30,13 @@ def test_pieces_equal_the_whole(name):
     rng = np.random.default_rng(1)
     for sizes in (iter(lambda: 1, 0), iter(lambda: int(rng.integers(1, 40)), 0)):
         np.testing.assert_array_equal(flown(sizes), whole)
+
+
+def test_a_second_flight_begins_with_the_rotors_of_the_first():
+    """Motor noise is drawn around the thrust of the vehicle, not around that of the last flight's last step."""
+    plan = scenario.draw_flight(scenario.load("paper-9cm"), 5, 2)
+    stepper = Stepper(plan, vehicle.load(), 5, 2, choose(plan, {"motor_noise": {"rms": 0.05}}))
+    for _ in range(3):
+        stepper.begin(plan.setpoints[0])
+        np.testing.assert_array_equal(stepper.memory[0]["gain"], Stepper(plan, vehicle.load(), 5, 2, choose(plan)).plant[0]["gain"])
+        stepper.fly(plan.setpoints[:300], np.empty((300, loop.COLUMNS)))

@@ -8,7 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 from airtouch import vehicle as vehicles
-from airtouch.simulation import flight
+from airtouch.errors import AirTouchError
+from airtouch.simulation import flight, scenario
 from airtouch.simulation.effects.ground_effect import thrust_ratio
 from airtouch.simulation.plant import from_vehicle, hover_pwm
 
@@ -66,3 +67,26 @@ acc_noise_ratio = [1.0, 2.0, 3.0]
     np.testing.assert_allclose(from_vehicle(v)[0]["acc_noise"], 0.06 * np.array([1, 2, 3]))
     assert hover_pwm(v) == pytest.approx(math.sqrt(0.03 * 9.81 / 4 / 4e-11))
     assert hover_pwm(replace(v, thrust_of_pwm_n=(0.0, 1e-6, 0.0))) == pytest.approx(0.03 * 9.81 / 4 / 1e-6)
+
+
+LEVEL = """
+[mission]
+step = [{ do = "take-off", height_m = 0.5 }, { do = "hover", time_s = 1.0 }]
+"""
+
+
+def test_a_scenario_may_change_fields_of_the_vehicle():
+    given = "range_module = 'none'\n[vehicle]\nmass_kg = { low = 0.03, high = 0.05 }\nflow_noise_mps = [0.01, 0.02]\n"
+    scene = scenario.parse(given + LEVEL, "mine.toml")
+    drawn = [scenario.draw_flight(scene, 0, i).flown_by(vehicles.load()) for i in range(20)]
+    assert all(0.03 <= v.mass_kg <= 0.05 for v in drawn) and len({v.mass_kg for v in drawn}) == 20
+    assert {(v.flow_noise_mps, v.range_module, v.name) for v in drawn} == {((0.01, 0.02), "none", "crazyflie-2.1-flow")}
+
+
+@pytest.mark.parametrize("line, said", [
+    ("mas_kg = 1", "unknown key mas_kg"), ("mass_kg = -1", "must be positive"), ("flow_noise_mps = 1", "must be 2 numbers"),
+    ("firmware = '1999'", "mine.toml"), ("name = 'other'", "every field of a vehicle but its name")])
+def test_wrong_fields_are_told_with_their_file(line, said):
+    with pytest.raises(AirTouchError, match=said) as told:
+        scenario.parse(f"[vehicle]\n{line}\n{LEVEL}", "mine.toml")
+    assert str(told.value).startswith("mine") and "\n" not in str(told.value)

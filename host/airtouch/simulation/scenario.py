@@ -4,7 +4,7 @@ import math
 import tomllib
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import effects, mission, world
 from airtouch.simulation.expressions import draw
 from airtouch.simulation.firmware.settings import DEFAULT
-from airtouch.vehicle import RANGE_MODULES, Vehicle, check_firmware
+from airtouch.vehicle import RANGE_MODULES, Vehicle, check_firmware, numbers
 
-KEYS = {"name", "summary", "firmware", "range_module", "values", "world", "platform", "mission", "effects"}
+KEYS = {"name", "summary", "firmware", "range_module", "vehicle", "values", "world", "platform", "mission", "effects"}
+FIRMWARE_KEYS = ("firmware", "range_module")  #: fields of a vehicle that may stand outside [vehicle]
 DEFAULT_ROOM_M = (-10.0, 10.0, -10.0, 10.0)
 CIRCLE_CORNERS = 24
 
@@ -35,7 +36,7 @@ class Scenario:
 class FlightPlan:
     """One flight with every value drawn: set-points (rows, 8), world, room (4,), effects.
 
-    firmware, range_module: what flies instead of the vehicle's own; "" where the scenario says nothing.
+    changes: fields of the vehicle that are others in this flight, firmware and range module among them.
     """
 
     setpoints: np.ndarray
@@ -43,13 +44,11 @@ class FlightPlan:
     room: np.ndarray
     effects: list[tuple[str, dict[str, float]]]
     values: dict[str, Any]
-    firmware: str = ""
-    range_module: str = ""
+    changes: Mapping[str, Any] = field(default_factory=dict)
 
     def flown_by(self, vehicle: Vehicle) -> Vehicle:
-        """The vehicle with the firmware and the range module of this flight."""
-        return replace(vehicle, firmware=self.firmware or vehicle.firmware,
-                       range_module=self.range_module or vehicle.range_module)
+        """The vehicle as it is in this flight."""
+        return replace(vehicle, **self.changes)
 
 
 def names() -> list[str]:
@@ -83,14 +82,14 @@ def parse(text: str, source: str) -> Scenario:
     unknown = sorted(set(table) - KEYS)
     if unknown:
         raise AirTouchError(f"{source}: unknown key {', '.join(unknown)}; known: {', '.join(sorted(KEYS))}")
-    for key in ("firmware", "range_module"):
+    for key in FIRMWARE_KEYS:
         if not isinstance(table.get(key, ""), str):
             raise AirTouchError(f"{source}: {key} must be a text in quotes")
-    check_firmware(table.get("firmware", DEFAULT), table.get("range_module", RANGE_MODULES[0]), source)
     if "mission" not in table:
         raise AirTouchError(f"{source}: no [mission]")
     scenario = Scenario(str(table.get("name", Path(source).stem)), str(table.get("summary", "")), table)
-    draw_flight(scenario, 0, 0)
+    changes = draw_flight(scenario, 0, 0).changes
+    check_firmware(changes.get("firmware", DEFAULT), changes.get("range_module", RANGE_MODULES[0]), source)
     return scenario
 
 
@@ -120,7 +119,11 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
     room = np.array(ground.get("room_m", DEFAULT_ROOM_M), dtype=np.float64)
     if room.shape != (4,):
         raise AirTouchError(f"{source}: room_m needs four numbers: x from, to, y from, to")
-    return FlightPlan(rows, built, room, chosen, values, table.get("firmware", ""), table.get("range_module", ""))
+    fields = draw(table.get("vehicle", {}), values, rng, f"{source}: vehicle")
+    changes = numbers(fields, f"{source}: [vehicle]") | {k: table[k] for k in FIRMWARE_KEYS if table.get(k)}
+    if "name" in changes:
+        raise AirTouchError(f"{source}: [vehicle] takes every field of a vehicle but its name")
+    return FlightPlan(rows, built, room, chosen, values, changes)
 
 
 def _platform(table: Mapping[str, Any], where: str) -> world.Platform:

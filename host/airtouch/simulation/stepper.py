@@ -49,6 +49,7 @@ class Stepper:
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
                                 f"{hover_pwm(vehicle):.0f}")
         self.plant, acting = prepare(vehicle, active)
+        self._gain = self.plant[0]["gain"].copy()  # the loop writes gain times noise into the plant
         self.world, self.room = plan.world, plan.room
         self.used = len(acting)
         self.functions = Wrenches([a.effect.wrench for a in acting], loop.SLOTS)
@@ -66,6 +67,7 @@ class Stepper:
         """Stand on what is below the set-point (8,), motors off."""
         w = self.world
         self.memory[:] = 0
+        self.plant[0]["gain"] = self._gain
         kept.begin(self.plant, w.corners, w.first, w.surface, w.box, setpoint, self.streams[3], self.memory)
 
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:
