@@ -44,11 +44,25 @@ def test_works_without_any_extra(flight, tmp_path, command):
 
 
 @pytest.mark.parametrize("command", [("demo", "--out", "{out}/demo"), ("train", "{flight}", "--out", "{out}/m.npz"),
-                                     ("adapt", "{flight}", "--out", "{out}/m.npz")])
+                                     ("adapt", "{flight}", "--out", "{out}/m.npz"), ("twin", "{flight}", "--out", "{out}/twin")])
 def test_training_says_at_once_what_is_missing(flight, tmp_path, command):
     done = run(*(word.format(flight=flight, out=tmp_path) for word in command))
     assert done.returncode == 2 and "pip install 'airtouch[train]'" in done.stderr and "tensorflow" in done.stderr, done.stderr
     assert "Traceback" not in done.stderr and not list(tmp_path.iterdir())
+
+
+def test_a_report_without_matplotlib_says_which_extra_brings_pictures(flight, tmp_path):
+    done = run("gap", "measure", flight, "--report", tmp_path / "gap.html")
+    page = (tmp_path / "gap.html").read_text(encoding="utf-8")
+    assert done.returncode == 0 and "airtouch[plots]" in page and "<img" not in page
+
+
+@pytest.mark.parametrize("command, extra", [(("map", "{flight}", "--truth", "--out", "{out}/m.geojson"), "map"),
+                                            (("gap", "blind", "run", "{out}/set", "-n", "1"), "plots")])
+def test_plots_say_at_once_what_is_missing(flight, tmp_path, command, extra):
+    done = run(*(word.format(flight=flight, out=tmp_path) for word in command))
+    assert done.returncode == 2 and f"pip install 'airtouch[{extra}]'" in done.stderr and "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch):

@@ -5,15 +5,20 @@ from importlib.util import find_spec
 from airtouch.errors import AirTouchError
 
 #: extra of `pip install 'airtouch[EXTRA]'` -> modules that it brings
-EXTRAS = {"train": ("tensorflow", "keras", "sklearn"), "fly": ("cflib",), "map": ("shapely",), "scale": ("distributed",),
-          "parquet": ("pyarrow",), "ulog": ("pyulog",), "ros": ("rosbags",), "pandas": ("pandas",)}
+EXTRAS = {"plots": ("matplotlib",), "train": ("tensorflow", "keras", "sklearn", "matplotlib"), "fly": ("cflib",),
+          "map": ("shapely", "matplotlib"), "scale": ("distributed",), "parquet": ("pyarrow",), "ulog": ("pyulog",), "ros": ("rosbags",), "pandas": ("pandas",)}
 
 
 def need(extra: str, purpose: str) -> None:
     """Raise AirTouchError, before any work, where a module of the extra is missing; purpose: what it is wanted for."""
-    missing = [name for name in EXTRAS[extra] if not _there(name)]
+    missing = lacking(extra)
     if missing:
         raise AirTouchError(f"{purpose} needs {', '.join(missing)}: pip install 'airtouch[{extra}]'")
+
+
+def lacking(extra: str) -> list[str]:
+    """The modules of an extra that are not installed."""
+    return [name for name in EXTRAS[extra] if not _there(name)]
 
 
 def _there(name: str) -> bool:

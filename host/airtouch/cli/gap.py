@@ -257,8 +257,10 @@ def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool
 def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path | None, plot: Path | None,
                 force: bool) -> None:
     """Open the key of the set in FOLDER and score the diagnoses in ANSWERS, a folder or a file."""
+    from airtouch.extras import need
     from airtouch.gap import blind as sealed
 
+    need("plots", "scoring a sealed set")
     _check_free(json_path, plot, force)
     _scored(sealed.score(folder, answers, key), json_path, plot, force)
 
@@ -278,8 +280,10 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, json_path: Path 
     effect left out, where `unknown` is right.
     """
     from airtouch.cli import gap_show
+    from airtouch.extras import need
     from airtouch.gap import blind_run as whole
 
+    need("plots", "scoring a sealed set")
     with gap_show.Bar() as bar:
         found = whole.run(out, flights, seed, workers=workers, progress=bar)
     _scored(found, json_path or out / "figures.json", out / "figures.png", True)

@@ -8,7 +8,7 @@ import click
 from airtouch import logs
 from airtouch.cli import scores as show
 from airtouch.detector import dataset, evaluate, registry
-from airtouch.errors import AirTouchError
+from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 
 
@@ -35,10 +35,9 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     Positions come from x_m, y_m where the log has them; else from the commanded speed, which places edges
     along the track only. Each edge has a 1-sigma: the detector's timing error times the speed there.
     """
-    try:
-        from airtouch.detector import edge_map
-    except ImportError:
-        raise AirTouchError("maps need shapely: pip install 'airtouch[map]'") from None
+    need("map", "a map")
+    from airtouch.detector import edge_map
+
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
     picture = out.with_suffix(".png")
     for path in (out, picture):

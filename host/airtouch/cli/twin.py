@@ -50,6 +50,9 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
                    the two apart, phase by phase (AUROC, 0.5 is closed); what stays different, largest first
     vehicle.toml   and scenario.toml: the twin, for simulate, gap and train
     """
+    from airtouch.extras import need
+
+    need("train", "comparing the twin with the drone")
     from airtouch import vehicle as vehicles
     from airtouch.report import twin_report
     from airtouch.simulation.batch import available_cores

@@ -8,15 +8,17 @@ from typing import Any
 import jinja2
 
 from airtouch import __version__
+from airtouch.extras import lacking
 from airtouch.gap import summary, words
 from airtouch.gap.advice import ADD_AN_EFFECT
 from airtouch.gap.measure import Measurement
 from airtouch.gap.pictures import Pictures
 from airtouch.gap.result import Cell, Diagnosis
 from airtouch.logs.files import write_bytes
-from airtouch.report import gap_figures, gap_tables
+from airtouch.report import gap_tables
 from airtouch.report.write import embed
 
+NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: of the section that shows how
 
 
@@ -35,7 +37,7 @@ def write_measurement(path: Path, found: Measurement, pictures: Pictures | None 
         cells=found.map.cells, floor_from=found.map.floor_from, where=found.where, pictures=pictures,
         calibration=gap_tables.named(found.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),
-               ("What these logs cannot say", found.cannot), ("Notes", found.notes), ("Left out", found.left_out)],
+               ("What these logs cannot say", found.cannot), ("Notes", _notes(found.notes, pictures)), ("Left out", found.left_out)],
         flights=_flights(found.flights, found.vehicle, found.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -59,7 +61,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         unexplained=[words.open_in_words(u) for u in diagnosis.unexplained],
         nearest=words.nearest_in_words(diagnosis.unexplained[0]) if diagnosis.unexplained else [],
         calibration=gap_tables.named(diagnosis.calibration),
-        lists=[("What these logs cannot say", diagnosis.cannot), ("Notes", diagnosis.notes)],
+        lists=[("What these logs cannot say", diagnosis.cannot), ("Notes", _notes(diagnosis.notes, diagnosis.pictures))],
         flights=_flights(diagnosis.flights, diagnosis.vehicle, diagnosis.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -83,10 +85,17 @@ def _example() -> str:
     return (resources.files("airtouch.simulation.effects") / "own_effect.py.txt").read_text("utf-8")
 
 
+def _notes(notes: Sequence[str], pictures: Pictures | None) -> list[str]:
+    """The notes, and that pictures are wanted but cannot be made."""
+    return [*notes, *([NO_PICTURES] if pictures is not None and lacking("plots") else [])]
+
+
 def _images(pictures: Pictures | None) -> list[dict[str, str]]:
     """Plots of the headline's signals, of spectra and of the commands."""
-    if pictures is None:
+    if pictures is None or lacking("plots"):
         return []
+    from airtouch.report import gap_figures
+
     images = []
     if pictures.signal is not None:
         one = pictures.signal

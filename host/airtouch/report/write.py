@@ -16,7 +16,6 @@ from airtouch.detector.trace import Trace
 from airtouch.logs import Edge
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
-from airtouch.report import figures
 from airtouch.report.columns import COLUMNS, cell
 
 
@@ -47,6 +46,8 @@ def write_report(
     scores: detector -> its flights; the first detector is the one that is reported on.
     Raises AirTouchError when the file exists, without `force`.
     """
+    from airtouch.report import figures
+
     first = next(iter(scores))
     summaries = {name: summary.summarise(some) for name, some in scores.items()}
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
