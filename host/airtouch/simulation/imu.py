@@ -77,7 +77,7 @@ def sense(plant, memory, stream, hover, step):
             memory.acc[i] = min(max(logged, -plant.acc_range), plant.acc_range)
             value = min(max(value + shake, -plant.acc_range), plant.acc_range)
             memory.imu[row, i] = sensors.lowpass(memory.acc_filter, memory.acc_past[i], value)
-            value = rate + plant.gyro_bias[i] + memory.gyro_rms[i] * memory.imu_normals[3 + i]
+            value = plant.gyro_scale[i] * rate + plant.gyro_bias[i] + memory.gyro_rms[i] * memory.imu_normals[3 + i]
             value = sensors.lowpass(memory.gyro_chip, memory.gyro_chip_past[i], value)
             value += plant.vibration_gyro * shake
             memory.gyro[i] = min(max(value, -plant.gyro_range), plant.gyro_range)

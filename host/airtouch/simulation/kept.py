@@ -28,7 +28,7 @@ MEMORY_DTYPE = np.dtype([
     ("state", _F, (13,)), ("speed", _F, (4,)), ("force", _F, (6,)), ("slope", _F, (13,)), ("ground", _F),
     ("charge", _F), ("volts", _F), ("effects", _F, (SLOTS, MEMORY)),
     # motors: their command and its delay line, noise, phase, thrust of each over nominal
-    ("pwm", _F, (4,)), ("commands", _F, (RING, 4)), ("flicker", _F, (8,)), ("phase", _F, (4,)), ("gain", _F, (4,)),
+    ("pwm", _F, (4,)), ("commands", _F, (RING, 4)), ("slowed", _F, (4,)), ("held", _F, (4,)), ("flicker", _F, (8,)), ("phase", _F, (4,)), ("gain", _F, (4,)),
     # the IMU: true motion at the last step and now, samples as logged and as filtered, what the firmware has
     ("motion", _F, (6,)), ("now", _F, (6,)), ("acc", _F, (3,)), ("gyro", _F, (3,)), ("imu", _F, (imu.RING, 6)),
     ("seen_acc", _F, (3,)), ("seen_gyro", _F, (3,)), ("acc_rms", _F, (3,)), ("gyro_rms", _F, (3,)),

@@ -82,6 +82,13 @@ def _motors(plant, memory, noise, k, h, volts, stream):
     power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     for i in range(4):
         command = sensors.delayed(memory.commands, k, plant.actuator_delay / h, i)
+        if plant.motor_slowness[i] > 0.0:
+            memory.slowed[i] += (command - memory.slowed[i]) * (1.0 - math.exp(-h / plant.motor_slowness[i]))
+            command = memory.slowed[i]
+        if plant.motor_dead_zone[i] > 0.0:
+            if abs(command - memory.held[i]) > plant.motor_dead_zone[i]:
+                memory.held[i] = command
+            command = memory.held[i]
         memory.target[i] = motors.target_speed(plant, command, factor)
         flicker[i] = noise[0] * flicker[i] + noise[1] * normal[i]
         random = plant.motor_noise * flicker[i] + plant.motor_hiss * flicker[4 + i]
