@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
 
-.PHONY: help setup demo test docs fuzz bench firmware emulate gap8 flash clean
+.PHONY: help setup demo test docs fuzz fuzz-logs repeat bench firmware emulate gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -32,6 +32,12 @@ docs:  ## build the site of host/docs, strictly: build/site
 
 fuzz:  ## fuzz the C that flies for long: [TARGET="parser app"] [RUNS=1000000]
 	$(PYTHON) tools/fuzz.py $(TARGET) $(if $(RUNS),--runs $(RUNS))
+
+fuzz-logs: setup  ## fuzz the log readers: [RUNS=100000] [ARGS="--format usd-2 --first 100000"]
+	$(BIN)/python tools/fuzz_logs.py --count $(or $(RUNS),100000) $(ARGS)
+
+repeat: setup  ## the tests that use threads, sockets or processes, many times over: [TIMES=50] [TEST=tests/sitl]
+	$(BIN)/python tools/repeat.py $(TEST) --times $(or $(TIMES),50)
 
 bench: setup  ## time the kernels and the simulator against their peers, as ratios
 	$(BIN)/python tools/bench.py $(BENCH_ARGS)

@@ -1,12 +1,12 @@
 """Fuzz the log readers: mutated files of every format through read, check, segments, resample and the command.
 
-    python tools/fuzz_logs.py --seed 1 --count 1000
+    make fuzz-logs [RUNS=100000] [ARGS="--seed 2 --first 100000"]       # or: python tools/fuzz_logs.py --count 100000
     python tools/fuzz_logs.py --seed 1 --format usd-2 --only 4711
     python tools/fuzz_logs.py --shapes 100000
 
 Prints per format the number of inputs, logs, refusals and failures, and the worst time and memory.
 Exit code 1 when anything failed. One input is known by seed, format and number: the last line of a
-failure is the command that repeats it. With --shapes, files made to cost time or memory, so many samples,
+failure is the command that repeats it, and --first goes on where a run ended. With --shapes, files made to cost time or memory, so many samples,
 lines or parts long, go the same way.
 """
 
@@ -111,6 +111,8 @@ def fuzz(name: str, seed: int, first: int, count: int, folder: Path) -> Count:
     result = Count()
     walk.walk(files_of(name)[-1], name, Random(0))  # what is imported on the way counts for no input
     for number in range(first, first + count):
+        if sys.stderr.isatty() and (number - first) % 500 == 0:
+            print(f"\r{name}: {number - first} of {count} ", end="", file=sys.stderr, flush=True)
         try:
             outcome, seconds, mb = one(name, seed, number, folder)
         except Exception as error:
@@ -161,7 +163,7 @@ def main() -> int:
         for name in options.format or sound.FORMATS:
             c = fuzz(name, options.seed, options.first, options.count, Path(folder))
             failed += c.failed
-            print(f"{name:13}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}"
+            print("\r" * sys.stderr.isatty() + f"{name:13}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}"
                   f" {c.worst_s[1]:<7}{c.worst_mb[0]:10.1f} {c.worst_mb[1]}", flush=True)
             for what, numbers in sorted(c.failures.items(), key=lambda item: -len(item[1])):
                 print(f"  {len(numbers)} times {what}\n    python tools/fuzz_logs.py --seed {options.seed} "

@@ -29,6 +29,16 @@ def flying(n=200, **changed):
     return table({**si_columns(motion(n, 0.01, 0)), **changed})
 
 
+# the table
+
+
+@pytest.mark.parametrize("blank", [b"\x0b", b" ", b"\t \x0c", b"\r\x0b"])
+def test_a_last_line_of_white_space_without_its_end_is_blank(blank):
+    """It was refused without its place."""
+    log = parse(flying() + blank, "made")
+    assert len(log) == 200 and log.meta["warnings"] == parse(flying(), "made").meta["warnings"]
+
+
 # the clock
 
 

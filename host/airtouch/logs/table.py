@@ -11,7 +11,7 @@ from airtouch.errors import AirTouchError, shown
 MOST_COLUMNS = 256  #: those of the schema and any others
 LONGEST_NAME = 100  #: characters
 _EMPTY_CELL = re.compile(rb"(?<=,)(?=[,\n])|(?<=\n)(?=,)")
-_BLANK = re.compile(rb"(?<=\n)[^\S\n]+(?=\n)")
+_BLANK = re.compile(rb"(?<=\n)[^\S\n]+(?=\n|\Z)")
 _HEAD = re.compile(rb"(?:[^\S\n]*+(?:#[^\n]*+)?\n)*+")  # blank lines and comments
 _COMMENT = re.compile(rb"#[^\n]*")
 

@@ -29,14 +29,14 @@ def period(log: FlightLog, start: int, stop: int) -> float:
         return 0.0
     jumps = np.clip(jumps / size, -CLIP, CLIP)
     sample = np.arange(len(jumps))
-    best, found = CLEAR, 0.0
+    spread, best, found = jumps.std(), CLEAR, 0.0
     for seconds in PERIODS_S:
         samples = seconds * RATE_HZ
         if len(jumps) < LEAST_PULSES * samples:
             break
         place = (sample % samples).astype(int)
         mean = np.bincount(place, jumps)[:int(samples)] / np.bincount(place)[:int(samples)]
-        score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / jumps.std()
+        score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / spread
         if score > best:
             best, found = score, float(seconds)
     return round(found, 3)

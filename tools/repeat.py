@@ -1,0 +1,84 @@
+"""Runs the tests that use threads, sockets or processes many times over: what fails once in fifty is a race.
+
+    python tools/repeat.py                                # those below tests/, 50 times each
+    python tools/repeat.py tests/sitl --times 200
+    nice -n 10 python tools/repeat.py tests/crazyflie/test_log_blocks.py -k refuses
+
+Best on a machine that is busy with other work. Each test is repeated before the next one begins; fixtures of a module or
+of the session are made once. Prints for each test how often it passed and failed; what the failures printed is kept in
+build/repeat. Exit code 1 when anything failed.
+"""
+
+import argparse
+import re
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+#: words of a test file that uses threads, sockets or processes
+CONCURRENT = re.compile(r"\b(threading|socket|Popen|multiprocessing|dask|simulated_link|sitl|cflib)\b")
+
+
+class Repeat:
+    """A pytest plugin: every test so many times, counted, failures kept in a folder."""
+
+    def __init__(self, times: int, kept: Path) -> None:
+        self.times, self.kept = times, kept
+        self.passed, self.failed, self.skipped = Counter(), Counter(), Counter()
+        self.started: dict[str, float] = {}
+
+    @pytest.fixture
+    def repeated(self) -> None:
+        """Asked for by every test, with the number of the repetition."""
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        metafunc.fixturenames.append("repeated")
+        metafunc.parametrize("repeated", range(self.times), indirect=True, ids=[f"again{i}" for i in range(self.times)])
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        name = re.sub(r"-?again\d+", "", report.nodeid).replace("[]", "")
+        self.started.setdefault(name, time.monotonic() - report.duration)
+        if report.failed:
+            self.failed[name] += 1
+            path = self.kept / f"{re.sub(r'[^A-Za-z0-9]+', '_', report.nodeid)[-150:]}.txt"
+            path.write_text(f"{report.nodeid}, {report.when}\n{report.longreprtext}\n"
+                            + "\n".join(f"--- {title}\n{text}" for title, text in report.sections))
+            print(f"FAILED {report.nodeid}: {path.relative_to(ROOT)}", flush=True)
+        elif report.skipped:
+            self.skipped[name] += 1
+        elif report.when == "call":
+            self.passed[name] += 1
+        if report.when == "teardown" and self.passed[name] + self.failed[name] + self.skipped[name] == self.times:
+            print(f"{self.passed[name]:4} passed {self.failed[name]:4} failed {self.skipped[name]:4} skipped "
+                  f"{time.monotonic() - self.started[name]:7.1f} s  {name}", flush=True)
+
+
+def concurrent_tests() -> list[str]:
+    """The test files that use threads, sockets or processes, and those of the link."""
+    return [str(path) for path in sorted((ROOT / "tests").rglob("test_*.py"))
+            if CONCURRENT.search(path.read_text()) or "link" in path.name]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tests", nargs="*", help="files or folders; by default those that use threads, sockets or processes")
+    parser.add_argument("--times", type=int, default=50, help="repetitions of each test (50)")
+    parser.add_argument("-k", default="", help="only tests that match, as pytest's -k")
+    wanted = parser.parse_args()
+    kept = ROOT / "build" / "repeat"
+    kept.mkdir(parents=True, exist_ok=True)
+    plugin = Repeat(wanted.times, kept)
+    quiet = ["-p", "no:terminal", "-o", "addopts=--strict-markers --import-mode=importlib", "-p", "no:cacheprovider"]
+    options = [*quiet, *(["-k", wanted.k] if wanted.k else [])]
+    code = pytest.main([*options, *(wanted.tests or concurrent_tests())], plugins=[plugin])
+    print(f"{len(plugin.passed | plugin.failed)} tests: {plugin.passed.total()} passed, {plugin.failed.total()} failed, "
+          f"{plugin.skipped.total()} skipped")
+    return int(code != pytest.ExitCode.OK)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
