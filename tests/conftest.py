@@ -1,7 +1,12 @@
 """What every test may ask for."""
 
 import os
+import sys
 
+# What Python compiles is kept, whatever the caller's setting: else each of two workers and some forty programs that the
+# tests start would compile the package anew, the workers the tests as well.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
 

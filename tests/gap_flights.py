@@ -7,11 +7,11 @@ import numpy as np
 from airtouch import vehicle as vehicles
 from airtouch.gap.channels import residual
 from airtouch.gap.data import Study
-from airtouch.gap.flight import PERIOD_S, Flight
+from airtouch.gap.flight import PERIOD_S, Flight, ready
 from airtouch.gap.spectra import Floor
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import KINDS
-from airtouch.simulation import replay
+from airtouch.simulation import batch, replay, scenario
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
 HOVER, TAKE_OFF = KINDS.index("hover"), KINDS.index("take-off")
@@ -33,6 +33,13 @@ def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=Non
         np.tile(np.eye(3), (n, 1, 1)), np.broadcast_to(np.int8(phase), n).copy(), np.ones(n, bool),
         np.zeros(n), np.zeros(n, bool) if lost is None else lost)
     return replace(made, acceleration=force - residual(made, VEHICLE)[:, :3])
+
+
+def flown(count, seed, chosen=()):
+    """Flights of the diagnosis' scenario, ready for it, with the chosen effects alone."""
+    off = [e for e in scenario.load("diagnosis").table.get("effects", {}) if e not in dict(chosen)]
+    logs = batch.flights("diagnosis", count, vehicle=VEHICLE, effects=chosen, without=off, seed=seed, workers=1)
+    return [ready(log, VEHICLE) for log in logs]
 
 
 def noise(seconds, rms, seed):

@@ -4,32 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gap_flights import VEHICLE, flown
 
-from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, candidates, flight, gates
+from airtouch.gap import candidates, flight, gates
 from airtouch.gap.channels import inside, residual
 from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
 from airtouch.gap.result import Cell
 from airtouch.gap.select import select
 from airtouch.gap.unexplained import unexplained
-from airtouch.simulation import effects, scenario
-from airtouch.simulation.batch import flights as simulated
+from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
 
-VEHICLE = vehicles.load("crazyflie-2.1-flow")
 FROM_S, TO_S = 9.0, 15.0
-
-
-def flown(count, seed):
-    off = list(scenario.load("diagnosis").table.get("effects", {}))
-    logs = simulated("diagnosis", count, vehicle=VEHICLE, without=off, seed=seed, workers=1)
-    return [flight.ready(log, VEHICLE) for log in logs]
-
-
-@pytest.fixture(scope="module")
-def study():
-    return calibrate.calibrated(VEHICLE, flown(4, 61))[0]
 
 
 @pytest.fixture(scope="module")

@@ -4,18 +4,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from gap_flights import VEHICLE, flown
 
-from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, candidates, clock, fit, flight, generic
+from airtouch.gap import candidates, clock, fit, generic
 from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
 from airtouch.gap.select import halves
-from airtouch.simulation import effects, scenario
+from airtouch.simulation import effects
 from airtouch.simulation import signals as at
-from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import Effect, Parameter, wrench
 
-VEHICLE = vehicles.load("crazyflie-2.1-flow")
 PUSH = 0.01  #: N s/m
 
 
@@ -32,17 +30,6 @@ def sideways():
                                    wrench=_sideways))
     yield made
     effects.unregister("sideways")
-
-
-def flown(count, seed, chosen=()):
-    off = [e for e in scenario.load("diagnosis").table.get("effects", {}) if e not in dict(chosen)]
-    logs = simulated("diagnosis", count, vehicle=VEHICLE, effects=chosen, without=off, seed=seed, workers=1)
-    return [flight.ready(log, VEHICLE) for log in logs]
-
-
-@pytest.fixture(scope="module")
-def study():
-    return calibrate.calibrated(VEHICLE, flown(5, 41))[0]
 
 
 def gain_of(study, flights):
