@@ -234,3 +234,31 @@ def test_flow_latency_is_the_plants_delay(quiet):
     (active,) = effects.activate({"flow_latency": {"delay": 0.06}})
     active.effect.settings(plant[0], active.values)
     assert plant["flow_delay"] == 0.06
+
+
+def test_reach_sees_the_platform_before_and_after_the_beam_does(sweep):
+    """By reach over speed at both edges, and the beam alone at none."""
+    plain, wide = (true_edges(sweep({"range_bias": {"near": 0.0, "dip": 0.0, "reach": reach}})) for reach in (0.0, 0.06))
+    assert plain[0].sample - wide[0].sample == pytest.approx(100 * 0.06 / 0.3, abs=4)
+    assert wide[1].sample - plain[1].sample == pytest.approx(100 * 0.06 / 0.3, abs=6)
+
+
+@pytest.mark.parametrize("kept", [{"above": 0.4}, {"wait": 1.0}])
+def test_flow_transient_waits_and_only_acts_above(sweep, kept):
+    """Bit by bit as without it until its time, for ever where the drone is too low; with neither it acts at once."""
+    still, free, held = (sweep({"flow_scale": {"share": 0.0, "transient": 0.5, **more}})
+                         for more in ({"transient": 0.0}, {}, kept))
+    entry = true_edges(still)[0].sample
+    until = len(still) if "above" in kept else entry + 90
+    np.testing.assert_array_equal(held["vx_mps"][:until], still["vx_mps"][:until])
+    assert np.abs(free["vx_mps"] - still["vx_mps"])[entry:entry + 90].max() > 0.01
+    if "wait" in kept:
+        assert np.abs(held["vx_mps"] - still["vx_mps"])[until:].max() > 0.01
+
+
+def test_leaving_a_surface_presses_down_and_entering_it_does_not(sweep):
+    plain, pressed = (sweep({"ground_effect": {"turbulence": 0.0, "leaving": share}}) for share in (0.0, 0.05))
+    entry, leave = true_edges(plain)[:2]
+    np.testing.assert_array_equal(pressed["acc_z_mps2"][:leave.sample - 60], plain["acc_z_mps2"][:leave.sample - 60])
+    change = (pressed["acc_z_mps2"] - plain["acc_z_mps2"])[leave.sample - 60:leave.sample + 30]
+    assert change.min() == pytest.approx(-0.05 * 9.81, rel=0.4)

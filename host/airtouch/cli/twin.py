@@ -67,7 +67,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
         click.echo(f"airtouch: {reason}", err=True)
     out.mkdir(parents=True, exist_ok=True)
     aim = fit.target(recorded.courses, recorded.features)
-    listed = levers.default(craft)
+    listed = levers.default(craft, recorded.near)
     workers = workers or available_cores()
     with Bar("fitting") as bar:
         state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers, fixed=levers.FIXED,

@@ -35,7 +35,7 @@ MEMORY_DTYPE = np.dtype([
     *((name, _F, (5,)) for name in _FILTERS), *((name, _F, (3, 2)) for name in _PASTS),
     # ranging: measurements not yet handed over, what is below, the last reading's offset, flow noise, walls
     ("looks", _I), ("distances", _F, (ranging.RANGES,)), ("tops", _F, (ranging.RANGES,)),
-    ("kicks", _F, (ranging.RANGES,)), ("flows", _F, (ranging.FLOWS, 2)), ("top", _F), ("changed", _F), ("rose", _F),
+    ("kicks", _F, (ranging.RANGES,)), ("flows", _F, (ranging.FLOWS, 2)), ("top", _F), ("beneath", _F), ("changed", _F), ("rose", _F),
     ("down", _F), ("offset", _F), ("drift", _F, (3,)), ("ranges", _F, (4,)),
     # the firmware: its own state, and what it hands from part to part
     ("est", kalman.STATE), ("module", range_module.STATE), ("pid", controller.STATE),
@@ -72,7 +72,8 @@ def begin(plant_array, corners, first, surface, box, row, stream, memory_array):
         memory.gain[i] = plant.gain[i]
         memory.ranges[i] = np.nan
     memory.force[2] = plant.mass * plant.gravity
-    memory.top, memory.charge, memory.volts = memory.ground, plant.battery_charge, plant.nominal_voltage
+    memory.top = memory.beneath = memory.ground
+    memory.charge, memory.volts = plant.battery_charge, plant.nominal_voltage
     memory.down, memory.changed = 0.01, -ranging.LAST
     roll, pitch = 0.005 * normal(stream), 0.005 * normal(stream)
     imu.begin(plant, memory)

@@ -30,6 +30,10 @@ def look(plant, memory, ground, state, now, stream):
     spot = max(sensors.CONE_TANGENT * (eye - near), 0.002)
     world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
     top = patch[world.UPPER_TOP] if patch[world.COVER] >= sensors.CONE_COVER else patch[world.LOWER_TOP]
+    memory.beneath = top
+    if plant.range_reach > 0.0:
+        world.below(corners, first, surface, box, state[0], state[1], eye, plant.range_reach, patch)
+        top = patch[world.UPPER_TOP] if patch[world.COVER] > 0.0 else patch[world.LOWER_TOP]
     tilt = max(1.0 - 2.0 * (state[7] * state[7] + state[8] * state[8]), 0.3)  # cosine between beam and plumb
     true = (eye - top) / tilt
     if top != memory.top:
@@ -39,7 +43,8 @@ def look(plant, memory, ground, state, now, stream):
     fresh = math.sqrt(1.0 - decay * decay) * plant.range_drift
     memory.drift[2] = decay * memory.drift[2] + fresh * memory.other_normals[1]
     error = memory.drift[2] * true + plant.range_bias * math.exp(-true / plant.range_bias_fade)
-    error += plant.range_dip * memory.rose * math.exp((memory.changed - now) / plant.range_dip_time)
+    dip = plant.range_dip * memory.rose * math.exp((memory.changed - now) / plant.range_dip_time)
+    error += dip * math.exp(-true / plant.range_dip_fade) if plant.range_dip_fade > 0.0 else dip
     row = memory.looks & (RANGES - 1)
     down = max(true + error + plant.range_noise * memory.other_normals[0], 0.0)
     memory.distances[row] = down if down <= sensors.MAX_RANGE_M else np.nan
@@ -96,9 +101,12 @@ def flow_reading(plant, memory, tick, state, now, stream, reading):
     fresh = math.sqrt(1.0 - decay * decay)
     for i in range(2):
         memory.drift[i] = decay * memory.drift[i] + fresh * plant.flow_noise[i] * memory.other_normals[i]
-    near = max(state[2] - plant.range_below_rotors - memory.top, plant.flow_focus)
-    far = max(near + memory.offset, near)
-    share = plant.flow_share + plant.flow_transient * math.exp((memory.changed - now) / plant.flow_transient_time)
+    distance = state[2] - plant.range_below_rotors - memory.beneath
+    near = max(distance, plant.flow_focus)
+    far = max(near + (memory.beneath - memory.top) + memory.offset, near)
+    share, since = plant.flow_share, now - memory.changed - plant.flow_transient_wait
+    if since >= 0.0 and distance >= plant.flow_transient_above:
+        share += plant.flow_transient * math.exp(-since / plant.flow_transient_time)
     per_metre = (1.0 - share) / far + share / near
     ahead, left, _ = rotate_back(state[6:10], state[3], state[4], state[5])
     upright = 1.0 - 2.0 * (state[7] * state[7] + state[8] * state[8])

@@ -38,7 +38,7 @@ class Course:
     before_s: to the entry; over_s: to the exit; stop_s: to the end of the forward flight; after_s: from the exit to
     the landing. speed_mps: of the velocity step; speed_from: "stated",
     "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated. pulse_s: period of
-    velocity pulses in the hover, 0: none.
+    velocity pulses in the hover, 0: none. top_m: height of the platform where other flights tell it (`near_range`), 0: not known.
     """
 
     source: str
@@ -62,6 +62,7 @@ class Course:
     exit: int
     landing: int
     pulse_s: float = 0.0
+    top_m: float = 0.0
 
     def as_dict(self) -> dict[str, float | int | str]:
         """Plain values, for files."""

@@ -1,7 +1,7 @@
 """Recorded flights read, checked and turned into courses and features."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,22 +10,28 @@ from airtouch import logs
 from airtouch.detector import dataset
 from airtouch.errors import AirTouchError
 from airtouch.twin import course as courses
+from airtouch.twin import near_range
 from airtouch.twin.channels import channels
 from airtouch.twin.course import Course
 from airtouch.twin.features import features
+from airtouch.twin.near_range import NearRange
 
 FEWEST = 4  #: flights that a twin is fitted to, at least
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """Flights that a twin is fitted to: courses, channels (each (n, 12)), features (flights, features)."""
+    """Flights that a twin is fitted to: courses, channels (each (n, 12)), features (flights, features).
+
+    near: what their down range reads close to the platform, None where they do not tell.
+    """
 
     vehicle: str
     courses: list[Course]
     channels: list[np.ndarray]
     features: np.ndarray
     left_out: list[tuple[str, str]]
+    near: NearRange | None = None
 
 
 def recorded(paths: Sequence[str | Path], *, speed_mps: float | None = None, folds: Sequence[int] = (),
@@ -56,4 +62,7 @@ def recorded(paths: Sequence[str | Path], *, speed_mps: float | None = None, fol
         why = f"; {left_out[0][1]}" if left_out else ""
         raise AirTouchError(f"{len(usable)} of {len(files)} flights can be used and {FEWEST} are needed: fly straight "
                             f"over the platform's two edges {FEWEST - len(usable)} more times, at two heights{why}")
-    return Recorded(courses.one_vehicle(named), usable, shapes, np.array(numbers), left_out)
+    near = near_range.measure(usable, shapes)
+    if near is not None:
+        usable = [replace(c, top_m=near.top_m) for c in usable]
+    return Recorded(courses.one_vehicle(named), usable, shapes, np.array(numbers), left_out, near)

@@ -8,6 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import effects as registry
+from airtouch.twin.near_range import NearRange
 from airtouch.vehicle import Vehicle
 
 VEHICLE, MISSION = "vehicle", "mission"
@@ -41,8 +42,9 @@ class Lever:
         return f"{self.of}.{self.key}"
 
 
-def default(vehicle: Vehicle) -> tuple[Lever, ...]:
-    """The levers of a fit, started from a vehicle and plain effects."""
+def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...]:
+    """The levers of a fit, started from a vehicle and plain effects. near: what recorded flights say of the down range."""
+    near = near or NearRange(0.0, -0.045, 0.03, 0.035)
     gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
     yaw = vehicle.yaw_torque_over_thrust_m
     return (
@@ -75,24 +77,30 @@ def default(vehicle: Vehicle) -> tuple[Lever, ...]:
         Lever(VEHICLE, "flow_noise_time_s", vehicle.flow_noise_time_s, 0.02, 3.0, 0.1, "s"),
         Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "1"),
         Lever(VEHICLE, "range_drift_time_s", vehicle.range_drift_time_s, 0.05, 3.0, 0.1, "s"),
-        Lever("ground_effect", "strength", 0.9, 0.0, 3.0, 0.15, "1"),
-        Lever("ground_effect", "fade", 0.0875, 0.03, 0.3, 0.01, "m"),
-        Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1"),
+        Lever("ground_effect", "strength", 1.4, 0.0, 3.0, 0.15, "1", 0.3),
+        Lever("ground_effect", "fade", 0.08, 0.03, 0.3, 0.01, "m"),
+        Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1", 0.3),
         Lever("ground_effect", "turbulence", 0.6, 0.0, 3.0, 0.1, "1"),
         Lever("ground_effect", "turbulence_time", 0.04, 0.005, 0.3, 0.006, "s"),
         Lever("ground_effect", "heave", 0.6, 0.0, 2.0, 0.1, "1"),
         Lever("ground_effect", "pitch", 0.8, 0.0, 2.0, 0.1, "1"),
         Lever("ground_effect", "swirl", 0.004, 0.0, 0.05, 0.001, "m"),
-        Lever("flow_scale", "share", 0.0, -0.1, 1.0, 0.03, "1"),
-        Lever("flow_scale", "transient", 0.0, -1.0, 1.0, 0.05, "1"),
-        Lever("flow_scale", "focus", 0.08, 0.01, 0.3, 0.008, "m"),
+        Lever("ground_effect", "leaving", 0.02, -0.1, 0.1, 0.006, "1", 0.01),
+        Lever("flow_scale", "share", -0.04, -0.1, 1.0, 0.03, "1", 0.02),
+        Lever("flow_scale", "transient", 0.7, -1.0, 1.0, 0.08, "1", 0.25),
+        Lever("flow_scale", "time", 0.15, 0.02, 1.0, 0.04, "s"),
+        Lever("flow_scale", "wait", 0.14, 0.0, 0.4, 0.015, "s", 0.04),
+        Lever("flow_scale", "above", 0.07, 0.03, 0.15, 0.005, "m"),
+        Lever("flow_scale", "focus", 0.06, 0.01, 0.3, 0.008, "m"),
         Lever("flow_latency", "delay", 0.02, 0.0, 0.2, 0.008, "s"),
-        Lever("range_bias", "near", -0.045, -0.1, 0.1, 0.008, "m"),
-        Lever("range_bias", "fade", 0.03, 0.01, 0.2, 0.006, "m"),
-        Lever("range_bias", "dip", 0.0, -0.1, 0.1, 0.006, "m"),
-        Lever("range_bias", "time", 0.15, 0.03, 1.0, 0.02, "s"),
-        Lever("range_bias", "delay", 0.035, 0.0, 0.15, 0.008, "s"),
-        Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.008, "m", 0.01),
+        Lever("range_bias", "near", near.near, -0.2, 0.1, 0.008, "m", 0.012),
+        Lever("range_bias", "fade", near.fade, 0.01, 0.2, 0.006, "m"),
+        Lever("range_bias", "dip", -0.035, -0.1, 0.1, 0.006, "m"),
+        Lever("range_bias", "dip_fade", 0.06, 0.02, 0.3, 0.008, "m"),
+        Lever("range_bias", "time", 0.06, 0.03, 1.0, 0.02, "s"),
+        Lever("range_bias", "reach", 0.02, 0.0, 0.1, 0.006, "m", 0.01),
+        Lever("range_bias", "delay", near.delay, 0.0, 0.15, 0.008, "s", 0.012),
+        Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.008, "m", 0.012),
     )
 
 

@@ -29,11 +29,12 @@ def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: fl
     """The values (KEYS) with which the simulator flies a course: m, s, m/s, degrees.
 
     The edges are put where the recorded flight, at its speed and with the same rise, crossed them. The
-    platform's height follows from the readings on both sides of the entry, less the error that `effects`
-    give the down range. height_m: added to the set height, for a simulator that
+    platform's height is the course's own where it is known; else it follows from the readings on both sides of the entry,
+    less the error that `effects` give the down range. height_m: added to the set height, for a simulator that
     flies higher than it is told. pulse_mps: of the pulses in the hover, where the course has some.
     """
-    clearance = max(true_distance(course.entered_m, (effects or {}).get("range_bias", {})), LEAST_CLEARANCE_M)
+    clearance = max(course.before_m - course.top_m if course.top_m else
+                    true_distance(course.entered_m, (effects or {}).get("range_bias", {})), LEAST_CLEARANCE_M)
     before = max(course.speed_mps * (course.before_s - 0.5 * RISE_S), LEAST_BEFORE_M)
     height = course.cruise_m + height_m
     top = max(min(course.before_m - clearance, height - 0.5 * LEAST_CLEARANCE_M), 0.01)

@@ -1,0 +1,160 @@
+"""Simulated edges laid over recorded free air: flights to train on whose background is the drone's own.
+
+A detector that is trained on simulated flights learns the simulator's free air with them. What a platform does to a
+flight is the difference of two simulated flights with the same random numbers, one with the platform and one without.
+Added to stretches of recorded flights far from any edge, it gives flights with known edges in air as lively as the
+real one.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector.channels import level_acceleration
+from airtouch.errors import AirTouchError
+from airtouch.logs.edges import Edge
+from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog
+from airtouch.reference.finite import PWM_MAX, hold_finite
+from airtouch.simulation import flight, scenario
+from airtouch.simulation.flight import Diverged
+from airtouch.simulation.scenario import Scenario
+from airtouch.simulation.world import World
+from airtouch.twin.course import course
+from airtouch.vehicle import Vehicle
+
+COLUMNS = (*ACC_WORLD, *GYRO, *PWM)
+RATE_HZ = 100
+SPARE = 3  #: simulated flights tried for each one wanted, at most
+BEFORE_S, BEHIND_S, FADE_S = 0.4, 2.5, 0.5  #: of a response: before the entry, after the exit, last part that dies out
+FREE_S, AWAY_S, AFTER_S = 1.5, 0.6, 1.5  #: shortest hover; gap in the recorded samples before an entry, after an exit
+SETTLED_S, EARLIEST_S = 1.0, 2.0  #: after the climb: where hover begins, and where an edge may be laid first
+HOVERS = 2  #: hovers of other flights that lengthen each flight
+JOIN_S = 0.3  #: over which two stretches are blended
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a platform changes: values (m, 10) of COLUMNS, and the edges (samples counted from its first row)."""
+
+    values: np.ndarray
+    edges: tuple[Edge, Edge]
+
+
+@dataclass(frozen=True)
+class FreeAir:
+    """One recorded flight without its platform.
+
+    start: (n, 10) with take-off, level from row `level` on. hover: (k, 10). end: (m, 10).
+    """
+
+    start: np.ndarray
+    level: int
+    hover: np.ndarray
+    end: np.ndarray
+
+
+def responses(scene: Scenario, vehicle: Vehicle, count: int, seed: int = 0,
+              progress: Callable[[int, int], None] = lambda *_: None) -> list[Response]:
+    """The first `count` responses of a scenario's flights over one platform.
+
+    Raises AirTouchError where too few flights end well.
+    """
+    out: list[Response] = []
+    for number in range(SPARE * count):
+        if len(out) == count:
+            break
+        found = _response(scene, vehicle, seed, number)
+        if found is not None:
+            out.append(found)
+            progress(len(out), count)
+    if len(out) < count:
+        raise AirTouchError(f"{scene.name}: only {len(out)} of {SPARE * count} flights ended well and crossed one "
+                            "platform; choose another scenario")
+    return out
+
+
+def _response(scene: Scenario, vehicle: Vehicle, seed: int, number: int) -> Response | None:
+    plan = scenario.draw_flight(scene, seed, number)
+    active = flight.choose(plan)
+    ground = plan.world
+    bare = World(ground.corners[:0], ground.first[:1], ground.surface[-1:], ground.box[:0])
+    over = flight.fly_plan(plan, vehicle, seed, number, active, scene.name)
+    if isinstance(over, Diverged):
+        return None
+    edges = logs.true_edges(over)
+    if [e.kind for e in edges] != ["entry", "exit"]:
+        return None
+    beside = flight.fly_plan(replace(plan, world=bare), vehicle, seed, number, active, scene.name)
+    if isinstance(beside, Diverged) or len(beside) != len(over):
+        return None
+    first = max(edges[0].sample - round(BEFORE_S * RATE_HZ), 0)
+    last = min(edges[1].sample + round(BEHIND_S * RATE_HZ), len(over))
+    values = (_values(over) - _values(beside))[first:last]
+    fade = min(round(FADE_S * RATE_HZ), len(values))
+    values[-fade:] *= np.linspace(1.0, 0.0, fade)[:, None]
+    entry, leave = (replace(e, sample=e.sample - first) for e in edges)
+    return Response(values, (entry, leave))
+
+
+def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:
+    """The free air of flights whose down range shows a platform; the others are left out."""
+    out = []
+    for log in flights:
+        try:
+            log.require(*GYRO, *PWM)
+            flown, values = course(log, 0.3), _values(log)
+        except AirTouchError:
+            continue
+        before = flown.entry - round(AWAY_S * RATE_HZ)
+        first = max(flown.start - RATE_HZ, 0)
+        hover = values[flown.level + round(SETTLED_S * RATE_HZ):before]
+        if len(hover) >= FREE_S * RATE_HZ:
+            end = values[flown.exit + round(AFTER_S * RATE_HZ):]
+            out.append(FreeAir(values[first:before], flown.level - first, hover, end))
+    return out
+
+
+def flights(air: Sequence[FreeAir], laid: Sequence[Response],
+            seed: int = 0) -> tuple[list[FlightLog], list[list[Edge]]]:
+    """A flight for each response that fits, with its edges. Same arguments, same flights.
+
+    Each is the free air of one recorded flight, lengthened by hovers of others that are moved to its own mean.
+    """
+    rng = np.random.default_rng([seed, 77])
+    out, labels = [], []
+    for number, response in enumerate(laid):
+        chosen = air[rng.integers(len(air))]
+        middle = np.median(chosen.hover, axis=0)
+        others = [air[i].hover for i in rng.integers(len(air), size=HOVERS)]
+        hovers = _joined([chosen.start, *(h - np.median(h, axis=0) + middle for h in others)])
+        values = _joined([hovers, chosen.end])
+        entry, leave = (e.sample for e in response.edges)
+        earliest = max(chosen.level + round(EARLIEST_S * RATE_HZ), entry)
+        at = int(rng.integers(earliest, max(len(hovers) - (leave - entry), earliest) + 1))
+        if at + leave - entry + round(SETTLED_S * RATE_HZ) > len(values):
+            continue
+        rows = slice(at - entry, min(at - entry + len(response.values), len(values)))
+        values[rows] += response.values[:rows.stop - rows.start]
+        values[:, -len(PWM):] = np.clip(values[:, -len(PWM):], 0.0, PWM_MAX)
+        columns = dict(zip(COLUMNS, values.T, strict=True)) | {"time_s": np.arange(len(values)) / RATE_HZ}
+        out.append(FlightLog(columns, {"source": f"overlay_{seed}_{number:06d}", "sample_period_s": 1.0 / RATE_HZ}))
+        labels.append([replace(e, sample=at - entry + e.sample) for e in response.edges])
+    return out, labels
+
+
+def _values(log: FlightLog) -> np.ndarray:
+    """(n, 10) of COLUMNS, holes held."""
+    return hold_finite(np.column_stack([level_acceleration(log), log.stack(GYRO), log.stack(PWM)]))[0]
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Stretches one after the other, each blended into the next over JOIN_S; one that is too short is left out."""
+    n = round(JOIN_S * RATE_HZ)
+    share = np.linspace(0.0, 1.0, n)[:, None]
+    out = parts[0].copy()
+    for part in parts[1:]:
+        if len(part) > 2 * n:
+            out = np.vstack([out[:-n], out[-n:] * (1.0 - share) + part[:n] * share, part[n:]])
+    return out

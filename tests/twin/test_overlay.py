@@ -1,0 +1,90 @@
+"""Simulated edges over recorded free air: the response is the platform's alone, the background is the recorded one."""
+
+import numpy as np
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation import scenario
+from airtouch.twin import missions, overlay
+from airtouch.twin.course import course
+from twin_courses import PLAIN, made_course
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A scenario with the course at 5 cm."""
+    return missions.one(made_course(1, 0.05), PLAIN)
+
+
+@pytest.fixture(scope="module")
+def laid(scene, vehicle):
+    return overlay.responses(scene, vehicle, 3, seed=4)
+
+
+def test_a_response_is_nothing_before_the_platform_and_something_over_it(laid):
+    """With the same random numbers two flights are the same to the bit until the rotors are near the platform."""
+    for response in laid:
+        entry, leave = (e.sample for e in response.edges)
+        assert [e.kind for e in response.edges] == ["entry", "exit"]
+        np.testing.assert_array_equal(response.values[:5], 0.0)
+        lift = response.values[entry - 10:entry + 30, 2]
+        assert 0.1 < np.abs(lift).max() < 5.0  # m/s^2
+        assert np.abs(response.values[leave + 100:, 2]).max() < np.abs(lift).max()
+        np.testing.assert_array_equal(response.values[-1], 0.0)
+
+
+def test_same_seed_same_responses_and_another_seed_others(scene, vehicle, laid):
+    again, other = overlay.responses(scene, vehicle, 1, seed=4), overlay.responses(scene, vehicle, 1, seed=5)
+    np.testing.assert_array_equal(again[0].values, laid[0].values)
+    assert other[0].values.shape != laid[0].values.shape or np.any(other[0].values != laid[0].values)
+
+
+def test_free_air_holds_no_edge(made):
+    """Of flights whose platform is known: everything but the platform, and all of it recorded."""
+    air = overlay.free_air([log for _, log, _ in made])
+    assert len(air) == len(made)
+    for (_, log, _), part in zip(made, air, strict=True):
+        flown = course(log)
+        assert len(part.start) + len(part.end) < len(log) - (flown.exit - flown.entry)
+        np.testing.assert_array_equal(part.start[-1, 6:], log.stack(overlay.PWM)[flown.entry - 61])
+        np.testing.assert_array_equal(part.hover, part.start[-len(part.hover):])
+
+
+def test_laid_edges_are_where_the_labels_say(made, laid):
+    """Without responses the flight is recorded free air; with them it differs from 0.4 s before the entry on only."""
+    air = overlay.free_air([log for _, log, _ in made])
+    silent = [overlay.Response(np.zeros_like(r.values), r.edges) for r in laid]
+    with_edges, edges = overlay.flights(air, laid, seed=2)
+    without, same = overlay.flights(air, silent, seed=2)
+    assert edges == same and len(edges) >= 2
+    for log, bare, (entry, leave), response in zip(with_edges, without, edges, laid, strict=True):
+        assert leave.sample - entry.sample == response.edges[1].sample - response.edges[0].sample
+        assert leave.sample < len(log)
+        moved = np.flatnonzero((log.stack(overlay.ACC_WORLD) != bare.stack(overlay.ACC_WORLD)).any(axis=1))
+        first = entry.sample - response.edges[0].sample
+        assert first <= moved[0] <= entry.sample and moved[-1] < first + len(response.values)
+        # where two stretches meet it goes on: in level flight nothing jumps
+        mean = bare.stack(overlay.PWM).mean(axis=1)[entry.sample - 40:leave.sample]
+        assert np.abs(np.diff(mean)).max() < 12000.0
+
+
+def test_flights_without_down_range_have_no_free_air(made):
+    log = made[0][1]
+    bare = type(log)({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
+    assert overlay.free_air([bare]) == []
+
+
+def test_a_scenario_without_platform_is_named(vehicle):
+    table = dict(missions.one(made_course(1, 0.05), PLAIN).table)
+    table.pop("platform")
+    with pytest.raises(AirTouchError, match="only 0 of 3 flights"):
+        overlay.responses(scenario.Scenario("bare", "", table), vehicle, 1)
+
+
+def test_logs_of_overlay_flights_train(made, laid):
+    """They have what the detector needs and no down range of their own."""
+    from airtouch.detector.stream.batches import channels_of
+    (log, *_), _ = overlay.flights(overlay.free_air([made[0][1]]), laid[:1], seed=1)
+    assert not log.has("zrange_m")
+    x, airborne = channels_of(log)
+    assert x.shape == (len(log), 12) and airborne.mean() > 0.5
