@@ -185,8 +185,7 @@ def _save(path: Path, state: State, levers: Sequence[Lever], seed: int, flights:
         "levers": [lever.name for lever in levers], "seed": seed, "flights": flights,
         "values": state.values.tolist(), "history": state.history,
         "drawn": [d.tolist() for d in state.drawn],
-        "apart": [[[None if not np.isfinite(v) else round(v, 4) for v in row] for row in a.tolist()]
-                  for a in state.apart]}).encode(), path, force=True)
+        "apart": [[[v if np.isfinite(v) else None for v in row] for row in a.tolist()] for a in state.apart]}).encode(), path, force=True)
 
 
 def _load(path: Path | None, levers: Sequence[Lever], seed: int, flights: int) -> State | None:
