@@ -14,9 +14,11 @@ from airtouch.logs.flight_log import COLUMNS, FlightLog
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from airtouch.detector.registry import Detector
     from airtouch.detector.trace import Trace
     from airtouch.gap.measure import Measurement
     from airtouch.gap.result import Diagnosis
+    from airtouch.simulation.scenario import Scenario
     from airtouch.twin.adapt import Adapted
     from airtouch.vehicle import Vehicle
 
@@ -66,10 +68,10 @@ def from_pandas(table: "DataFrame") -> FlightLog:
     return FlightLog({name: table[name].to_numpy(dtype=float) for name in names}, meta)
 
 
-def detect(flight: "Flight", detector: str = "best", model: str | Path | None = None) -> "Trace":
+def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | Path | None = None) -> "Trace":
     """Edges felt in a flight: `.edges` (sample, kind, probability) and `.probability` (n,) of being over a platform.
 
-    detector: best, paper, paper-stream or baseline; model: a trained file, the shipped one for None.
+    detector: best, paper, paper-stream, baseline or an object like those of `detector.registry.Detector`; model: a trained file, the shipped one for None.
     """
     from airtouch.detector import evaluate as scoring
     from airtouch.detector import registry
@@ -80,7 +82,7 @@ def detect(flight: "Flight", detector: str = "best", model: str | Path | None = 
     return chosen.run(log, chosen.model_for(trained, log) if hasattr(chosen, "model_for") else trained)
 
 
-def evaluate(flights: "Flight | Iterable[Flight]", detector: str = "best", *, speed_mps: float | None = None,
+def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = "best", *, speed_mps: float | None = None,
              model: str | Path | None = None) -> dict[str, Any]:
     """Score a detector on flights with known edges: the content of `airtouch evaluate --json`.
 
@@ -101,10 +103,11 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: str = "best", *, sp
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
         file = FlightFile(Path(log.source), Condition(speed_mps=speed))
         scores.append(scoring.evaluate_flight(file, log, chosen, trained).score)
-    return scoring.as_json(detector, scores, left_out, chosen.lag_s(trained), chosen.parameters(trained))
+    name = detector if isinstance(detector, str) else getattr(detector, "__name__", type(detector).__name__)
+    return scoring.as_json(name, scores, left_out, chosen.lag_s(trained), chosen.parameters(trained))
 
 
-def simulate(scenario: str | Path, flights: int = 1, *, vehicle: "Vehicle | str | Path | None" = None,
+def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "Vehicle | str | Path | None" = None,
              effects: Mapping[str, Mapping[str, float]] | Sequence[tuple[str, Mapping[str, float]]] = (),
              without: Sequence[str] = (), seed: int = 0) -> list[FlightLog]:
     """Fly a scenario and return the logs; effects: {name: {parameter: value}} to switch on. Raises AirTouchError.

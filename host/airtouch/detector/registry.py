@@ -40,8 +40,10 @@ class Detector(Protocol):
         """What a report prints: plain numbers and text."""
 
 
-def get(name: str) -> Detector:
-    """The module of a detector; AirTouchError that lists the known ones."""
+def get(name: str | Detector) -> Detector:
+    """The module of a detector, or the detector itself; AirTouchError that lists the known ones."""
+    if not isinstance(name, str):
+        return name
     if name not in DETECTORS:
         raise AirTouchError(f"no detector {name!r}; known: {', '.join(DETECTORS)}")
     return importlib.import_module(DETECTORS[name])

@@ -1,0 +1,56 @@
+"""The notebooks of host/docs/notebooks run from first cell to last, and print what their text promises."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+nbformat = pytest.importorskip("nbformat", reason="could not import nbformat: pip install 'airtouch[test]'")
+nbclient = pytest.importorskip("nbclient", reason="could not import nbclient: pip install 'airtouch[test]'")
+pytest.importorskip("ipykernel", reason="could not import ipykernel: pip install 'airtouch[test]'")
+
+FOLDER = Path(__file__).resolve().parents[1] / "host" / "docs" / "notebooks"
+NAMES = ("first-flight", "own-detector", "diagnose-a-gap", "add-an-effect")
+
+
+def printed(name, tmp_path):
+    """What the cells of a notebook print, executed in a kernel of this Python."""
+    book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
+    nbformat.validate(book)
+    nbclient.NotebookClient(book, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()
+    return "".join(out.get("text", "") for cell in book.cells if cell.cell_type == "code" for out in cell.outputs)
+
+
+def test_every_notebook_is_run_and_stored_without_outputs():
+    assert {path.stem for path in FOLDER.glob("*.ipynb")} == set(NAMES)
+    for name in NAMES:
+        cells = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4).cells
+        assert all(not cell.outputs and cell.execution_count is None for cell in cells if cell.cell_type == "code")
+
+
+def test_the_first_flight_is_felt(tmp_path):
+    said = printed("first-flight", tmp_path)
+    assert "entry declared" in said and "exit  declared" in said
+    missed, edges = map(int, re.search(r"missed (\d+) of (\d+)", said).groups())
+    assert edges == 6 and missed <= 1
+
+
+def test_a_detector_of_ones_own_is_scored_beside_the_others(tmp_path):
+    rows = dict(re.findall(r"^(.+?) *: missed (\d+) of 12", printed("own-detector", tmp_path), re.M))
+    assert set(rows) == {"roll power", "best", "baseline"}
+    assert int(rows["best"]) <= 3 and int(rows["roll power"]) <= 9
+
+
+def test_the_gap_is_diagnosed(tmp_path):
+    from airtouch.gap import example
+
+    said = printed("diagnose-a-gap", tmp_path)
+    assert "times the floor" in said
+    assert f"\neffect\n{next(iter(example.answer()))} " in said
+
+
+def test_an_effect_is_added_and_its_typo_told(tmp_path):
+    said = printed("add-an-effect", tmp_path)
+    without, effect = map(float, re.search(r"([\d.]+) without, ([\d.]+) with", said).groups())
+    assert without == pytest.approx(1.0, abs=0.12) and effect == pytest.approx(1.4, abs=0.15)
+    assert "no plant field 'giro_scale'; did you mean gyro_scale" in said
