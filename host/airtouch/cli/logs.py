@@ -16,6 +16,7 @@ from airtouch.errors import AirTouchError, shown
 from airtouch.logs.rosbag import is_bag
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
+RERUN = ".rrd"  #: written, never read
 FOREIGN = (".ulg",)  #: read in folders as well
 FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
 #: what the table calls a group of channels -> the column that tells whether it is there
@@ -82,7 +83,7 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
 @FILES
 @click.option("--out", required=True, type=click.Path(),
               help="Folder for the converted files; made when missing.")
-@click.option("--format", "ending", type=click.Choice([e[1:] for e in ENDINGS]), default="csv.gz",
+@click.option("--format", "ending", type=click.Choice([e[1:] for e in (*ENDINGS, RERUN)]), default="csv.gz",
               show_default=True, help="Kind of file to write.")
 @click.option("--columns", "mapping", type=click.Path(), metavar="MAP.toml",
               help="Read CSVs of someone else's by this file, which says which of their columns is which of ours.")
@@ -100,11 +101,14 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     Example:
       airtouch logs convert log00 log01 --out converted --rate 100
     """
-    from airtouch.logs import canonical, mapped
+    from airtouch.extras import need
+    from airtouch.logs import canonical, mapped, rerun_file
     from airtouch.logs.files import write_bytes
 
     if plain and ending != "csv":
         raise AirTouchError("--plain is for --format csv")
+    if ending == RERUN[1:]:
+        need("rerun", "writing Rerun recordings")
     if mapping:
         mapped.load(mapping)
     folder = Path(out)
@@ -124,6 +128,8 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
         log = log if rate is None else logs.resample(log, rate)
         if plain:
             write_bytes(canonical.plain_csv(log), target, force)
+        elif ending == RERUN[1:]:
+            write_bytes(rerun_file.recording(log), target, force)
         else:
             logs.write(log, target, force)
         written.add(target)
