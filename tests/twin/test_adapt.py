@@ -77,6 +77,8 @@ def test_flights_without_down_range_are_used_by_pseudo_labels(made, quick, tmp_p
     found = adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None))
     assert not found.held_out  # two labelled flights are too few
     assert [label is None for label in seen[-1][:5]] == [True, True, False, False, False]
+    adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None), withhold=True)
+    assert [label is None for label in seen[-1][:5]] == [False] * 5
     assert found.model.metadata["adapted"]["pseudo_labelled"] == 3
 
 

@@ -28,10 +28,12 @@ MORE = 5  #: flights that the outlook is given for
               help="Commanded speed over the platform; else the manifest's, else from the logs.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
+@click.option("--withhold-range", is_flag=True,
+              help="Take no labels from the flights in the last stage: what unlabelled flights bring.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, origin: str, speed: float | None,
-            folds: tuple[int, ...], hold_out: bool, seed: int, force: bool) -> None:
+            folds: tuple[int, ...], hold_out: bool, withhold_range: bool, seed: int, force: bool) -> None:
     """Train a detector for the drone that flew FLIGHTS: logs, or folders (the clean flights of a manifest.csv).
 
     \b
@@ -64,8 +66,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; {where}")
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     with Stages() as stages:
-        found = adapt.adapt(usable, scene, craft, work, start=start, seed=seed, hold_out=hold_out, progress=stages,
-                            command=typed)
+        found = adapt.adapt(usable, scene, craft, work, start=start, seed=seed, hold_out=hold_out,
+                            withhold=withhold_range, progress=stages, command=typed)
     found.model.save(out, force)
     _say(found, adapt, summary, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")

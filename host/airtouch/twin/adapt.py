@@ -71,12 +71,13 @@ class Adapted:
 
 
 def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,
-          start: StreamModel | None, seed: int = 0, hold_out: bool = True, progress: Progress | None = None,
-          command: str = "airtouch adapt") -> Adapted:
+          start: StreamModel | None, seed: int = 0, hold_out: bool = True, withhold: bool = False,
+          progress: Progress | None = None, command: str = "airtouch adapt") -> Adapted:
     """A detector from flights and their twin. Same arguments, same bits.
 
     start: weights to go on from, None for none. work: a folder in which each finished stage is kept, so that the
-    same call goes on after a stop. twin_only: all labelled flights scored by the detector that has seen the twin only.
+    same call goes on after a stop. withhold: the last stage takes all flights as if they had no down range, to measure what
+    unlabelled ones bring. twin_only: all labelled flights scored by the detector that has seen the twin only.
     Raises AirTouchError where nothing crosses an edge.
     """
     work.mkdir(parents=True, exist_ok=True)
@@ -91,8 +92,12 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     held, half = [], []
     if hold_out and len(labelled) >= FEWEST:
         held, half = _hold_out(flights, labelled, flown, twin, work, key, seed, progress, command)
-    model = _model(work / f"all_{key}.npz", lambda: tune(twin, flights, flown, seed, _named(progress, "all flights"), command))
-    known = {"twin": what, "labelled": len(labelled), "pseudo_labelled": len(flights) - len(labelled)}
+    last = [_without_range(f) for f in flights] if withhold else flights
+    name = "unlabelled" if withhold else "all"
+    model = _model(work / f"{name}_{key}.npz",
+                   lambda: tune(twin, last, flown, seed, _named(progress, "all flights"), command))
+    own = sum(f.labelled for f in last)
+    known = {"twin": what, "labelled": own, "pseudo_labelled": len(flights) - own}
     return Adapted(replace(model, metadata={**model.metadata, "adapted": known}), held, half, twin_only)
 
 
@@ -156,6 +161,12 @@ def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] 
     exponent = float(np.clip(np.log2(before / now), 0.0, 1.0))
     return {"now_m": now, "half_m": before, "then_m": now * ((labelled + more) / labelled) ** -exponent,
             "exponent": exponent}
+
+
+def _without_range(flight: Flight) -> Flight:
+    """The flight as logged without a down range."""
+    log = flight.log
+    return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
 
 def _model(path: Path, make: Callable[[], StreamModel]) -> StreamModel:
