@@ -38,7 +38,8 @@ INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/ke
             "gap8/kernels", "gap8/model", "gap8/app/src"]
 XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
 VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
-# Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay says it.
+# Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
+# says it.
 OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
            "ASAN_OPTIONS": "quarantine_size_mb=2:thread_local_quarantine_size_kb=64:malloc_context_size=0"}
 LONG = ("-O2",)  # of runs in which the inputs cost more than the compiler: a third less for those of a network
@@ -124,7 +125,7 @@ def _compile(made_by: Engine, source: Path, flags: tuple[str, ...]) -> Path:
     target = BUILD / "objects" / f"{source.stem}-{hashlib.sha256(content).hexdigest()[:16]}.o"
     if not target.exists():
         target.parent.mkdir(parents=True, exist_ok=True)
-        part = target.with_suffix(f".{os.getpid()}-{threading.get_ident()}")  # two threads may make the same one
+        part = target.with_suffix(f".{os.getpid()}-{threading.get_ident()}")  # two threads may make one
         done = subprocess.run([*command, "-c", source, "-o", part], capture_output=True, text=True)
         if done.returncode:
             raise SystemExit(f"{source}:\n{done.stderr}")

@@ -4,9 +4,9 @@
     python tools/repeat.py tests/sitl --times 200
     nice -n 10 python tools/repeat.py tests/crazyflie/test_log_blocks.py -k refuses
 
-Best on a machine that is busy with other work. Each test is repeated before the next one begins; fixtures of a module or
-of the session are made once. Prints for each test how often it passed and failed; what the failures printed is kept in
-build/repeat. Exit code 1 when anything failed.
+Best on a machine that is busy with other work. Each test is repeated before the next one begins; fixtures of a module
+or of the session are made once. Prints for each test how often it passed and failed; what the failures printed is kept
+in build/repeat. Exit code 1 when anything failed.
 """
 
 import argparse
@@ -37,7 +37,8 @@ class Repeat:
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
         metafunc.fixturenames.append("repeated")
-        metafunc.parametrize("repeated", range(self.times), indirect=True, ids=[f"again{i}" for i in range(self.times)])
+        names = [f"again{i}" for i in range(self.times)]
+        metafunc.parametrize("repeated", range(self.times), indirect=True, ids=names)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         name = re.sub(r"-?again\d+", "", report.nodeid).replace("[]", "")
@@ -65,7 +66,7 @@ def concurrent_tests() -> list[str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tests", nargs="*", help="files or folders; by default those that use threads, sockets or processes")
+    parser.add_argument("tests", nargs="*", help="files or folders; by default those of threads, sockets, processes")
     parser.add_argument("--times", type=int, default=50, help="repetitions of each test (50)")
     parser.add_argument("-k", default="", help="only tests that match, as pytest's -k")
     wanted = parser.parse_args()
