@@ -23,7 +23,7 @@ def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind") / "set"
     patch = pytest.MonkeyPatch()
     patch.setattr(blind, "strengths", lambda *_: CLEAR)
-    found = blind_run.run(folder, 10, seed=3, workers=2, unknown=1)
+    found = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
     patch.undo()
     return folder, found
 
