@@ -133,6 +133,7 @@ def test_bias_of_the_down_range_moves_the_platform(made):
         shown = true - 0.03 * np.exp(-true / 0.03) - 0.02 * np.exp(-missions.SETTLED_S / 0.2)
         assert max(shown, 0.0) == pytest.approx(reading, abs=2e-3)
         assert missions.true_distance(reading, {}) == reading
+        assert missions.true_distance(reading, {**bias, "near": {"low": -0.04, "high": -0.02}}) == pytest.approx(true)
     planned = made[0][0]
     plain, moved = missions.drawn(planned), missions.drawn(planned, {"range_bias": bias})
     assert plain["top"] == pytest.approx(planned.before_m - planned.entered_m)

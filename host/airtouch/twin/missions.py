@@ -47,8 +47,12 @@ def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: fl
     return {name: round(float(value), 4) for name, value in values.items()}
 
 
-def true_distance(reading_m: float, bias: Mapping[str, float]) -> float:
-    """The distance that a down range reading just after an entry stands for, m, with the effect `range_bias`."""
+def true_distance(reading_m: float, bias: Mapping[str, Any]) -> float:
+    """The distance that a down range reading just after an entry stands for, m, with the effect `range_bias`.
+
+    Of a parameter that each flight draws from a range, the middle counts.
+    """
+    bias = {name: 0.5 * (v["low"] + v["high"]) if isinstance(v, Mapping) else v for name, v in bias.items()}
     values = registry.get("range_bias").values(bias) if bias else dict.fromkeys(("near", "dip"), 0.0)
     if not values["near"] and not values["dip"]:
         return reading_m
