@@ -28,6 +28,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.blind import alike
 from airtouch.gap.blind_score import wilson
 from airtouch.gap.diagnose import diagnose
+from airtouch.gap.result import Diagnosis
 from airtouch.logs import read
 from gap_authors import questions
 from gap_peers import NAMES
@@ -114,6 +115,7 @@ def _wanted(part: str, build: bool) -> bool:
     return part == "all" or build == (part == "build")
 
 
+_LAST: dict[tuple[str, tuple[str, ...]], Diagnosis] = {}  #: of this process, whose calibration serves the next case alike
 ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "peers": peers}
 
 
@@ -123,9 +125,12 @@ def answered(case: Case) -> dict:
     out = {"row": case.row, "truth": case.truth, "condition": case.condition, "flight": Path(case.flight).name,
            "baseline": len(case.baseline), "effects": []}
     try:
-        told = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline])
+        told = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
+                        before=_LAST.get((case.vehicle, case.baseline)))
     except AirTouchError as error:
         return {**out, "verdict": "refused", "why": str(error)}
+    _LAST.clear()
+    _LAST[case.vehicle, case.baseline] = told
     found = told.plain()
     return {**out, "verdict": told.verdict, "effects": found["effects"], "gap": told.gap,
             "ranking": {r.name: round(r.probability, 4) for r in told.ranking[:6]},
@@ -194,7 +199,7 @@ def main(arguments: list[str] | None = None) -> int:
     done = {}
     if args.keep and args.keep.exists():
         done = {c["flight"]: c for c in map(json.loads, args.keep.read_text().splitlines())}
-    todo = [c for c in cases if Path(c.flight).name not in done]
+    todo = sorted((c for c in cases if Path(c.flight).name not in done), key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(args.jobs, 1)) as pool:
         for i, case in enumerate(pool.map(answered, todo)):
             done[case["flight"]] = case

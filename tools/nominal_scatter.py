@@ -2,8 +2,9 @@
 
     python tools/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]
 
-Every nominal flight is held against up to five others of its vehicle, day and condition, on which the vehicle is
-calibrated. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20; simulated flights of this project.
+Every nominal flight is held twice against up to five others of its vehicle, on which the vehicle is calibrated: of its
+own group (drone, day and condition) and of other groups of the same drone. Strengths of both count, rates of the first
+alone. Authors' flights of folds 0 to 2; neural-swarm's days 19 and 20; simulated flights of this project.
 With --keep, flights that the file holds already are not worked on again.
 """
 
@@ -17,11 +18,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap import blind, calibrate, measure, nominal_scatter
 from airtouch.gap.data import Data
+from airtouch.gap.flight import Flight
 from airtouch.gap.nominal_scatter import Apparent, Scatter, measured
 from airtouch.gap.select import apparent
 from airtouch.logs import read
@@ -34,27 +37,27 @@ SIMULATED = 4  #: groups of simulated flights
 Log = tuple[str, Callable[[], FlightLog]]
 
 
-def groups(folder: Path) -> Iterator[tuple[str, str, Vehicle, list[Log]]]:
-    """Class, group, vehicle and nominal flights, each a name and a way to its log, that belong together."""
+def groups(folder: Path) -> Iterator[tuple[str, str, str, Vehicle, list[Log]]]:
+    """Class, drone, group, vehicle and nominal flights, each a name and a way to its log, that belong together."""
     made = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in ("0", "1", "2"):
             made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(_read(folder / "airtouch" / r["file"]))
     flown = vehicles.load("crazyflie-2.1-flow")
     for key, files in made.items():
-        yield "crazyflie, flow deck, radio log", " ".join(key), flown, files
+        yield "crazyflie, flow deck, radio log", "the authors'", " ".join(key), flown, files
     swarm = folder / "neuralswarm"
     made = defaultdict(list)
     for name in ("baselines.csv", "manifest.csv"):
         for r in csv.DictReader((swarm / name).open()):
             if r["day"] in ("19", "20") and r.get("truth", "none") == "none":
-                made[r["group"], r["vehicle"]].append(_read(swarm / "flights" / r["file"]))
-    for (group, of), files in made.items():
-        yield f"motion capture, uSD log, {of}", group, vehicles.load(swarm / f"{of}.toml"), files
+                made[r["cf"], r["group"], r["vehicle"]].append(_read(swarm / "flights" / r["file"]))
+    for (drone, group, of), files in made.items():
+        yield f"motion capture, uSD log, {of}", drone, group, vehicles.load(swarm / f"{of}.toml"), files
     flown = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
         logs = blind.nominal(flown, blind.CAL_FIRST, blind.CAL, seed)
-        yield nominal_scatter.SIMULATED, f"seed {seed}", flown, [(f"simulated {seed} {i}", lambda log=log: log)
+        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, [(f"simulated {seed} {i}", lambda log=log: log)
                                                    for i, log in enumerate(logs)]
 
 
@@ -62,14 +65,24 @@ def _read(path: Path) -> Log:
     return path.name, lambda: read(path)
 
 
-def held_out(logs: list[Log], flown: Vehicle) -> Iterator[tuple[str, Apparent]]:
-    """Each flight against others of its group."""
-    ready = list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], flown, []), strict=True))
+def held_out(logs: list[Log], flown: Vehicle, others: list[Log] | None = None) -> Iterator[tuple[str, Apparent]]:
+    """Each flight against others of its group, or against those given."""
+    ready = _ready(logs, flown)
+    if others is not None:
+        study, _ = calibrate.calibrated(flown, _some([f for _, f in _ready(_some(others), flown)]), scatter=False)
     for i, (name, flight) in enumerate(ready):
-        others = [f for k, (_, f) in enumerate(ready) if k != i]
-        chosen = [others[k] for k in np.unique(np.linspace(0, len(others) - 1, MOST).astype(int))]
-        study, _ = calibrate.calibrated(flown, chosen, scatter=False)
+        if others is None:
+            study, _ = calibrate.calibrated(flown, _some([f for k, (_, f) in enumerate(ready) if k != i]), scatter=False)
         yield name, apparent(Data(study, [flight]))
+
+
+def _ready(logs: list[Log], flown: Vehicle) -> list[tuple[str, Flight]]:
+    return list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], flown, []), strict=True))
+
+
+def _some(items: list) -> list:
+    """At most MOST of them, evenly chosen."""
+    return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, MOST).astype(int))]
 
 
 def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
@@ -79,7 +92,8 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     for name, s in classes.items():
         lines += [f'["{name}"]  # {counts[name]}', *([f'vehicle = "{s.vehicle}"'] if s.vehicle else []),
                   f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
-                  f"root_passing_rate = [{s.passing_rate[0]:.3f}, {s.passing_rate[1]:.3f}]", f'["{name}".rms]']
+                  f'["{name}".root_passing_rates]']
+        lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing_rates.items()] + [f'["{name}".rms]']
         lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.rms.items()]
         lines.append("")
     return "\n".join(lines)
@@ -95,26 +109,29 @@ def main() -> None:
     done = {}
     if args.keep and args.keep.exists():
         done = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
-    cases, groups_of, flown_by = defaultdict(list), defaultdict(set), {}
-    for of, group, flown, files in groups(args.flights):
-        if len(files) < LEAST:
-            continue
+    every = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
+    cases, alike, groups_of, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
+    for of, drone, group, flown, files in every:
         groups_of[of].add(group)
         flown_by[of] = "" if of == nominal_scatter.SIMULATED else flown.name
-        if any(name not in done for name, _ in files):
-            for name, one in held_out(files, flown):
-                done[name] = {"file": name, "rate": one.rate, "passing_rate": one.passing_rate,
-                                   "strengths": {k: v.tolist() for k, v in one.strengths.items()},
-                              "errors": {k: v.tolist() for k, v in one.errors.items()}}
-                if args.keep:
-                    with args.keep.open("a") as out:
-                        out.write(json.dumps(done[name]) + "\n")
-                print(f"{of}: {name}: {one.rate:.2f} nats a second", file=sys.stderr, flush=True)
-        for row in (done[name] for name, _ in files):
-            cases[of].append(Apparent(*({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors")),
-                                      row["rate"], row["passing_rate"]))
-    classes = {of: replace(measured(flights), vehicle=flown_by[of]) for of, flights in cases.items()}
-    counts = {of: f"{len(flights)} flights in {len(groups_of[of])} groups" for of, flights in cases.items()}
+        rest = [f for _, same, other, _, some in every if same == drone and other != group for f in some]
+        for note, others in [("", None), *([(", other groups", rest)] if len(rest) > 1 else [])]:
+            if any(name + note not in done for name, _ in files):
+                for name, one in held_out(files, flown, others):
+                    done[name + note] = {"file": name + note, "rate": one.rate, "passing_rates": one.passing_rates,
+                                         "strengths": {k: v.tolist() for k, v in one.strengths.items()},
+                                         "errors": {k: v.tolist() for k, v in one.errors.items()}}
+                    if args.keep:
+                        with args.keep.open("a") as out:
+                            out.write(json.dumps(done[name + note]) + "\n")
+                    print(f"{of}: {name}{note}: {one.rate:.2f} nats a second", file=sys.stderr, flush=True)
+            for row in (done[name + note] for name, _ in files):
+                parts = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
+                cases[of].append(Apparent(*parts, row["rate"], row["passing_rates"]))
+                if others is None:
+                    alike[of].append(cases[of][-1])
+    classes = {of: replace(measured(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
+    counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups" for of, flights in cases.items()}
     new = args.out.with_suffix(".new")
     new.write_text(text_of(classes, counts))
     new.rename(args.out)

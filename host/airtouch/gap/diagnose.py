@@ -26,7 +26,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
-AT_FLOOR = 1.0  #: gap, of which no effect is named, that is at its floor
+AT_FLOOR = 1.0  #: gap that is at its floor
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as nobody "
@@ -36,14 +36,15 @@ WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bia
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
              progress: Callable[[str], None] | None = None, without: Iterable[str] = (),
-             pictures: bool = False) -> Diagnosis:
+             pictures: bool = False, before: Diagnosis | None = None) -> Diagnosis:
     """Name the unmodelled effect that the flights have in common and how much of the gap it is.
 
     flights: one or more; what they share is looked for. baseline: flights declared free of
     unmodelled effects, on which the vehicle is calibrated and the floor is measured; without
     them the floor is the sensors' declared noise and the twin view is left out. without:
-    names of effects to leave out. pictures: whether to keep the curves that a report shows. Raises
-    AirTouchError when no flight can be used.
+    names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
+    diagnosis with the same vehicle and baseline, whose calibration is used again. Raises AirTouchError
+    when no flight can be used.
     """
     say = progress or (lambda _: None)
     left_out: list[str] = []
@@ -54,7 +55,10 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if balance_result.applies(seen, nominal, vehicle):
         return balance_result.diagnosis(seen, nominal, vehicle, left_out, without, pictures)
     say("calibration")
-    study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
+    if before is not None and before.held is not None:
+        study, fitted = before.held
+    else:
+        study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = _data(study, some)
     found = select(data, candidates.every(without), say, tuple(without))
@@ -118,9 +122,16 @@ def _some(flights: Sequence[Flight]) -> list[Flight]:
 
 
 def _verdict(found: Selection, before: float) -> str:
-    """before: the gap over its floor; what does not stand over it is nothing, whatever small differences add up to."""
+    """before: the gap over its floor; what does not stand over it is nothing, whatever small differences add up to.
+
+    What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
+    in both halves of the data, in whose common part the gap is measured.
+    """
+    apart = found.chosen is not None and any(t.kind == CLOCK or t.gate for t in found.chosen.terms)
+    if before <= AT_FLOOR and not apart:
+        return "none"
     if not found.explained:
-        return "unknown" if before > AT_FLOOR or found.chosen is not None else "none"
+        return "unknown"
     return "none" if found.chosen is None else "effect"
 
 
@@ -202,7 +213,7 @@ def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink, str, l
     verdict = _verdict(found, overall.before)
     effects = _effects(data, found) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
-    chance = agreeing(probabilities(found, found.chosen is None and overall.before <= AT_FLOOR), answer)
+    chance = agreeing(probabilities(found, verdict == "none"), answer)
     out = []
     for name, p in chance.items():
         one = found.singles.get(name)

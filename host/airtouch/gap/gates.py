@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scipy.signal import butter, sosfiltfilt
+
 from airtouch.gap import candidates
 from airtouch.gap.candidates import Term
+from airtouch.gap.channels import residual
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over
 from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.problem import Part, problem_of, whole_of
+from airtouch.gap.problem import Part, Problem, problem_of, whole_of
 from airtouch.gap.spectra import AIR, LENGTH
 
 MOST_STRETCHES = 4  #: of one flight
@@ -24,7 +27,11 @@ WORST = 0.25  #: share of the blocks that are explained worst
 ROUNDS = 3
 LEAST_BLOCKS = 6  #: in the air
 STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
+PIECE_S = 0.16  #: of the force along the thrust, in which bursts are looked for
+LIVELY_HZ = 1.0  #: above which they are
+LIVELY, DEGREES = 6.0, 3.0  #: power of a burst over the flight's median; independent values in a piece
 Gate = tuple[tuple[str, float, float], ...]
+Found = tuple[Sequence[Term], Gate, float]  #: an effect, when it acts, and what the choice of that costs
 WHOLE = 0.9  #: of a flight's blocks: what acts there does not come and go
 
 
@@ -38,24 +45,39 @@ class Gated:
     cost: float
 
 
-def best_gated(data: Data, without: Sequence[str] = ()) -> Gated | None:
-    """The effect that explains most by acting in some stretches only; None where none gains anything."""
-    judged = [j for name, variants in candidates.gated(without).items() for v in variants
-              if (j := _judged(data, name, v)) is not None]
-    return max(judged, key=lambda j: j.gain, default=None)
+def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
+    """Effects that may come and go, each in the stretches in which it explains most; those that never act are left out."""
+    found = {name: [j for v in variants for j in _judged(data, name, v)]
+             for name, variants in candidates.gated(without).items()}
+    return {name: max(judged, key=lambda j: j.gain) for name, judged in found.items() if judged}
 
 
-def _judged(data: Data, name: str, terms: Sequence[Term]) -> Gated | None:
+def _judged(data: Data, name: str, terms: Sequence[Term]) -> list[Gated]:
+    """An effect in the stretches that blocks show, and in those that bursts of the force along the thrust show."""
     whole = whole_of(data)
     problem = problem_of(data, whole)
     off = _each(data, whole, ())
+    if len(off) < LEAST_BLOCKS:
+        return []
+    out = []
+    for found in (_by_blocks(data, whole, problem, off, terms), _by_bursts(data, terms)):
+        if found is None:
+            continue
+        values, gate, cost = found
+        acting = [replace(t, gate=gate) for t in values]
+        fitted = fit(data, whole, acting)
+        free = sum(len(t.free) for t in acting)
+        gained = judge(data, whole, fitted.terms) - judge(data, whole, ()) - cost - 0.5 * free * np.log(len(off))
+        out.append(Gated(name, fitted, gained, cost))
+    return out
+
+
+def _by_blocks(data: Data, whole: Part, problem: Problem, off: np.ndarray, terms: Sequence[Term]) -> Found | None:
+    """An effect fitted, the stretches of blocks (off: their log likelihood without it) where it acts, and their price."""
     blocks = len(off)
-    if blocks < LEAST_BLOCKS:
-        return None
     count = np.maximum(np.bincount(problem.block[problem.block >= 0], minlength=blocks), 1)
     on = np.zeros(blocks, bool)
     on[np.argsort(off / count)[:max(int(WORST * blocks), 2)]] = True
-    fitted, cost = None, 0.0
     for _ in range(ROUNDS):
         fitted = fit(data, _part(whole, on), terms)
         gain = _each(data, whole, fitted.terms) - off
@@ -65,18 +87,44 @@ def _judged(data: Data, name: str, terms: Sequence[Term]) -> Gated | None:
             chosen[first:last + 1] = True
         if not stretches or chosen.mean() > WHOLE:
             return None
-        cost = 2.0 * np.log(blocks) * len(stretches)
         if (chosen == on).all():
             break
         on = chosen
     gate = tuple((data.flights[problem.piece[a]].name, *_seconds(data, problem, a, b)) for a, b in stretches)
-    gate = _sharpened(data, whole, fitted.terms, gate)
-    gated = [replace(t, gate=gate) for t in fitted.terms]
-    refitted = fit(data, whole, gated, fitted.scaled if len(fitted.scaled) else None)
-    free = sum(len(t.free) for t in gated)
-    gained = judge(data, whole, refitted.terms) - judge(data, whole, ()) - cost
-    gained -= 0.5 * free * np.log(blocks)
-    return Gated(name, refitted, gained, cost)
+    return fitted.terms, _sharpened(data, whole, fitted.terms, gate), 2.0 * np.log(blocks) * len(stretches)
+
+
+def _by_bursts(data: Data, terms: Sequence[Term]) -> Found | None:
+    """The same for stretches in which the force along the thrust is far more lively than in the rest of the flight.
+
+    A wake that is flown through lasts shorter than a block. A piece of PIECE_S counts the log likelihood of a power
+    that is LIVELY times the flight's median over that of the median (chi-square of DEGREES), as if it were no more.
+    """
+    gate, price = [], 0.0
+    for flight in data.flights:
+        left = np.nan_to_num(residual(flight, data.study.vehicle, data.study.calibration)[:, 2])
+        left[flight.on_ground | flight.lost] = 0.0
+        size = int(PIECE_S / PERIOD_S)
+        pieces = _highpassed(left)[:len(left) // size * size].reshape(-1, size)
+        power = (pieces ** 2).mean(axis=1)
+        known = power > 0.0
+        if known.sum() < 2 * LEAST_BLOCKS:
+            continue
+        over = np.minimum(power / np.median(power[known]), LIVELY)
+        gain = np.where(known, 0.5 * DEGREES * (over * (1.0 - 1.0 / LIVELY) - np.log(LIVELY)), -np.inf)
+        each = 2.0 * np.log(known.sum())
+        stretches = _stretches(gain, np.zeros(len(gain), int), each)
+        gate += [(flight.name, a * PIECE_S, (b + 1) * PIECE_S) for a, b in stretches]
+        price += each * len(stretches)
+    seconds = sum(end - begin for _, begin, end in gate)
+    if not gate or seconds > WHOLE * sum(len(f) for f in data.flights) * PERIOD_S:
+        return None
+    return terms, tuple(gate), price
+
+
+def _highpassed(values: np.ndarray) -> np.ndarray:
+    """Values (n,) freed of what is slower than LIVELY_HZ."""
+    return sosfiltfilt(butter(2, LIVELY_HZ * 2.0 * PERIOD_S, "highpass", output="sos"), values)
 
 
 def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:

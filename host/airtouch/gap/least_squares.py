@@ -69,6 +69,7 @@ def bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarra
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
             inside = where[where < n]
+            covariance = np.diag(1.0 / np.maximum(np.diag(normal)[:n], 1e-300))  # of those at a bound: all else known
             covariance[np.ix_(inside, inside)] = full[:len(inside), :len(inside)]
             break
         free &= ~stuck

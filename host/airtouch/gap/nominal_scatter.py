@@ -13,7 +13,7 @@ which class it is they tell by themselves. `tools/nominal_scatter.py` makes the 
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 
@@ -24,11 +24,12 @@ MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
 WORTH = 4.0  #: flights that a class of the table counts as at most, beside the baseline's own
+POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them
 NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
 RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
 RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
 SIMULATED = "simulated"  #: the class of flights of this project's simulator
-GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the likeliest is taken
+GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the posterior's median is taken
 
 
 @dataclass(frozen=True)
@@ -36,37 +37,39 @@ class Apparent:
     """One nominal flight held against others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
-    chance; rate: nats a second that a model without names gains; passing: that the best effect does that comes and goes.
+    chance; rate: nats a second that a model without names gains; passing_rates: that each effect does that comes and goes.
     """
 
     strengths: Mapping[str, np.ndarray]
     errors: Mapping[str, np.ndarray]
     rate: float
-    passing_rate: float = 0.0
+    passing_rates: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate, passing_rate: mean and standard deviation of the square root of each. vehicle: whose recorded flights a class
+    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose recorded flights a class
     of the table was measured on.
     """
 
     rms: Mapping[str, np.ndarray]
     freedom: float
     rate: tuple[float, float]
-    passing_rate: tuple[float, float] = (0.0, 0.0)
+    passing_rates: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     vehicle: str = ""
 
     def evidence(self, name: str, strength: np.ndarray) -> float:
         """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
 
-        Student's density with `freedom`, of what remains after each further parameter has paid for itself.
+        Student's density with `freedom`, of what remains after each further parameter has paid for itself. A parameter
+        that the table does not know yet scatters as the widest of its effect's others.
         """
         rms = self.rms.get(name)
         if rms is None or not len(strength):
             return math.inf
+        rms = np.append(rms, np.full(max(len(strength) - len(rms), 0), rms.max()))[:len(strength)]
         far = float(np.sum((strength / rms) ** 2)) - max(np.count_nonzero(strength) - 1, 0)
         return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
 
@@ -77,9 +80,9 @@ class Scatter:
         """
         return self._usual(self.rate, seconds, least)
 
-    def passing(self, seconds: float, least: float) -> float:
+    def passing(self, name: str, seconds: float, least: float) -> float:
         """The same of an effect that comes and goes."""
-        return self._usual(self.passing_rate, seconds, least)
+        return self._usual(self.passing_rates.get(name, (0.0, 0.0)), seconds, least)
 
     def _usual(self, rate: tuple[float, float], seconds: float, least: float) -> float:
         sure = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
@@ -91,12 +94,12 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
 
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
-    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs, and one
-    that was measured on the vehicle of this name is.
+    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
+    that was measured on the vehicle of this name leaves no room for other vehicles'.
     """
     classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
-    if recorded and any(c.vehicle == vehicle for c in classes.values()):
-        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle}
+    if vehicle and any(c.vehicle == vehicle for c in classes.values()):
+        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle or name == SIMULATED}
     n = len(baseline)
     wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
     known = baseline if n > 1 else ()
@@ -109,11 +112,12 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
         scale = math.sqrt(wide)
-        own_rms = [_likeliest(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p, worth)
+        own_rms = [_median(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p, worth)
                    for k, p in enumerate(prior)] if rows else prior
-        rms[name] = np.maximum(own_rms, least)
-    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth),
-                   _rate(own.passing_rate, [f.passing_rate for f in known], worth))
+        never = rows and not any(f.errors[name].any() or f.strengths[name].any() for f in rows)
+        rms[name] = np.maximum(own_rms, np.maximum(prior, least) if never else least)  # losses come and go by the day
+    passing = {n: _rate(r, [f.passing_rates.get(n, 0.0) for f in known], worth) for n, r in own.passing_rates.items()}
+    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing)
 
 
 def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
@@ -121,15 +125,17 @@ def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.nda
     return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
 
 
-def _likeliest(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> float:
-    """Standard deviation of highest posterior for values (n,) that chance alone scatters by `error` (n,).
+def _median(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> float:
+    """Posterior median of the standard deviation of values (n,) that chance alone scatters by `error` (n,).
 
-    The variance's prior is scaled inverse chi-square of `worth` degrees of freedom; none where worth is 0.
+    The variance's prior is scaled inverse chi-square of `worth` degrees of freedom; where worth is 0 every order of
+    magnitude of GRID is as likely. The likeliest value would be none at all wherever chance can explain the values.
     """
     variance = GRID[:, None] ** 2 + error ** 2
     level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
     level -= 0.5 * worth * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) if worth else 0.0
-    return float(GRID[int(np.argmax(level))])
+    below = np.cumsum(np.exp(level - level.max()))
+    return float(GRID[int(np.searchsorted(below, 0.5 * below[-1]))])
 
 
 def _rate(own: tuple[float, float], rates: Sequence[float], worth: float) -> tuple[float, float]:
@@ -151,7 +157,8 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
                 variance = np.maximum(rms[:n], NEVER_BELOW) ** 2 + wide * flight.errors[name][:n] ** 2
                 far = wide * flight.strengths[name][:n] ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
-        for rate, (middle, spread) in ((flight.rate, own.rate), (flight.passing_rate, own.passing_rate)):
+        passing = [(flight.passing_rates.get(n, 0.0), r) for n, r in own.passing_rates.items()]
+        for rate, (middle, spread) in ((flight.rate, own.rate), *passing):
             total += float(student.logpdf(np.sqrt(rate), RATE_FREEDOM, middle, max(spread, RATE_NEVER_BELOW)))
     return total
 
@@ -162,8 +169,9 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     names = {n for c in classes for n in c.rms}
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
     highest = lambda rates: max(rates, key=lambda r: r[0] + r[1])
-    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes),
-                   highest(c.passing_rate for c in classes))
+    passing = {n: highest(c.passing_rates[n] for c in classes if n in c.passing_rates)
+               for n in sorted({n for c in classes for n in c.passing_rates})}
+    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
 
 
 @cache
@@ -171,22 +179,29 @@ def table() -> dict[str, Scatter]:
     """The shipped classes of vehicles by name."""
     text = (resources.files("airtouch") / "gap" / "nominal_scatter.toml").read_text(encoding="utf-8")
     return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
-                          tuple(entry["root_rate"]), tuple(entry["root_passing_rate"]), entry.get("vehicle", ""))
+                          tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["root_passing_rates"].items()},
+                          entry.get("vehicle", ""))
             for name, entry in tomllib.loads(text).items()}
 
 
-def measured(flights: Sequence[Apparent]) -> Scatter:
-    """The scatter of flights each of which was held against others than itself."""
+def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = None) -> Scatter:
+    """The scatter of flights each of which was held against others than itself.
+
+    alike: those of them that give the rates and the degrees of freedom, which were held against flights of their own
+    day and condition; all by default.
+    """
+    alike = flights if alike is None else alike
     names = sorted({n for f in flights for n in f.strengths})
     rms = {}
     for name in names:
         rows = [f for f in flights if name in f.strengths]
         size = max(len(f.strengths[name]) for f in rows)
-        found = [_likeliest(_column(rows, name, "strengths", k), _column(rows, name, "errors", k), 0.0, 0.0)
-                 for k in range(size)]
-        rms[name] = np.array(found)
-    return Scatter(rms, float(len(flights)), _robust([f.rate for f in flights]),
-                   _robust([f.passing_rate for f in flights]))
+        columns = [tuple(_column(rows, name, part, k) for part in ("strengths", "errors")) for k in range(size)]
+        pooled = _median(*(np.concatenate(part) for part in zip(*columns, strict=True)), 0.0, 0.0)
+        rms[name] = np.array([_median(*c, pooled, POOLED) for c in columns] if size > 1 else [pooled])
+    passing = {n: _robust([f.passing_rates.get(n, 0.0) for f in alike])
+               for n in sorted({n for f in alike for n in f.passing_rates})}
+    return Scatter(rms, float(len(alike)), _robust([f.rate for f in alike]), passing)
 
 
 def _robust(rates: Sequence[float]) -> tuple[float, float]:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, every, twins_of
+from airtouch.gap.candidates import CLOCK, COMPANIONS, GATED, MEAN, SPECTRUM, Term, every, twins_of
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over, strength_variance
 from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.gates import best_gated
+from airtouch.gap.gates import gated
 from airtouch.gap.generic import generic_gain
 from airtouch.gap.nominal_scatter import Apparent
 from airtouch.gap.problem import Part, whole_of
@@ -39,6 +39,7 @@ MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
 WORTH_AGAIN = 0.25  #: of what the first effect must gain, below which a candidate is not judged again beside a deviation
+STRETCHED = 0.999  #: of a parameter's bound, from which it is at it
 HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
 FULL = 5  #: candidates that are fitted in full, after a first look at all
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
@@ -160,7 +161,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     tried, need = singles, least
     passing = _passing(data, parts, base, singles, least, without)
     if passing is not None:
-        steps, least = [passing], {**least, passing.name: data.study.scatter.passing(_seconds(data), LEAST_GAIN)}
+        steps, least = [passing], {**least, passing.name: data.study.scatter.passing(passing.name, _seconds(data), LEAST_GAIN)}
         singles = {**singles, passing.name: passing}
         tried, need = _beside(data, parts, base, screen, candidates, steps, singles, progress)
     while sum(s.named for s in steps) < MOST_EFFECTS:
@@ -192,14 +193,16 @@ def _passing(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float
     """
     if data.study.scatter is None:
         return None
-    gated = best_gated(data, without)
     steady = max((j.gain for n, j in singles.items() if j.evidence >= least[n]), default=0.0)
-    if gated is None or gated.gain < max(data.study.scatter.passing(_seconds(data), LEAST_GAIN), steady + LEAST_GAIN):
+    usual = {n: data.study.scatter.passing(n, _seconds(data), LEAST_GAIN) for n in GATED}
+    found = [g for g in gated(data, without).values() if g.gain >= max(usual[g.name], steady + LEAST_GAIN)]
+    if not found:
         return None
-    shaken = any(t.kind == SPECTRUM for t in gated.fitted.terms)
-    gain = sum(judge(data, p, gated.fitted.terms) - before for p, before in zip(parts, base[shaken], strict=True))
-    return Judged(gated.name, gated.fitted.terms, gain - gated.cost, (gated.fitted, gated.fitted), choice=gated.cost,
-                  strength=_strength(gated.fitted.terms[0], gated.fitted.terms, (gated.fitted,))[0], evidence=gated.gain)
+    best = max(found, key=lambda g: g.gain)
+    shaken = any(t.kind == SPECTRUM for t in best.fitted.terms)
+    gain = sum(judge(data, p, best.fitted.terms) - before for p, before in zip(parts, base[shaken], strict=True))
+    return Judged(best.name, best.fitted.terms, gain - best.cost, (best.fitted, best.fitted), choice=best.cost,
+                  strength=_strength(best.fitted.terms[0], best.fitted.terms, (best.fitted,))[0], evidence=best.gain)
 
 
 def _beside(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], screen: Screen,
@@ -211,8 +214,9 @@ def _beside(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]
     gained something without it: a deviation takes gain from others, it seldom lends any.
     """
     named = any(s.named for s in steps)
-    gained = lambda n: n in first and first[n].gain > WORTH_AGAIN * FIRST_GAIN
-    worth = candidates if named else {n: v for n, v in candidates.items() if gained(n)}
+    gained = {n for n, j in first.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
+    gained |= {m for n in gained if twins_of(n) for m in twins_of(n)[0]}  # the scatter of either counts
+    worth = candidates if named else {n: v for n, v in candidates.items() if n in gained}
     tried = _round(data, parts, base, screen, worth, steps[-1], progress)
     need = {n: _needed_beside(data, steps[-1], j) if named else needed(data, j.terms[len(steps[-1].terms):])
             for n, j in tried.items()}
@@ -234,10 +238,11 @@ def apparent(data: Data) -> Apparent:
     parts = halves(data)
     base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]
     singles = _round(data, parts, base, Screen(data), every(), None, lambda _: None)
-    gated = best_gated(data)
+    passing = gated(data)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
-                    _nameless(data, parts, None) / _seconds(data), max(gated.gain, 0.0) / _seconds(data) if gated else 0.0)
+                    _nameless(data, parts, None) / _seconds(data),
+                    {n: max(passing[n].gain, 0.0) / _seconds(data) if n in passing else 0.0 for n in GATED})
 
 
 def _error(data: Data, judged: Judged) -> np.ndarray:
@@ -245,13 +250,19 @@ def _error(data: Data, judged: Judged) -> np.ndarray:
     term = judged.terms[0]
     if term.kind == CLOCK:
         return np.zeros(len(judged.strength))
-    if term.kind != SPECTRUM:  # at a bound nobody knows how far beyond it would lie
-        known = (judged.variance > 0.0) | (judged.strength == 0.0)
-        return np.where(known, np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS), NOBODY_KNOWS)
+    if term.kind != SPECTRUM:
+        return np.where(_at_bound(term, judged.strength), NOBODY_KNOWS,
+                        np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
     variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
     return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))
+
+
+def _at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
+    """Which scaled parameters (k,) lie as far from neutral as they may: the model stretches to fit something else."""
+    low, high = (term.among_all(b) for b in term.bounds())
+    return (strength != 0.0) & ((strength <= STRETCHED * low) | (strength >= STRETCHED * high))
 
 
 def _assumes(data: Data, terms: Sequence[Term]) -> bool:
@@ -361,9 +372,19 @@ def _same(one: Term, other: Term) -> bool:
 
 
 def _with_evidence(data: Data, best: Mapping[str, Judged], before: float) -> dict[str, Judged]:
-    """Every candidate with its evidence: what it gains, and no more than its strength alone says."""
+    """Every candidate with its evidence: what it gains, and no more than its strength alone says.
+
+    None where the strength is the largest that can be: there the effect stands in for another. What these logs cannot
+    tell apart has the least evidence of either.
+    """
     scatter = data.study.scatter
-    return {n: replace(j, evidence=min(j.gain - before, scatter.evidence(n, j.strength) if scatter else np.inf))
+    most = {}
+    for n, j in best.items():
+        own = next(t for t in reversed(j.terms) if t.name == n)
+        stretched = own.kind == MEAN and _at_bound(own, j.strength).any()
+        most[n] = 0.0 if stretched else scatter.evidence(n, j.strength) if scatter else np.inf
+    alike = {n: twins_of(n)[0] if twins_of(n) else {n} for n in best}
+    return {n: replace(j, evidence=min(j.gain - before, *(most[m] for m in alike[n] if m in most)))
             for n, j in best.items()}
 
 
