@@ -154,9 +154,12 @@ class Slopes:
         self.rises, self.doubts = [np.zeros(0)] * size, [np.zeros(0)] * size
         self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
 
-    def take(self, x: np.ndarray) -> None:
-        """Take them at scaled parameters x (k,): all that may have changed much, and always those that bend."""
-        every = self.far(x)
+    def take(self, x: np.ndarray, every: bool = False) -> None:
+        """Take them at scaled parameters x (k,): all of them where x lies far from where they were taken, or as told; always
+
+        those that bend.
+        """
+        every = every or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
         before = _active(self.mean, x)
         for i in range(len(x)) if every else np.flatnonzero(self.bent):
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
@@ -184,10 +187,6 @@ class Slopes:
             information = information + (doubts * weight) @ doubts.T
         return gradient, information
 
-    def far(self, x: np.ndarray) -> bool:
-        """Whether x (k,) lies so far away that they may have changed."""
-        return bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
-
 
 def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
                   spread: np.ndarray | float, wide: bool,
@@ -205,61 +204,38 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
     prior = np.concatenate([spread, [p for _, p in constants]])
     push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
-    values = problem.values(_active(mean, x)) if mean else problem.base
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
-        return x, offsets, covariance, values
-    told, price = problem.commanded(_active(mean, x), wide)
-    cost = price + cost_of(problem, values, added + told, x, offsets, prior)
+        return x, offsets, covariance, problem.base
+
+    def at(x: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """What is left, the power over the floor, and minus the log of the posterior."""
+        active = _active(mean, x)
+        values = (problem.values(active) if mean else problem.base) - push(offsets)
+        told, price = problem.commanded(active, wide)
+        return values, added + told, price + cost_of(problem, values, added + told, x, offsets, prior)
+
+    values, power, cost = at(x, offsets)
     slopes, stuck, damping = Slopes(problem, mean, high), False, 0.0
     for _ in range(ITERATIONS):
-        if stuck:
-            slopes.at = np.full(len(x), np.inf)
-        slopes.take(x)
-        weights, power = weights_of(problem, values, added + told), slopes.of_power(x, values, added + told, wide)
+        slopes.take(x, stuck)
         columns = [*slopes.columns, *(-c for c, _ in constants)]
+        weights, of_power = weights_of(problem, values, power), slopes.of_power(x, values, power, wide)
         gain, tries = 0.0, 0
         while gain == 0.0 and tries < TRIES:
             tries += 1
-            change, covariance = bounded_step(columns, prior, values, weights, x, offsets, low, high, power, damping)
-            new_x, new_o = np.clip(x + change[:len(x)], low, high), offsets + change[len(x):]
-            new_values = (problem.values(_active(mean, new_x)) if mean else problem.base) - push(new_o)
-            new_told, price = problem.commanded(_active(mean, new_x), wide)
-            new_cost = price + cost_of(problem, new_values, added + new_told, new_x, new_o, prior)
+            change, covariance = bounded_step(columns, prior, values, weights, x, offsets, low, high, of_power, damping)
+            new_x, new_offsets = np.clip(x + change[:len(x)], low, high), offsets + change[len(x):]
+            new_values, new_power, new_cost = at(new_x, new_offsets)
             if new_cost < cost - 1e-9:
                 gain, cost = cost - new_cost, new_cost
-                x, offsets, values, told = new_x, new_o, new_values, new_told
+                x, offsets, values, power = new_x, new_offsets, new_values, new_power
                 damping *= CALMED
             else:
                 damping = max(damping, LEAST_DAMPING) / CALMED
         if gain < ENOUGH and (gain > 0.0 or stuck or np.array_equal(x, slopes.at)):
             break
         stuck = gain == 0.0
-    return x, offsets, covariance, values
-    told, price = problem.commanded(_active(mean, x), wide)
-    cost = price + cost_of(problem, values, added + told, x, offsets, prior)
-    slopes = Slopes(problem, mean, high)
-    slopes.take(x)
-    for _ in range(ITERATIONS):
-        change, covariance = bounded_step(
-            [*slopes.columns, *(-c for c, _ in constants)], prior, values, weights_of(problem, values, added + told), x,
-            offsets, low, high, slopes.of_power(x, values, added + told, wide))
-        scale, gain = 1.0, 0.0
-        while scale > 0.05:
-            new_x = np.clip(x + scale * change[:len(x)], low, high)
-            new_o = offsets + scale * change[len(x):]
-            new_values = (problem.values(_active(mean, new_x)) if mean else problem.base) - push(new_o)
-            new_told, price = problem.commanded(_active(mean, new_x), wide)
-            new_cost = price + cost_of(problem, new_values, added + new_told, new_x, new_o, prior)
-            if new_cost < cost - 1e-9:
-                gain, cost = cost - new_cost, new_cost
-                x, offsets, values, told = new_x, new_o, new_values, new_told
-                break
-            scale *= 0.4
-        if gain < ENOUGH:
-            if not slopes.far(x) and (gain > 0.0 or np.array_equal(x, slopes.at)):
-                break
-            slopes.take(x)
     return x, offsets, covariance, values
 
 
