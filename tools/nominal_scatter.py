@@ -113,7 +113,7 @@ def main() -> None:
     cases, alike, groups_of, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
     for of, drone, group, flown, files in every:
         groups_of[of].add(group)
-        flown_by[of] = "" if of == nominal_scatter.SIMULATED else flown.name
+        flown_by[of] = flown.name
         rest = [f for _, same, other, _, some in every if same == drone and other != group for f in some]
         for note, others in [("", None), *([(", other groups", rest)] if len(rest) > 1 else [])]:
             if any(name + note not in done for name, _ in files):

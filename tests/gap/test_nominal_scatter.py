@@ -10,7 +10,7 @@ from airtouch.simulation.effects import EFFECTS
 
 
 def drawn(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[Apparent]:
-    return [Apparent({k: rng.normal(size=len(v)) * v for k, v in rms.items()}, {k: 0.0 * v for k, v in rms.items()},
+    return [Apparent({k: rng.normal(size=len(v)) * v for k, v in rms.items()}, {k: 1e-6 + 0.0 * v for k, v in rms.items()},
                      float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
 
 

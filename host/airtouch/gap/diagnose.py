@@ -127,7 +127,7 @@ def _verdict(found: Selection, before: float) -> str:
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
     in both halves of the data, in whose common part the gap is measured.
     """
-    apart = found.chosen is not None and any(t.kind == CLOCK or t.gate for t in found.chosen.terms)
+    apart = found.chosen is not None and all(t.kind == CLOCK or t.gate for t in found.chosen.terms)
     if before <= AT_FLOOR and not apart:
         return "none"
     if not found.explained:

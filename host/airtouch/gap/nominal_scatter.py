@@ -50,8 +50,8 @@ class Apparent:
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose recorded flights a class
-    of the table was measured on.
+    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose flights a class of
+    the table was measured on.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -99,7 +99,7 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     """
     classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
     if vehicle and any(c.vehicle == vehicle for c in classes.values()):
-        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle or name == SIMULATED}
+        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle}
     n = len(baseline)
     wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
     known = baseline if n > 1 else ()
@@ -114,8 +114,8 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
         scale = math.sqrt(wide)
         own_rms = [_median(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p, worth)
                    for k, p in enumerate(prior)] if rows else prior
-        never = rows and not any(f.errors[name].any() or f.strengths[name].any() for f in rows)
-        rms[name] = np.maximum(own_rms, np.maximum(prior, least) if never else least)  # losses come and go by the day
+        exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
+        rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
     passing = {n: _rate(r, [f.passing_rates.get(n, 0.0) for f in known], worth) for n, r in own.passing_rates.items()}
     return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing)
 

@@ -378,13 +378,11 @@ def _with_evidence(data: Data, best: Mapping[str, Judged], before: float) -> dic
     tell apart has the least evidence of either.
     """
     scatter = data.study.scatter
-    most = {}
-    for n, j in best.items():
-        own = next(t for t in reversed(j.terms) if t.name == n)
-        stretched = own.kind == MEAN and _at_bound(own, j.strength).any()
-        most[n] = 0.0 if stretched else scatter.evidence(n, j.strength) if scatter else np.inf
-    alike = {n: twins_of(n)[0] if twins_of(n) else {n} for n in best}
-    return {n: replace(j, evidence=min(j.gain - before, *(most[m] for m in alike[n] if m in most)))
+    own = {n: next(t for t in reversed(j.terms) if t.name == n) for n, j in best.items()}
+    within = {n for n, j in best.items() if own[n].kind != MEAN or not _at_bound(own[n], j.strength).any()}
+    most = {n: scatter.evidence(n, best[n].strength) if scatter else np.inf for n in within}
+    alike = {n: (twins_of(n)[0] if twins_of(n) else {n}) & within for n in best}
+    return {n: replace(j, evidence=min(j.gain - before, *(most[m] for m in alike[n])) if n in within else 0.0)
             for n, j in best.items()}
 
 
