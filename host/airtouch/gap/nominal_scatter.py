@@ -20,6 +20,8 @@ from importlib import resources
 import numpy as np
 from scipy.stats import t as student
 
+from airtouch.gap.candidates import TWINS
+
 MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
@@ -116,6 +118,10 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
+    for group, _ in TWINS:  # one thing in the logs, as mass and thrust, scatters as the wider of its names
+        same = [rms[n] for n in group if n in rms]
+        if len({len(x) for x in same}) == 1:
+            rms |= {n: np.max(same, axis=0) for n in group if n in rms}
     passing = {n: _rate(r, [f.passing_rates.get(n, 0.0) for f in known], worth) for n, r in own.passing_rates.items()}
     return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing)
 

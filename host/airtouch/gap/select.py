@@ -215,7 +215,6 @@ def _beside(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]
     """
     named = any(s.named for s in steps)
     gained = {n for n, j in first.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
-    gained |= {m for n in gained if twins_of(n) for m in twins_of(n)[0]}  # the scatter of either counts
     worth = candidates if named else {n: v for n, v in candidates.items() if n in gained}
     tried = _round(data, parts, base, screen, worth, steps[-1], progress)
     need = {n: _needed_beside(data, steps[-1], j) if named else needed(data, j.terms[len(steps[-1].terms):])
@@ -374,16 +373,16 @@ def _same(one: Term, other: Term) -> bool:
 def _with_evidence(data: Data, best: Mapping[str, Judged], before: float) -> dict[str, Judged]:
     """Every candidate with its evidence: what it gains, and no more than its strength alone says.
 
-    None where the strength is the largest that can be: there the effect stands in for another. What these logs cannot
-    tell apart has the least evidence of either.
+    None where the strength is the largest that can be: there the effect stands in for another.
     """
     scatter = data.study.scatter
-    own = {n: next(t for t in reversed(j.terms) if t.name == n) for n, j in best.items()}
-    within = {n for n, j in best.items() if own[n].kind != MEAN or not _at_bound(own[n], j.strength).any()}
-    most = {n: scatter.evidence(n, best[n].strength) if scatter else np.inf for n in within}
-    alike = {n: (twins_of(n)[0] if twins_of(n) else {n}) & within for n in best}
-    return {n: replace(j, evidence=min(j.gain - before, *(most[m] for m in alike[n])) if n in within else 0.0)
-            for n, j in best.items()}
+    out = {}
+    for n, j in best.items():
+        own = next(t for t in reversed(j.terms) if t.name == n)
+        stretched = own.kind == MEAN and _at_bound(own, j.strength).any()
+        most = 0.0 if stretched else scatter.evidence(n, j.strength) if scatter else np.inf
+        out[n] = replace(j, evidence=min(j.gain - before, most))
+    return out
 
 
 def _price(terms: Sequence[Term]) -> float:
