@@ -66,10 +66,10 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; {where}")
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     with Stages() as stages:
-        found = adapt.adapt(usable, scene, craft, work, start=start, seed=seed, hold_out=hold_out,
-                            withhold=withhold_range, progress=stages, command=typed)
-    found.model.save(out, force)
-    _say(found, adapt, summary, len(labelled), hold_out)
+        adapted = adapt.adapt(usable, scene, craft, work, start=start, seed=seed, hold_out=hold_out,
+                              withhold=withhold_range, progress=stages, command=typed)
+    adapted.model.save(out, force)
+    _say(adapted, adapt, summary, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
 
 

@@ -115,11 +115,11 @@ class Term:
 
         other: the value of those that this variant leaves alone.
         """
-        every = _free(self.effect)
-        out = np.full(len(every), other)
+        names = _free(self.effect)
+        out = np.full(len(names), other)
         for name, value in zip(self.free, x, strict=False):
-            if name in every:
-                out[every.index(name)] = value
+            if name in names:
+                out[names.index(name)] = value
         return out
 
     def step(self, name: str) -> float:

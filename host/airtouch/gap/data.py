@@ -116,9 +116,9 @@ def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], 
     """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
     cache = data.__dict__.setdefault(name, {})
     key = tuple((a.effect.name, *a.values.values(), a.gate) for a in active)
-    made = cache.pop(key) if key in cache else make()
+    spectra_of = cache.pop(key) if key in cache else make()
     if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
-        cache[key] = made  # the last one used is the last in it
+        cache[key] = spectra_of  # the last one used is the last in it
         if len(cache) > KEPT:
             cache.pop(next(k for k in cache if k))
-    return made
+    return spectra_of

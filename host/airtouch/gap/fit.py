@@ -98,10 +98,10 @@ def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False
 
 def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
     """Power that random effects add, their strengths in `random` fitted anew, one after another."""
-    told, _ = problem.commanded(mean, True)
+    commanded, _ = problem.commanded(mean, True)
     for _ in range(ROUNDS if len(random) > 1 else 1):
         for i in range(len(random)):
-            random[i] = _strength(problem, random, i, values, told)
+            random[i] = _strength(problem, random, i, values, commanded)
     return problem.random_power(random)
 
 
@@ -154,23 +154,27 @@ class Slopes:
         self.rises, self.doubts = [np.zeros(0)] * size, [np.zeros(0)] * size
         self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
 
-    def take(self, x: np.ndarray, every: bool = False) -> None:
+    def take(self, x: np.ndarray, anew: bool = False) -> None:
         """Take them at scaled parameters x (k,): all of them where x lies far from where they were taken, or as told; always
 
         those that bend.
         """
-        every = every or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
+        anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
+        moved = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
+        if not len(moved):
+            return
         before = _active(self.mean, x)
-        for i in range(len(x)) if every else np.flatnonzero(self.bent):
+        values, doubt = self.problem.values(before), self.problem.doubt(before)
+        for i in moved:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
             there = x.copy()
             there[i] += step
             after = _active(self.mean, there)
-            self.columns[i] = (self.problem.values(after) - self.problem.values(before)) / step
+            self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.twin.rise(before, after) / step
-            self.doubts[i] = (self.problem.doubt(after) - self.problem.doubt(before)) / step
+            self.doubts[i] = (self.problem.doubt(after) - doubt) / step
             self.bent[i] = self.problem.bends(before, after)
-        self.at = x.copy() if every else self.at
+        self.at = x.copy() if anew else self.at
 
     def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
                  ) -> tuple[np.ndarray, np.ndarray]:
@@ -212,8 +216,9 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
         """What is left, the power over the floor, and minus the log of the posterior."""
         active = _active(mean, x)
         values = (problem.values(active) if mean else problem.base) - push(offsets)
-        told, price = problem.commanded(active, wide)
-        return values, added + told, price + cost_of(problem, values, added + told, x, offsets, prior)
+        commanded, price = problem.commanded(active, wide)
+        power = added + commanded
+        return values, power, price + cost_of(problem, values, power, x, offsets, prior)
 
     values, power, cost = at(x, offsets)
     slopes, stuck, damping = Slopes(problem, mean, high), False, 0.0

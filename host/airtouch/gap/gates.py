@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap import candidates
@@ -19,7 +18,7 @@ from airtouch.gap.channels import residual
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over
 from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.problem import Part, Problem, problem_of, whole_of
+from airtouch.gap.problem import Part, problem_of, whole_of
 from airtouch.gap.spectra import AIR, LENGTH
 
 MOST_STRETCHES = 4  #: of one flight
@@ -30,9 +29,8 @@ STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
 PIECE_S = 0.16  #: of the force along the thrust, in which bursts are looked for
 LIVELY_HZ = 1.0  #: above which they are
 LIVELY, DEGREES = 6.0, 3.0  #: power of a burst over the flight's median; independent values in a piece
-Gate = tuple[tuple[str, float, float], ...]
-Found = tuple[Sequence[Term], Gate, float]  #: an effect, when it acts, and what the choice of that costs
 WHOLE = 0.9  #: of a flight's blocks: what acts there does not come and go
+Gate = tuple[tuple[str, float, float], ...]
 
 
 @dataclass(frozen=True)
@@ -47,34 +45,35 @@ class Gated:
 
 def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     """Effects that may come and go, each in the stretches in which it explains most; those that never act are left out."""
-    found = {name: [j for v in variants for j in _judged(data, name, v)]
-             for name, variants in candidates.gated(without).items()}
-    return {name: max(judged, key=lambda j: j.gain) for name, judged in found.items() if judged}
-
-
-def _judged(data: Data, name: str, terms: Sequence[Term]) -> list[Gated]:
-    """An effect in the stretches that blocks show, and in those that bursts of the force along the thrust show."""
     whole = whole_of(data)
-    problem = problem_of(data, whole)
-    off = _each(data, whole, ())
-    if len(off) < LEAST_BLOCKS:
-        return []
-    out = []
-    for found in (_by_blocks(data, whole, problem, off, terms), _by_bursts(data, terms)):
-        if found is None:
-            continue
-        values, gate, cost = found
-        acting = [replace(t, gate=gate) for t in values]
-        fitted = fit(data, whole, acting)
-        free = sum(len(t.free) for t in acting)
-        gained = judge(data, whole, fitted.terms) - judge(data, whole, ()) - cost - 0.5 * free * np.log(len(off))
-        out.append(Gated(name, fitted, gained, cost))
+    nothing = _each(data, whole, ())
+    if len(nothing) < LEAST_BLOCKS:
+        return {}
+    level, bursts = judge(data, whole, ()), _bursts(data)
+    out = {}
+    for name, variants in candidates.gated(without).items():
+        judged = [_judged(data, whole, name, terms, gate, cost, level, len(nothing)) for variant in variants
+                  for terms, gate, cost in (_by_blocks(data, whole, nothing, variant), (variant, *bursts)) if gate]
+        if judged:
+            out[name] = max(judged, key=lambda j: j.gain)
     return out
 
 
-def _by_blocks(data: Data, whole: Part, problem: Problem, off: np.ndarray, terms: Sequence[Term]) -> Found | None:
-    """An effect fitted, the stretches of blocks (off: their log likelihood without it) where it acts, and their price."""
-    blocks = len(off)
+def _judged(data: Data, whole: Part, name: str, terms: Sequence[Term], gate: Gate, cost: float, level: float,
+            blocks: int) -> Gated:
+    """An effect fitted within a gate, whose choice costs `cost`. level: log likelihood without any effect."""
+    acting = [replace(t, gate=gate) for t in terms]
+    fitted = fit(data, whole, acting)
+    free = sum(len(t.free) for t in acting)
+    return Gated(name, fitted, judge(data, whole, fitted.terms) - level - cost - 0.5 * free * np.log(blocks), cost)
+
+
+def _by_blocks(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term]) -> tuple[Sequence[Term], Gate, float]:
+    """An effect fitted, the stretches of blocks (off: their log likelihood without it) where it acts, and their price.
+
+    No stretch where it acts nowhere or everywhere.
+    """
+    problem, blocks = problem_of(data, whole), len(off)
     count = np.maximum(np.bincount(problem.block[problem.block >= 0], minlength=blocks), 1)
     on = np.zeros(blocks, bool)
     on[np.argsort(off / count)[:max(int(WORST * blocks), 2)]] = True
@@ -86,7 +85,7 @@ def _by_blocks(data: Data, whole: Part, problem: Problem, off: np.ndarray, terms
         for first, last in stretches:
             chosen[first:last + 1] = True
         if not stretches or chosen.mean() > WHOLE:
-            return None
+            return terms, (), 0.0
         if (chosen == on).all():
             break
         on = chosen
@@ -94,18 +93,18 @@ def _by_blocks(data: Data, whole: Part, problem: Problem, off: np.ndarray, terms
     return fitted.terms, _sharpened(data, whole, fitted.terms, gate), 2.0 * np.log(blocks) * len(stretches)
 
 
-def _by_bursts(data: Data, terms: Sequence[Term]) -> Found | None:
-    """The same for stretches in which the force along the thrust is far more lively than in the rest of the flight.
+def _bursts(data: Data) -> tuple[Gate, float]:
+    """The stretches in which the force along the thrust is far more lively than in the rest of the flight, and their price.
 
     A wake that is flown through lasts shorter than a block. A piece of PIECE_S counts the log likelihood of a power
     that is LIVELY times the flight's median over that of the median (chi-square of DEGREES), as if it were no more.
     """
     gate, price = [], 0.0
     for flight in data.flights:
-        left = np.nan_to_num(residual(flight, data.study.vehicle, data.study.calibration)[:, 2])
-        left[flight.on_ground | flight.lost] = 0.0
+        force = np.nan_to_num(residual(flight, data.study.vehicle, data.study.calibration)[:, 2])
+        force[flight.on_ground | flight.lost] = 0.0
         size = int(PIECE_S / PERIOD_S)
-        pieces = _highpassed(left)[:len(left) // size * size].reshape(-1, size)
+        pieces = _highpassed(force)[:len(force) // size * size].reshape(-1, size)
         power = (pieces ** 2).mean(axis=1)
         known = power > 0.0
         if known.sum() < 2 * LEAST_BLOCKS:
@@ -117,9 +116,8 @@ def _by_bursts(data: Data, terms: Sequence[Term]) -> Found | None:
         gate += [(flight.name, a * PIECE_S, (b + 1) * PIECE_S) for a, b in stretches]
         price += each * len(stretches)
     seconds = sum(end - begin for _, begin, end in gate)
-    if not gate or seconds > WHOLE * sum(len(f) for f in data.flights) * PERIOD_S:
-        return None
-    return terms, tuple(gate), price
+    whole = seconds > WHOLE * sum(len(f) for f in data.flights) * PERIOD_S
+    return ((), 0.0) if whole else (tuple(gate), price)
 
 
 def _highpassed(values: np.ndarray) -> np.ndarray:

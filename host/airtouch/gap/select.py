@@ -194,11 +194,11 @@ def _passing(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float
     if data.study.scatter is None:
         return None
     steady = max((j.gain for n, j in singles.items() if j.evidence >= least[n]), default=0.0)
-    usual = {n: data.study.scatter.passing(n, _seconds(data), LEAST_GAIN) for n in GATED}
-    found = [g for g in gated(data, without).values() if g.gain >= max(usual[g.name], steady + LEAST_GAIN)]
-    if not found:
+    nominal = {n: data.study.scatter.passing(n, _seconds(data), LEAST_GAIN) for n in GATED}
+    passing = [g for g in gated(data, without).values() if g.gain >= max(nominal[g.name], steady + LEAST_GAIN)]
+    if not passing:
         return None
-    best = max(found, key=lambda g: g.gain)
+    best = max(passing, key=lambda g: g.gain)
     shaken = any(t.kind == SPECTRUM for t in best.fitted.terms)
     gain = sum(judge(data, p, best.fitted.terms) - before for p, before in zip(parts, base[shaken], strict=True))
     return Judged(best.name, best.fitted.terms, gain - best.cost, (best.fitted, best.fitted), choice=best.cost,
