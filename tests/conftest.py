@@ -11,8 +11,9 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
 
 import pytest
-import skips
 from hypothesis import settings
+
+import skips
 from skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401
 
 settings.register_profile("reproducible", derandomize=True, deadline=None)

@@ -17,11 +17,11 @@ from types import SimpleNamespace
 from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.crtpstack import CRTPPacket
 from cflib.crtp.exceptions import WrongUriType
-from patience import HANG_S
 
 from airtouch.sitl import Server
 from airtouch.sitl.faults import Fault, Line
 from airtouch.sitl.packet import LOG, PARAM, Packet
+from patience import HANG_S
 
 URI = "simulated://"
 CLOCKED = [f"airtouch.crazyflie.{name}" for name in ("collect", "drone", "flight", "log_blocks", "monitor")]

@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 import pytest
-import short_flights
 
 import airtouch as at
+import short_flights
 
 NEVER = ("numba", "scipy", "pandas", "matplotlib", "tensorflow", "keras", "sklearn", "jinja2", "numpy", "cffi", "click")
 

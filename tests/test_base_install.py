@@ -4,8 +4,8 @@ import subprocess
 import sys
 
 import pytest
-import short_flights
 
+import short_flights
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.extras import EXTRAS, need

@@ -6,8 +6,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-import short_flights
 
+import short_flights
 from airtouch import logs
 
 ROOT = Path(__file__).resolve().parents[1]

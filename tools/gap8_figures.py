@@ -22,8 +22,8 @@ sys.path.insert(0, str(ROOT))
 from airtouch.cli.flights import need_flights  # noqa: E402
 from airtouch.detector import crossval, dataset, evaluate, export, paper, registry, summary  # noqa: E402
 from airtouch.detector.dataset import FlightFile  # noqa: E402
-from airtouch.detector.stream.export import golden_flight  # noqa: E402
 from airtouch.detector.score import FlightScore  # noqa: E402
+from airtouch.detector.stream.export import golden_flight  # noqa: E402
 from airtouch.errors import AirTouchError  # noqa: E402
 from airtouch.kernels.network import arena_bytes, parameter_bytes  # noqa: E402
 from airtouch.kernels.rolling import rolling_size  # noqa: E402

@@ -27,7 +27,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gap_passes import apart_db, pieces
 
 from airtouch import logs, vehicle
 from airtouch.cli.flights import need_flights
@@ -39,6 +38,7 @@ from airtouch.gap.diagnose import diagnose
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
+from gap_passes import apart_db, pieces
 
 VEHICLE = "crazyflie-2.1-flow"
 MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly chosen: it judges on 260 s

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from airtouch import logs
 from airtouch.cli.flights import find_flights
 from airtouch.detector import best, dataset
+from airtouch.detector.score import FlightScore
 from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
-from airtouch.detector.score import FlightScore
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
 
 SHOWN = ("motor mean", "gyro x", "ax")  #: channels drawn

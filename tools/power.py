@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
-from ina219 import Power, added, by_stage, canonical, parse, power
 
 from airtouch.detector.stream.recipe import STRIDE
 from airtouch.errors import AirTouchError
+from ina219 import Power, added, by_stage, canonical, parse, power
 
 #: stage -> the paper's figure, mW (Table 1), in the order in which stages are switched on
 PAPER_MW = {"baseline": 78.0, "FC-FE": 6.0, "CCS-FF": 2.0, "filter": 2.0, "network": 33.0}

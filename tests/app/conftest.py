@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import pytest
-from app.drone import signals
 
 from airtouch import vehicle as vehicles
 from airtouch.detector import best
 from airtouch.logs import read
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
+from app.drone import signals
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from objects import compiled
 
 ROOT = Path(__file__).parents[2]

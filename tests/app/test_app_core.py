@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from app.drone import Drone
 from scipy.spatial.transform import Rotation
 
 from airtouch.detector import paper, paper_stream
 from airtouch.detector.features import pipeline
 from airtouch.kernels.app_core import DETECTORS, HEALTH, LINK, AppCore, Gap8Core
 from airtouch.kernels.library import call
+from app.drone import Drone
 
 
 def test_best_on_the_stm32_is_the_detector_that_is_scored(flight, best_edges):

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from patience import HANG_S
 
 from airtouch.kernels.app_core import DETECTORS, AppCore, Gap8Core
+from patience import HANG_S
 from tools.emulator import build, elf
 from tools.emulator.machine import Machine
 

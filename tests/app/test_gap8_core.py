@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from app.sanitized import build
 from patience import HANG_S
 

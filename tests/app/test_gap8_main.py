@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from objects import compiled
-from patience import HANG_S
 
 from airtouch.kernels.app_core import DETECTORS, HEALTH, AppCore, Gap8Core
+from objects import compiled
+from patience import HANG_S
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]

@@ -5,9 +5,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from app.sanitized import build
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from app.sanitized import build
 from patience import HANG_S
 
 PASS, DROP, FLIP, RESET = 0, 6, 10, 62

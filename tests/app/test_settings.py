@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from app.drone import Drone, said
 
 from airtouch.detector import paper, paper_stream
 from airtouch.detector.features import pipeline
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import LINK, PARAM_TYPES, PARAMS, AppCore
 from airtouch.kernels.library import call, ffi
+from app.drone import Drone, said
 
 OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 4), "filter": (3, 2), "bandMid": (1e9, 48.0),
                 "bandWidth": (50.0, 2.0), "pFa": (0.0, 1e-12), "probabilityIn": (7.0, 0.99),

@@ -5,15 +5,15 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import objects
 import pytest
-from patience import HANG_S
 
+import objects
 from airtouch import vehicle as vehicles
 from airtouch.detector import vehicle_header
 from airtouch.simulation import scenario
 from airtouch.sitl import app as sitl
 from airtouch.sitl.drone import Drone
+from patience import HANG_S
 
 ROOT, HERE = Path(__file__).parents[2], Path(__file__).parent
 APP, HOST = ROOT / "firmware" / "app" / "src", ROOT / "host" / "airtouch" / "kernels"

@@ -5,9 +5,9 @@ import struct
 
 import numpy as np
 import pytest
-from app.drone import Drone
 
 from airtouch.kernels.app_core import DETECTORS, LINK, AppCore, Gap8Core
+from app.drone import Drone
 
 HOVER = (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (40_000.0,) * 4
 HISTORY = 288  # steps of which the samples are kept

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-import short_flights
 
+import short_flights
 from airtouch import logs
 
 HEADER = "file,use,fold,height,angle_deg,wind,speed_mps\n"

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from small_model import random_model
 
 from airtouch.cli import export as export_command
 from airtouch.cli import train as train_command
 from airtouch.detector import registry, simulated
 from airtouch.errors import AirTouchError
+from small_model import random_model
 
 
 def airtouch(*arguments: object) -> subprocess.CompletedProcess:
@@ -119,10 +119,9 @@ def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple
 
 
 def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path) -> None:
-    from made_flight import SMALL, made_flight
-
     from airtouch import logs
     from airtouch.detector import best
+    from made_flight import SMALL, made_flight
 
     for folder, count in (("mine", 3), ("calm", 1)):
         (tmp_path / folder).mkdir()

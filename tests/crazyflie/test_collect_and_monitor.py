@@ -20,6 +20,7 @@ from airtouch.sitl.variables import log_variables
 
 pytest.importorskip("cflib", reason="flying needs cflib")
 from missions import HOP  # noqa: E402
+
 from simulated_link import simulated  # noqa: E402
 
 

@@ -9,9 +9,9 @@ import sys
 from unittest.mock import Mock
 
 import pytest
-from patience import HANG_S
 
 from airtouch.crazyflie import guard
+from patience import HANG_S
 
 LAND_HEADER = 0x8C
 

@@ -17,7 +17,6 @@ from patience import HANG_S  # noqa: E402
 from simulated_link import APPEND, CREATE, SETTINGS, URI, simulated  # noqa: E402
 
 
-
 @pytest.fixture
 def far(monkeypatch):
     """A drone with its clock."""

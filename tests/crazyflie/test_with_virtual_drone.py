@@ -23,6 +23,7 @@ from airtouch.sitl import serve
 
 pytest.importorskip("cflib", reason="flying needs cflib")
 from missions import HOP  # noqa: E402
+
 from patience import HANG_S  # noqa: E402
 
 SPEED = 2.0  #: drone seconds a second

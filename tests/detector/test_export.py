@@ -5,11 +5,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from objects import compiled
-from small_model import random_model
 
 from airtouch.detector import best, export, model_file, paper_stream
 from airtouch.errors import AirTouchError
+from objects import compiled
+from small_model import random_model
 
 ROOT = Path(__file__).parents[2]
 MODEL, KERNELS, FIRMWARE = ROOT / "gap8" / "model", ROOT / "gap8" / "kernels", ROOT / "firmware" / "kernels"

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_flight import SMALL, made_flight
 
 from airtouch import logs
 from airtouch.detector import best, evaluate, free_air, sensors, training_set
-from airtouch.detector.dataset import FlightFile, Condition
+from airtouch.detector.dataset import Condition, FlightFile
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
+from made_flight import SMALL, made_flight
 
 
 @pytest.fixture(scope="module")

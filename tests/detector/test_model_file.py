@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_model import random_model
 
 from airtouch.detector import model_file
 from airtouch.errors import AirTouchError
+from small_model import random_model
 
 
 @pytest.fixture(scope="module")

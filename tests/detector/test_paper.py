@@ -4,8 +4,8 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-import short_flights
 
+import short_flights
 from airtouch import logs, reference, vehicle
 from airtouch.detector import paper, registry
 from airtouch.detector.channels import level_acceleration, thrust_axis

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from detector.test_training import made_flight
 
 from airtouch import logs
 from airtouch.detector import model_file, normalisation, paper, paper_stream
@@ -14,6 +13,7 @@ from airtouch.detector.features import feature_windows, flight_features
 from airtouch.errors import AirTouchError
 from airtouch.kernels.rolling import rolling_size
 from airtouch.reference import int8_network
+from detector.test_training import made_flight
 
 
 @pytest.fixture(scope="module")

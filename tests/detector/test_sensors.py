@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_flight import SMALL, made_flight
 
 from airtouch import logs
 from airtouch.detector import best, evaluate, sensor_note, sensors
@@ -13,6 +12,7 @@ from airtouch.detector.dataset import Condition, FlightFile
 from airtouch.detector.stream import batches
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO
+from made_flight import SMALL, made_flight
 
 
 @pytest.fixture(scope="module")

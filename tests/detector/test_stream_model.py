@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
-from made_flight import SMALL, made_flight
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from airtouch import kernels, logs
 from airtouch.detector import best
-from airtouch.detector.stream import batches, model as model_file, quantisation
+from airtouch.detector.stream import batches, quantisation
+from airtouch.detector.stream import model as model_file
 from airtouch.detector.stream.float_network import float_logits
 from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
 from airtouch.errors import AirTouchError
@@ -18,6 +19,8 @@ from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.reference.int8_network import quantise
 from airtouch.reference.motion_channels import NAMES
 from airtouch.reference.stream_int8 import run_stream
+from made_flight import SMALL, made_flight
+
 
 @pytest.fixture(scope="module")
 def small():

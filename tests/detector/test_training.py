@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from small_model import random_weights
 
 from airtouch.detector import losses, network, pruning, train
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
+from small_model import random_weights
 
 
 def test_the_network_has_the_papers_weights() -> None:

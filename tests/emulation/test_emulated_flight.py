@@ -3,13 +3,11 @@
 import os
 import shutil
 import struct
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from airtouch import vehicle as vehicles
 from airtouch.simulation import loop, scenario, setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import draw_flight

@@ -7,6 +7,7 @@ sanitizers. `make fuzz` runs them for longer: host/docs/fuzzing.md.
 import subprocess
 
 import pytest
+
 from tools import fuzz
 
 MUTATIONS = 300

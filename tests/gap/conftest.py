@@ -1,9 +1,9 @@
 """What several files of the diagnosis' tests share."""
 
 import pytest
-from gap_flights import VEHICLE, flown
 
 from airtouch.gap import calibrate
+from gap_flights import VEHICLE, flown
 
 
 @pytest.fixture(scope="session")

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-import short_flights
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import short_flights
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import diagnose

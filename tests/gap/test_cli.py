@@ -4,9 +4,9 @@ import json
 import math
 
 import pytest
-import short_flights
 from click.testing import CliRunner
 
+import short_flights
 from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap_input import Flights, files_of, vehicle_of

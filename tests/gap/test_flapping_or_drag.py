@@ -5,9 +5,9 @@ import pytest
 
 from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, candidates, fit, flight
+from airtouch.gap.blind import SCENARIO
 from airtouch.gap.data import Data
 from airtouch.gap.problem import whole_of
-from airtouch.gap.blind import SCENARIO
 from airtouch.simulation import replay, scenario
 from airtouch.simulation import signals as at
 from airtouch.simulation.batch import flights as simulated

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_flights import VEHICLE, flown
 
 from airtouch.gap import candidates, flight, gates
 from airtouch.gap.channels import inside, residual
@@ -15,6 +14,7 @@ from airtouch.gap.select import select
 from airtouch.gap.unexplained import unexplained
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
+from gap_flights import VEHICLE, flown
 
 FROM_S, TO_S = 9.0, 15.0
 

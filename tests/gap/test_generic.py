@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gap_flights import VEHICLE, flown
 
 from airtouch.gap import candidates, clock, fit, generic
 from airtouch.gap.data import Data
@@ -13,6 +12,7 @@ from airtouch.gap.select import halves
 from airtouch.simulation import effects
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench
+from gap_flights import VEHICLE, flown
 
 PUSH = 0.01  #: N s/m
 

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from airtouch.gap import measure
 from airtouch.gap.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
 

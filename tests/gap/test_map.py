@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 
 from airtouch.gap import gap_map as maps
 from airtouch.gap.band_sums import BANDS_HZ, REGIMES, filtered, gains, sensor_rms, stretches, sums
 from airtouch.gap.candidates import terms
 from airtouch.simulation.flight import prepare
+from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 
 NOISE = float(prepare(VEHICLE, ())[0][0]["acc_noise"][0])
 WIDTH = np.array([b - a for a, b in BANDS_HZ])

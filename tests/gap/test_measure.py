@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-import short_flights
 
+import short_flights
 from airtouch import logs, vehicle
 from airtouch.gap.flight import ready
 from airtouch.gap.gap_map import significant

@@ -9,8 +9,8 @@ from scipy.signal import welch
 from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, flight, random_effects, vibration_lines
 from airtouch.gap.candidates import every, terms
-from airtouch.gap.diagnose import _effects
 from airtouch.gap.data import Data
+from airtouch.gap.diagnose import _effects
 from airtouch.gap.select import select
 from airtouch.gap.spectra import AIR, REST, frequencies
 from airtouch.simulation.batch import flights as simulated

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import short_flights
 
 import airtouch
+import short_flights
 from airtouch import vehicle
 from airtouch.cli import gap_show, scores
 from airtouch.errors import AirTouchError

@@ -4,10 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from gap8.made_networks import network as made
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from small_model import random_model
 
 from airtouch import kernels, logs
 from airtouch.detector import model_file
@@ -18,6 +16,8 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels import network as c_network
 from airtouch.kernels import rolling
 from airtouch.reference import int8_network
+from gap8.made_networks import network as made
+from small_model import random_model
 
 POOLS = st.sampled_from([None, (2, 1), (1, 2), (2, 2), (3, 1)])
 STAGES = st.lists(st.tuples(st.integers(1, 4), st.integers(1, 2), st.sampled_from([1, 2, 3, 4, 5, 8, 12]), POOLS),

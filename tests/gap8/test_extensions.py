@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from gap8.conftest import FLAGS, KERNELS, MODEL
 
 PLAIN = "-DAIRTOUCH_PLAIN_C"

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from cffi import FFI
+
 from gap8.conftest import EMULATION
 
 PROBE = """

@@ -4,6 +4,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from gap8.conftest import EMULATION, KERNELS, MODEL
 from patience import HANG_S
 

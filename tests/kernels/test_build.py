@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from patience import HANG_S
 
 from airtouch.parameters import c_header
+from patience import HANG_S
 
 ROOT = Path(__file__).parents[2]
 KERNELS = ROOT / "firmware" / "kernels"

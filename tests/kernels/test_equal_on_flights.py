@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 from equality import (
-    EPS, RELATIVE, band_power_excess, deviation_power, same_alerts, worst,
+    EPS,
+    RELATIVE,
+    band_power_excess,
+    deviation_power,
+    same_alerts,
+    worst,
 )
 from numpy.lib.stride_tricks import sliding_window_view
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_model import random_model, random_weights, random_windows
 
 from airtouch import kernels, logs
 from airtouch.detector import model_file, network
@@ -17,6 +16,7 @@ from airtouch.detector.features import flight_features
 from airtouch.errors import AirTouchError
 from airtouch.kernels import network as c_network
 from airtouch.reference import int8_network
+from small_model import random_model, random_weights, random_windows
 
 WINDOWS = 5200
 

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from airtouch.errors import AirTouchError
-from airtouch.kernels.stream import arena_bytes, run_stream as run_c
+from airtouch.kernels.stream import arena_bytes
+from airtouch.kernels.stream import run_stream as run_c
 from airtouch.reference.int8_network import Int8Layer
 from airtouch.reference.stream_int8 import StreamConv, StreamNetwork, run_stream
 

@@ -2,18 +2,19 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_stream import network
 
+from airtouch import kernels as c
 from airtouch import logs
 from airtouch.detector.channels import level_acceleration
 from airtouch.errors import AirTouchError
-from airtouch import kernels as c
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.edge_decoder import DecoderConfig, edge_decoder
 from airtouch.reference.int8_network import quantise
 from airtouch.reference.motion_channels import motion_channels
 from airtouch.reference.stream_int8 import run_stream
-from test_stream import network
 
 ODD = st.sampled_from([0.0, -0.0, 1e-42, 1e30, -1e38, np.nan, np.inf, -np.inf, 65535.0, 65536.0, -1.0])
 

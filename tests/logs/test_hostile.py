@@ -13,16 +13,15 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from log_fuzzing.hostile import HOSTILE, table, usd  # noqa: E402
-from log_fuzzing.sound import META, canonical, motion, packed, parquet, si_columns  # noqa: E402
-
 from airtouch import logs  # noqa: E402
-from airtouch.cli import airtouch, main  # noqa: E402
+from airtouch.cli import main  # noqa: E402
 from airtouch.crazyflie.recorder import recover  # noqa: E402
 from airtouch.errors import AirTouchError, shown  # noqa: E402
 from airtouch.logs import clock, public  # noqa: E402
 from airtouch.logs.files import parse  # noqa: E402
 from airtouch.logs.flight_log import FlightLog  # noqa: E402
+from log_fuzzing.hostile import HOSTILE, table, usd  # noqa: E402
+from log_fuzzing.sound import META, canonical, motion, packed, parquet, si_columns  # noqa: E402
 
 
 def flying(n=200, **changed):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import short_flights
 from click.testing import CliRunner
 
+import short_flights
 from airtouch import logs
 from airtouch.cli.logs import command
 

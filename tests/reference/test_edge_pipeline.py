@@ -8,7 +8,12 @@ import pytest
 from airtouch.errors import AirTouchError
 from airtouch.parameters import DEFAULT
 from airtouch.reference.edge_pipeline import (
-    ENTRY, EXIT, EdgePipelineConfig, cfar_input, decode, edge_pipeline,
+    ENTRY,
+    EXIT,
+    EdgePipelineConfig,
+    cfar_input,
+    decode,
+    edge_pipeline,
 )
 from airtouch.vehicle import load
 

@@ -4,8 +4,8 @@ import contextlib
 import time
 
 import pytest
-from patience import HANG_S
 
+from patience import HANG_S
 
 
 @contextlib.contextmanager

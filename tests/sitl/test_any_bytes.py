@@ -5,10 +5,10 @@ import socket
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from patience import HANG_S
 
 from airtouch.sitl import Server, serve
 from airtouch.sitl.packet import MOST_DATA, Packet, parse
+from patience import HANG_S
 
 ECHO = bytes([15 << 4 | 0x0C]) + b"are you there"
 PACKETS = st.lists(st.tuples(st.integers(0, 15), st.integers(0, 3), st.integers(0, 15),

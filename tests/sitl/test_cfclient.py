@@ -10,9 +10,9 @@ import subprocess
 import sys
 
 import pytest
-from patience import HANG_S
 
 from airtouch.sitl import serve
+from patience import HANG_S
 
 SCRIPT = r"""
 import datetime, json, pathlib, sys, threading, time

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from patience import HANG_S
-from sitl.clients import connected, log_block, wait_for
 
 from airtouch.sitl import serve
+from patience import HANG_S
+from sitl.clients import connected, log_block, wait_for
 
 pytest.importorskip("cflib")
 from simulated_link import simulated  # noqa: E402

@@ -6,10 +6,10 @@ import subprocess
 import sys
 
 import pytest
-from patience import HANG_S
 
 from airtouch import logs
 from airtouch.cli import main
+from patience import HANG_S
 
 ECHO = bytes([15 << 4 | 0x0C]) + b"hello"
 

@@ -5,11 +5,11 @@ import struct
 
 import numpy as np
 import pytest
-from sitl.clients import connected, log_block
 
 from airtouch.errors import AirTouchError
 from airtouch.sitl.faults import Fault, Line, parse
 from airtouch.sitl.packet import CONSOLE, LOG, PARAM, Packet
+from sitl.clients import connected, log_block
 
 pytest.importorskip("cflib")
 from simulated_link import simulated  # noqa: E402

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airtouch.logs.quaternion import decompress
 from airtouch.kernels.app_core import PARAM_TYPES
+from airtouch.logs.quaternion import decompress
 from airtouch.sitl import app
 from airtouch.sitl.log_service import LENGTHS, encode
 from airtouch.sitl.packet import LOG, MEMORY, PARAM

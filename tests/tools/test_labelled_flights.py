@@ -3,13 +3,13 @@
 import sys
 
 import pytest
-from made_flight import SMALL, made_flight
 
 from airtouch import logs
 from airtouch.detector import best
 from airtouch.detector.dataset import Condition
 from airtouch.detector.score import EdgeScore, FlightScore
 from airtouch.errors import AirTouchError
+from made_flight import SMALL, made_flight
 from tools import labelled_flights
 
 

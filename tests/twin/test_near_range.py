@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from airtouch.errors import AirTouchError
 from airtouch.simulation.flight import Diverged, fly
 from airtouch.twin import missions, near_range
 from airtouch.twin.channels import channels
 from airtouch.twin.course import course
-from airtouch.errors import AirTouchError
 from twin_courses import PLAIN, made_course
 
 TOP = 0.74

@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import unicorn
-from unicorn import Uc, UcError, arm_const as arm, riscv_const as riscv, unicorn_const as uc_const
+from unicorn import Uc, UcError
+from unicorn import arm_const as arm
+from unicorn import riscv_const as riscv
+from unicorn import unicorn_const as uc_const
 
 from airtouch.errors import AirTouchError
 from tools.emulator.counter import InstructionCounter

@@ -17,7 +17,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from unicorn import riscv_const as riscv, unicorn_const as uc_const
+from unicorn import riscv_const as riscv
+from unicorn import unicorn_const as uc_const
 
 from tools.emulator.machine import RETURN, STACK_TOP, EmulationError, Machine
 

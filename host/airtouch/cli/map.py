@@ -6,7 +6,6 @@ from pathlib import Path
 import click
 
 from airtouch import logs
-from airtouch.cli import scores as show
 from airtouch.detector import dataset, evaluate, registry
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes

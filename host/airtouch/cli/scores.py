@@ -11,6 +11,7 @@ from rich.table import Table
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
+
 def table(rows: dict[str, dict[str, Any]], title: str) -> Table:
     """A table of summaries, one row each, with intervals."""
     result = Table(title=title, title_justify="left", show_lines=True, caption_justify="left",

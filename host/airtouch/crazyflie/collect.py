@@ -240,7 +240,7 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
 
 def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int) -> dict[str, Any]:
     """What is known of a flight before it is flown."""
-    now = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     held = {"period_s": blocks.STATE.period_ms / 1000.0, "longest_s": blocks.HELD_S} if ready.slow else {}
     return {
         "vehicle": plan.vehicle, "condition": dict(mission.values), "acc_frame": "body",

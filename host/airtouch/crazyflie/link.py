@@ -21,8 +21,8 @@ def cflib_or_error() -> Any:
     Its own messages are silenced.
     """
     try:
-        import cflib.crtp
         import cflib.crazyflie
+        import cflib.crtp
     except ImportError:
         raise AirTouchError("flying needs cflib: pip install 'airtouch[fly]'") from None
     logger = logging.getLogger("cflib")

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError, nearest
-from airtouch.simulation import setpoint as c
 from airtouch.simulation import scenario
+from airtouch.simulation import setpoint as c
 from airtouch.simulation.mission import RATE_HZ
 
 SHORTEST_S = 0.05  #: a stop shorter than this is a corner, no hover

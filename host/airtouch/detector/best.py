@@ -15,8 +15,8 @@ import numpy as np
 
 from airtouch import __version__, kernels, logs
 from airtouch.detector import evaluate, sensor_note, sensors, training_set, tuning
-from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.detector.channels import nine_channels
+from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.detector.stream import model as model_file
 from airtouch.detector.stream.batches import channels_of, flight_of
 from airtouch.detector.stream.float_network import float_logits

@@ -14,8 +14,8 @@ from airtouch.detector.registry import Detector
 from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore, score_flight
 from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
-from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.clock import sample_period
+from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.quality import clock_steps, nothing_logged
 
 SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air

@@ -13,8 +13,8 @@ from typing import Any
 from airtouch.gap import blind, blind_score, measure
 from airtouch.gap.blind_draw import KINDS
 from airtouch.gap.candidates import twins_of
-from airtouch.gap.diagnose import brief
 from airtouch.gap.data import Study
+from airtouch.gap.diagnose import brief
 from airtouch.logs.files import read, write_bytes
 from airtouch.vehicle import load
 

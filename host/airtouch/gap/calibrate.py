@@ -22,8 +22,8 @@ from airtouch.gap.generic import usual_of
 from airtouch.gap.loop_model import sensitivity
 from airtouch.gap.nominal_scatter import scatter_of
 from airtouch.gap.problem import whole_of
-from airtouch.gap.result import Quantity
 from airtouch.gap.response import Response, response_of
+from airtouch.gap.result import Quantity
 from airtouch.gap.select import apparent
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.simulation.effects import Active

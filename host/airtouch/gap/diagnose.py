@@ -7,8 +7,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap import advice as advices
-from airtouch.gap import callable_module
-from airtouch.gap import balance_result, calibrate, candidates, measure, summary
+from airtouch.gap import balance_result, calibrate, callable_module, candidates, measure, summary
 from airtouch.gap import pictures as picture
 from airtouch.gap.candidates import CLOCK, Term
 from airtouch.gap.data import Data, Study

@@ -7,9 +7,9 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap import motion
 from airtouch.logs.clock import lost_samples, true_period
-from airtouch.logs.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
+from airtouch.logs.quality import nothing_logged
 from airtouch.logs.resample import resample
 from airtouch.logs.segments import KINDS, PLATFORM_STEP_M, segments
 from airtouch.simulation import replay

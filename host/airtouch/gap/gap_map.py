@@ -14,8 +14,8 @@ import numpy as np
 
 from airtouch.gap import random_effects
 from airtouch.gap.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
-from airtouch.gap.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
 from airtouch.gap.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.data import Data, Study
 from airtouch.gap.flight import GROUND, Flight

@@ -7,7 +7,6 @@ E[power] = exp(a + slope * hardness), found by gamma regression over the blocks 
 flights (McCullagh and Nelder, Generalized Linear Models, 2nd ed., chapter 8).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np

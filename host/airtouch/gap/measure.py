@@ -13,8 +13,7 @@ from airtouch.gap import calibrate, callable_module, summary, twin
 from airtouch.gap.channels import residual
 from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, Flight, ready
-from airtouch.gap.gap_map import (CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of,
-                                   where)
+from airtouch.gap.gap_map import CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of, where
 from airtouch.gap.hardness import STILL_RAD, hardness_of
 from airtouch.gap.motion import held
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded

@@ -12,8 +12,8 @@ import numpy as np
 
 from airtouch.gap import edge_response
 from airtouch.gap.flight import Flight
-from airtouch.gap.spectra import LENGTH as AIR_LENGTH
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT
+from airtouch.gap.spectra import LENGTH as AIR_LENGTH
 from airtouch.gap.twin import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, Twin, frequencies, shapes
 from airtouch.simulation.effects import Active
 

@@ -12,7 +12,16 @@ import numpy as np
 
 from airtouch.logs.authors import GRAVITY, GYRO_LSB, range_m
 from airtouch.logs.flight_log import (
-    ACC, ACC_WORLD, ATTITUDE, AXES, GYRO, POSITION, PWM, RANGES, RPM, VELOCITY,
+    ACC,
+    ACC_WORLD,
+    ATTITUDE,
+    AXES,
+    GYRO,
+    POSITION,
+    PWM,
+    RANGES,
+    RPM,
+    VELOCITY,
 )
 from airtouch.logs.quaternion import decompress, euler, to_body
 

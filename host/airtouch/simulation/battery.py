@@ -1,6 +1,7 @@
 """A lithium-polymer battery: open-circuit voltage by charge, internal resistance, drain."""
 
 import numpy as np
+
 from airtouch.simulation.compiled import jit
 
 #: Charge left and open-circuit voltage of one cell: typical LiPo discharge curve.

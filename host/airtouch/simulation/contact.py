@@ -2,8 +2,8 @@
 
 import math
 
-from airtouch.simulation.compiled import jit
 from airtouch.simulation import signals as at
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.rotation import rotate_back
 
 SINK_M = 0.002  #: the legs give this much under the vehicle's weight

@@ -8,8 +8,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
-from airtouch.simulation import loop, setpoint
 from airtouch.simulation import effects as registry
+from airtouch.simulation import loop, setpoint
 from airtouch.simulation.effects import Active
 from airtouch.simulation.radio import received, rounded
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+
 from airtouch.simulation.compiled import jit
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation import kept, loop
 from airtouch.simulation import effects as registry
+from airtouch.simulation import kept, loop
 from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.effect import PARAMETERS, Wrenches
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed

@@ -1,10 +1,10 @@
 """The signals that effects see, from the vehicle's state and the world around it."""
 
-from airtouch.simulation.compiled import jit
 import math
 
 from airtouch.simulation import signals as at
 from airtouch.simulation import world
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.rotation import matrix, rotate_back
 
 

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from airtouch.simulation.compiled import jit
+
 from airtouch.errors import AirTouchError
+from airtouch.simulation.compiled import jit
 
 #: material -> (ground-effect factor, roughness). A hard smooth surface is 1; soft and porous
 #: ones give air room to escape. Set so that the order of the paper's four material pairs

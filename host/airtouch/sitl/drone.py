@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.simulation import loop, setpoint
+from airtouch.simulation.effects import Active
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.simulation.stepper import Stepper
-from airtouch.simulation.effects import Active
 from airtouch.sitl.app import App
 from airtouch.sitl.commander import PERIOD_S, Commander
 from airtouch.sitl.planner import DISABLED, FLYING, LANDING
