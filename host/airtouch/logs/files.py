@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError, shown
-from airtouch.logs import authors, canonical, crazypad, imrclab, usd
+from airtouch.logs import authors, canonical, crazypad, imrclab, usd, usd_old
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.readings import checked
 from airtouch.logs.table import Sheet, names_of, sheet
@@ -121,6 +121,8 @@ def _by_content(data: bytes, source: str) -> FlightLog:
         return ulog.read(data, source)
     if data[0] == usd.MAGIC:
         return usd.read(data, source)
+    if usd_old.matches(data):
+        return usd_old.read(data, source)
     return _by_header(sheet(_text(data, source)), source)
 
 

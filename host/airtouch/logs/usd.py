@@ -22,7 +22,8 @@ from airtouch.logs.variables import to_columns
 
 MAGIC = 0xBC
 MAIN_EVENT = "fixedFrequency"
-_TYPES = {"b": "i1", "B": "u1", "?": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "l": "<i4",
+#: struct's type letters as NumPy's types
+TYPES = {"b": "i1", "B": "u1", "?": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "l": "<i4",
           "L": "<u4", "q": "<i8", "Q": "<u8", "e": "<f2", "f": "<f4", "d": "<f8"}
 
 
@@ -108,10 +109,10 @@ def _event(name: str, declared: list[str], version: int, source: str) -> Event:
     fields = [("id", "<u2"), ("time", "<u4" if version == 1 else "<u8")]
     for i, text in enumerate(declared):
         letter = text[-2:-1]
-        if len(text) < 4 or text[-3] != "(" or text[-1] != ")" or letter not in _TYPES:
+        if len(text) < 4 or text[-3] != "(" or text[-1] != ")" or letter not in TYPES:
             raise AirTouchError(f"{source}: damaged uSD header: variable '{shown(text, 30)}' has no known type; "
                                 "copy it from the card again")
-        fields.append((f"v{i}", _TYPES[letter]))
+        fields.append((f"v{i}", TYPES[letter]))
     return Event(name, tuple(text[:-3] for text in declared), np.dtype(fields))
 
 

@@ -23,7 +23,7 @@ from airtouch.logs.flight_log import (
     RPM,
     VELOCITY,
 )
-from airtouch.logs.quaternion import decompress, euler, to_body
+from airtouch.logs.quaternion import decompress, euler, rotation, to_body
 
 _DEGREE = np.pi / 180.0
 _MOTORS = (1, 2, 3, 4)
@@ -70,6 +70,7 @@ def to_columns(table: Mapping[str, np.ndarray], meta: dict[str, Any]) -> dict[st
         if variable in table:
             columns[name] = range_m(table[variable], zero_is_invalid=True)
     _attitude(table, columns)
+    _rates(table, columns, meta)
     _acceleration(table, columns, meta)
     return columns
 
@@ -80,6 +81,31 @@ def _attitude(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray]) -
         columns |= dict(zip(ATTITUDE, euler(np.column_stack([table[v] for v in quaternion])), strict=True))
     elif "stateEstimateZ.quat" in table and not all(name in columns for name in ATTITUDE):
         columns |= dict(zip(ATTITUDE, euler(decompress(table["stateEstimateZ.quat"])), strict=True))
+
+
+def _rates(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    """Body rates from `stateEstimateZ.rate*` (mrad/s) where no gyro is logged.
+
+    Releases differ in the sign of the pitch rate; it is the sign that fits the logged attitude.
+    """
+    names = [f"stateEstimateZ.rate{a}" for a in ("Roll", "Pitch", "Yaw")]
+    if GYRO[0] in columns or not all(name in table for name in names):
+        return
+    pitch, turned = 1e-3 * table[names[1]], _pitch_rate(columns)
+    fits = float(np.sum(pitch[1:] * turned)) if turned is not None else 0.0
+    if not fits:
+        meta["warnings"].append("the sign of stateEstimateZ.ratePitch is unknown without attitude: gyro left out")
+        return
+    columns |= dict(zip(GYRO, (1e-3 * table[names[0]], np.sign(fits) * pitch, 1e-3 * table[names[2]]), strict=True))
+
+
+def _pitch_rate(columns: dict[str, np.ndarray]) -> np.ndarray | None:
+    """Rotation about the body's y axis from each row to the next, rad, shape (n-1,); 0 where it is unknown."""
+    if not all(name in columns for name in ATTITUDE):
+        return None
+    r = rotation(*(columns[name] for name in ATTITUDE))
+    step = np.einsum("nji,njk->nik", r[:-1], r[1:])
+    return np.nan_to_num(0.5 * (step[:, 0, 2] - step[:, 2, 0]))
 
 
 def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray],
