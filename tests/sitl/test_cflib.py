@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from airtouch.crazyflie import mission
 from airtouch.sitl import serve
 from patience import HANG_S
 from sitl.clients import connected, log_block, wait_for
@@ -106,11 +107,11 @@ def test_scan_finds_it(cflib, monkeypatch):
 
 
 def test_sweep_over_a_platform_is_felt(monkeypatch):
-    with simulated(monkeypatch, "paper-4cm", flight=1) as virtual, connected(virtual.uri) as cf:
+    with simulated(monkeypatch, mission.scene_of("sweep"), flight=1) as virtual, connected(virtual.uri) as cf:
         wait_for, let_fly = virtual.clock.wait_for, virtual.clock.sleep
         plan, rows = virtual.plan, []
         start, _, end, _ = plan.world.box[0]
-        height = plan.values["cruise"]
+        height = plan.values["top"] + plan.values["clearance"]
         log_block(cf, "edges", 10, {"stateEstimate.x": "float", "range.zrange": "uint16_t",
                                     "airtouch.edges": "uint16_t", "airtouch.edge": "uint8_t",
                                     "airtouch.health": "uint16_t"}, rows)

@@ -7,7 +7,7 @@ import click
 
 
 @click.command("sitl")
-@click.argument("scenario", default="paper-9cm")
+@click.argument("scenario", default="sweep")
 @click.option("--port", default=19850, show_default=True,
               help="UDP port; cflib scans 19850 to 19859. 0: any free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")

@@ -53,8 +53,9 @@ def write_report(
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
     template = environment.from_string(source)
+    answers = [answer(*row) for row in sorted(summaries.items(), key=_missed)]
     page = template.render(
-        title=title, answers=[answer(*row) for row in sorted(summaries.items(), key=_missed)], summaries=summaries, columns=COLUMNS, cell=cell,
+        title=title, answers=answers, summaries=summaries, columns=COLUMNS, cell=cell,
         breakdowns={f"{first} by height": summary.by_height(scores[first]),
                     f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
                     f"{first} by wind": summary.by_wind(scores[first])},
@@ -76,7 +77,7 @@ def answer(name: str, table: Mapping[str, Any]) -> str:
         return (f"{name}: {table['detections']} edges detected on {table['flights']} flights; "
                 "there is no true edge to compare with.")
     error = table["mean_abs_error_m"]
-    found = "none was found" if error is None else f"mean distance error of those found {error:.3f} m"
+    found = "none was found" if error is None else f"the edges found are {error:.3f} m off on average"
     return (f"{name} on {table['flights']} flights with {table['edges']} edges: "
             f"{table['missed_count']} missed ({table['missed']:.0%}), {table['false_count']} false "
             f"({table['false_per_minute']:.1f} a minute), {found}.")
