@@ -46,6 +46,11 @@ def test_detect_and_evaluate_take_a_file_a_log_and_a_table(log, path):
     assert len({s["missed_count"] for s in scores}) == 1
 
 
+def test_the_speed_of_a_simulated_flight_is_known(log):
+    speed = log.meta["condition"]["speed"]
+    assert at.evaluate(log, "baseline")["per_flight"] == at.evaluate(log, "baseline", speed_mps=speed)["per_flight"]
+
+
 def test_a_table_goes_there_and_back(log):
     back = at.from_pandas(at.to_pandas(log).assign(more=1.0))
     assert back.meta["vehicle"] == log.meta["vehicle"] and set(back.columns) == set(log.columns)

@@ -86,7 +86,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
              model: str | Path | None = None) -> dict[str, Any]:
     """Score a detector on flights with known edges: the content of `airtouch evaluate --json`.
 
-    flights: files, folders (by their manifest) or logs; speed_mps: commanded speed where no manifest says it.
+    flights: files, folders (by their manifest) or logs; speed_mps: commanded speed where no manifest and no log says it.
     """
     from airtouch.detector import dataset, registry
     from airtouch.detector import evaluate as scoring
@@ -97,7 +97,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     paths = [f for f in inputs if isinstance(f, (str, Path))]
     scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), chosen, trained) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
-        speed = speed_mps or log.meta.get("speed_mps")
+        speed = speed_mps or _flown_speed(log)
         scoring.check(log, scoring.spare_of(chosen))
         if scoring.truth(log) and speed is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
@@ -179,6 +179,12 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
                            command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return adapted
+
+
+def _flown_speed(log: FlightLog) -> float | None:
+    """Commanded speed that a log's metadata holds (of a converted or a simulated flight), m/s."""
+    drawn = log.meta.get("condition")
+    return log.meta.get("speed_mps") or (drawn.get("speed") if isinstance(drawn, Mapping) else None)
 
 
 def _several(flights: Any) -> list[Any]:
