@@ -30,8 +30,8 @@ docs:  ## build the site of host/docs, strictly: build/site
 	build/docs-env/bin/python -m pip install --quiet -c tools/docs-constraints.txt mkdocs-material
 	build/docs-env/bin/mkdocs build --strict -f host/mkdocs.yml -d $(CURDIR)/build/site
 
-fuzz:  ## fuzz the C that flies for long: [TARGET="parser app"] [RUNS=1000000]
-	$(PYTHON) tools/fuzz.py $(TARGET) $(if $(RUNS),--runs $(RUNS))
+fuzz:  ## fuzz the C that flies for long: [TARGET="parser app"] [RUNS=1000000] [RESUME=1]
+	$(PYTHON) tools/fuzz.py $(TARGET) $(if $(RUNS),--runs $(RUNS)) $(if $(RESUME),--resume)
 
 fuzz-logs: setup  ## fuzz the log readers: [RUNS=100000] [ARGS="--format usd-2 --first 100000"]
 	$(BIN)/python tools/fuzz_logs.py --count $(or $(RUNS),100000) $(ARGS)

@@ -1,16 +1,19 @@
 """Fuzzes the C that flies: builds the targets of tests/fuzz with sanitizers, runs them, and keeps what they find.
 
     make fuzz [TARGET="parser app"] [RUNS=1000000]        # or: python tools/fuzz.py parser app --runs 1000000
+    make fuzz TARGET=app RESUME=1                         # goes on to RUNS inputs where an earlier run was ended
     python tools/fuzz.py app --replay build/fuzz/findings/app/crash-...
     python tools/fuzz.py --coverage                       # lines that the corpus reaches, source by source
     python tools/fuzz.py --keep                           # the corpus, made small, becomes the seeds of tests/fuzz
 
 With clang the engine is libFuzzer, which follows coverage; else a small driver of our own under the C compiler's
 sanitizers, which only mutates the seeds. Everything is under build/fuzz: a corpus that grows from run to run, the
-findings, the logs. host/docs/fuzzing.md says what the targets promise.
+findings, the logs, and inputs.csv, which says how many inputs each program ran. host/docs/fuzzing.md says what the
+targets promise.
 """
 
 import argparse
+import csv
 import hashlib
 import os
 import re
@@ -24,7 +27,7 @@ import time
 import tomllib
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -37,7 +40,12 @@ FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-
 INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link", "firmware/app/src",
             "gap8/kernels", "gap8/model", "gap8/app/src"]
 XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
-VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
+# The shipped network's kernels with address alone: half of the time of the targets that run it at every step. `gap8` runs
+# the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
+ADDRESS = ["-fno-sanitize=undefined,float-cast-overflow,float-divide-by-zero"]
+#: A target's own flags, for its harness and the sources below gap8/, and whose source it is.
+VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP), "app": ("app", ADDRESS),
+            "stream_detector": ("stream_detector", ADDRESS)}
 # Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
 # says it.
 OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
@@ -45,6 +53,7 @@ OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
 LONG = ("-O2",)  # of runs in which the inputs cost more than the compiler: a third less for those of a network
 LONGEST = 2048  # bytes of an input
 TIMEOUT = 20  # seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
+BATCH = 50_000  # inputs that are run with one seed, and counted together
 SEED_BYTES = 9_000  # kept of a target, at most, with what the archive needs for each input
 ENTRY_BYTES = 110  # of the archive
 
@@ -136,7 +145,7 @@ def _compile(made_by: Engine, source: Path, flags: tuple[str, ...]) -> Path:
 def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None = None, folder: Path | None = None,
           flags: tuple[str, ...] = (), only: list[Path] | None = None) -> dict[str, Path]:
     """The programs of the named targets. replaced: other sources in the place of the product's; only: of these alone."""
-    folder = folder or BUILD / "bin" / made_by.name
+    folder = folder or BUILD / "bin" / "".join((made_by.name, *flags))  # a test may build beside a long run
     folder.mkdir(parents=True, exist_ok=True)
     sources = [(replaced or {}).get(path, path) for path in only or product_sources()]
     counted = made_by.product + flags
@@ -172,15 +181,17 @@ def corpus(name: str, folder: Path | None = None) -> Path:
 
 
 def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None = None) -> Result:
-    """Runs a target over its corpus and `runs` inputs in all; stops at the first finding."""
+    """Runs a target over its corpus and then `runs` inputs, which are those that count; stops at the first finding."""
     folder = folder or BUILD
     findings = folder / "findings" / name
     findings.mkdir(parents=True, exist_ok=True)
     before = set(findings.iterdir())
     log = folder / "logs" / f"{name}.txt"
     log.parent.mkdir(parents=True, exist_ok=True)
-    command = [program, f"-runs={runs}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
-               "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", corpus(name, folder)]
+    held = corpus(name, folder)
+    known = sum(1 for _ in held.iterdir())
+    command = [program, f"-runs={runs + known}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
+               "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", held]
     used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     with log.open("w") as to:
         done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | OPTIONS)
@@ -191,8 +202,35 @@ def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None 
         raise SystemExit(f"{name} failed without a finding; see {log}\n{text[-2000:]}")
     executed = re.findall(r"stat::number_of_executed_units:\s*(\d+)", text)
     reached = re.findall(r"cov: (\d+) ft: (\d+)", text) or [("0", "0")]
-    return Result(name, int(executed[-1]) if executed else 0, int(reached[-1][0]), int(reached[-1][1]), cpu,
+    return Result(name, max(0, int(executed[-1]) - known) if executed else 0, int(reached[-1][0]), int(reached[-1][1]), cpu,
                   new[0] if done.returncode else None, log)
+
+
+def run_batches(name: str, program: Path, runs: int, seed: int, resume: bool, folder: Path | None = None) -> Result:
+    """Runs `runs` inputs in batches, each with the next seed, and notes each in inputs.csv; stops at the first finding.
+
+    With resume, what inputs.csv says of this very program counts, so that a run that was ended goes on. The result's
+    inputs and CPU time are those of all batches that count.
+    """
+    ledger = (folder or BUILD) / "inputs.csv"
+    digest = hashlib.sha256(program.read_bytes()).hexdigest()[:16]
+    before = []
+    if resume and ledger.exists():
+        with ledger.open() as lines:
+            before = [line for line in csv.reader(lines) if line[:2] == [name, digest]]
+    inputs, cpu = sum(int(line[3]) for line in before), sum(float(line[4]) for line in before)
+    result = Result(name, inputs, 0, 0, cpu, None, ledger)
+    for number in range(len(before), len(before) + runs):  # a batch has one input at least
+        if inputs >= runs or result.finding:
+            break
+        result = run(name, program, min(BATCH, runs - inputs), seed + number, folder)
+        with ledger.open("a") as lines:
+            csv.writer(lines).writerow([name, digest, seed + number, result.inputs, round(result.cpu, 1),
+                                        "found" if result.finding else "nothing found"])
+        inputs, cpu = inputs + result.inputs, cpu + result.cpu
+        if sys.stderr.isatty():
+            print(f"\r{name}: {inputs} of {runs} ", end="", file=sys.stderr, flush=True)
+    return replace(result, inputs=inputs, cpu=cpu)
 
 
 def keep(name: str, program: Path) -> tuple[int, int]:
@@ -244,6 +282,7 @@ def main() -> None:
     parser.add_argument("targets", nargs="*", help=f"of {', '.join(targets())}; all by default")
     parser.add_argument("--runs", type=int, default=1_000_000, help="inputs of each target (1000000)")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of the mutations; the clock by default")
+    parser.add_argument("--resume", action="store_true", help="what earlier runs of the same programs did counts")
     parser.add_argument("--engine", choices=["libfuzzer", "standalone"], default="")
     parser.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
     parser.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
@@ -268,7 +307,7 @@ def main() -> None:
           f"{'target':16} {'inputs':>9} {'edges':>6} {'features':>8} {'CPU s':>6}  result", flush=True)
     failed = False
     for name in names:
-        result = run(name, programs[name], wanted.runs, wanted.seed)
+        result = run_batches(name, programs[name], wanted.runs, wanted.seed, wanted.resume)
         failed |= result.finding is not None
         verdict = "nothing found" if result.finding is None else (
             f"FOUND, see {result.log.relative_to(ROOT)}; replay: "

@@ -40,8 +40,7 @@ def programs(engine):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_found(programs, name, tmp_path):
-    seeds = len(list(fuzz.corpus(name, tmp_path).iterdir()))
-    result = fuzz.run(name, programs[name], seeds + MUTATIONS, folder=tmp_path)
+    result = fuzz.run(name, programs[name], MUTATIONS, folder=tmp_path)
     assert result.finding is None, result.log.read_text(errors="replace")[-3000:]
     assert result.inputs >= MUTATIONS
 
@@ -72,6 +71,18 @@ def test_the_driver_of_our_own_finds_a_planted_defect(tmp_path):
     elsewhere.mkdir()
     assert subprocess.run([program, result.finding], capture_output=True, cwd=elsewhere).returncode != 0
     assert list(elsewhere.iterdir()) == [], "a replay writes no file into the folder in which it is run"
+
+
+def test_a_run_that_was_ended_goes_on(programs, tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzz, "BATCH", 400)
+    first = fuzz.run_batches("parser", programs["parser"], 900, 1, True, tmp_path)
+    again = fuzz.run_batches("parser", programs["parser"], 2000, 1, True, tmp_path)
+    lines = [line.split(",") for line in (tmp_path / "inputs.csv").read_text().splitlines()]
+    assert 900 <= first.inputs < 2000 <= again.inputs == sum(int(line[3]) for line in lines)
+    assert [int(line[2]) for line in lines] == [1 + i for i in range(len(lines))], "every batch has its own seed"
+    assert sum(int(line[3]) for line in lines[:3]) == first.inputs, "what the first run did is not run again"
+    anew = fuzz.run_batches("parser", programs["parser"], 400, 1, False, tmp_path)
+    assert 400 <= anew.inputs < 900, "without --resume all begins anew"
 
 
 def test_the_kept_seeds_are_small():
