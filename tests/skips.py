@@ -6,6 +6,7 @@ A new reason that names a tool or a package goes into TOOLS.
 
 import os
 import re
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,11 @@ TOOLS = re.compile(r"could not import|pip install|needs the extra|needs cflib|on
 def folder() -> Path:
     """Where recorded flights are looked for."""
     return Path(os.environ.get("AIRTOUCH_FLIGHTS", Path(__file__).parents[2] / "shared" / "flights"))
+
+
+def needs(package: str) -> pytest.MarkDecorator:
+    """Skips where a package is missing; unlike importorskip it is not imported while the tests are collected."""
+    return pytest.mark.skipif(find_spec(package) is None, reason=f"could not import {package!r}")
 
 
 def _guard(report: pytest.TestReport | pytest.CollectReport) -> None:

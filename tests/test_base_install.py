@@ -1,7 +1,10 @@
 """The base install detects, diagnoses and simulates: nothing on those paths asks for an extra."""
 
+import json
 import subprocess
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
@@ -9,60 +12,90 @@ import short_flights
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.extras import EXTRAS, need
+from patience import HANG_S
 
+#: Every command as a process of its own, forked from one that has imported what most of them need.
 BLOCK = f"""
-import sys
+import json, os, sys, traceback
 class Absent:
     def find_spec(self, name, path=None, target=None):
         if name.split(".")[0] in {sorted({m for some in EXTRAS.values() for m in some})!r}:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Absent())
+import airtouch.gap.measure, airtouch.simulation.batch
 from airtouch.cli import main
-sys.argv = ["airtouch", *sys.argv[1:]]
-main()
+for words, folder in json.load(sys.stdin):
+    if not (pid := os.fork()):
+        for number, name in ((1, "out"), (2, "err")):
+            os.dup2(os.open(folder + "." + name, os.O_WRONLY | os.O_CREAT), number)
+        sys.argv, code = ["airtouch", *words], 0
+        try:
+            main()
+        except SystemExit as left:
+            code = left.code or 0
+        except BaseException:
+            code = traceback.print_exc() or 1
+        sys.stdout.flush(), sys.stderr.flush()
+        os._exit(code)  # to tear the interpreter down takes longer than most commands
+    print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 """
+WORKS = [("evaluate", "{flight}", "--speed", "0.3"), ("evaluate", "{flight}", "--speed", "0.3", "--detector", "paper"),
+         ("gap", "measure", "{flight}", "--report", "{out}/gap.html"), ("simulate", "hover", "--out", "{out}/flown", "--workers", "1"),
+         ("logs", "check", "{flight}"), ("--help",)]
+TRAINS = [("demo", "--out", "{out}/demo"), ("train", "{flight}", "--out", "{out}/m.npz"),
+          ("adapt", "{flight}", "--out", "{out}/m.npz"), ("twin", "{flight}", "--out", "{out}/twin")]
+DRAWS = {("map", "{flight}", "--truth", "--out", "{out}/m.geojson"): "map", ("gap", "blind", "run", "{out}/set", "-n", "1"): "plots"}
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command came to; out: the folder that it was given."""
+
+    code: int
+    error: str
+    out: Path
 
 
 @pytest.fixture(scope="module")
-def flight(tmp_path_factory):
-    path = tmp_path_factory.mktemp("base") / "flight.csv.gz"
-    logs.write(short_flights.fly(1)[0], path)
-    return path
+def done(tmp_path_factory):
+    """Every command without any extra."""
+    folder = tmp_path_factory.mktemp("base")
+    flight = folder / "flight.csv.gz"
+    logs.write(short_flights.fly(1)[0], flight)
+    commands = [*WORKS, *TRAINS, *DRAWS]
+    places = [folder / str(i) for i in range(len(commands))]
+    asked = []
+    for command, place in zip(commands, places, strict=True):
+        place.mkdir()
+        asked.append(([word.format(flight=flight, out=place) for word in command], str(place)))
+    ran = subprocess.run([sys.executable, "-c", BLOCK], input=json.dumps(asked), capture_output=True, text=True, timeout=HANG_S)
+    assert ran.returncode == 0, ran.stderr
+    return {command: Done(int(code), place.with_name(place.name + ".err").read_text(), place)
+            for command, place, code in zip(commands, places, ran.stdout.split(), strict=True)}
 
 
-def run(*arguments):
-    return subprocess.run([sys.executable, "-c", BLOCK, *map(str, arguments)], capture_output=True, text=True, timeout=600)
+@pytest.mark.parametrize("command", WORKS)
+def test_works_without_any_extra(done, command):
+    assert done[command].code == 0, done[command].error
 
 
-@pytest.mark.parametrize("command", [
-    ("evaluate", "{flight}", "--speed", "0.3"), ("evaluate", "{flight}", "--speed", "0.3", "--detector", "paper"),
-    ("gap", "measure", "{flight}", "--report", "{out}/gap.html"), ("simulate", "hover", "--out", "{out}/flown", "--workers", "1"),
-    ("logs", "check", "{flight}"), ("--help",)])
-def test_works_without_any_extra(flight, tmp_path, command):
-    done = run(*(word.format(flight=flight, out=tmp_path) for word in command))
-    assert done.returncode == 0, done.stderr
+@pytest.mark.parametrize("command", TRAINS)
+def test_training_says_at_once_what_is_missing(done, command):
+    said = done[command]
+    assert said.code == 2 and "pip install 'airtouch[train]'" in said.error and "tensorflow" in said.error, said.error
+    assert "Traceback" not in said.error and not list(said.out.iterdir())
 
 
-@pytest.mark.parametrize("command", [("demo", "--out", "{out}/demo"), ("train", "{flight}", "--out", "{out}/m.npz"),
-                                     ("adapt", "{flight}", "--out", "{out}/m.npz"), ("twin", "{flight}", "--out", "{out}/twin")])
-def test_training_says_at_once_what_is_missing(flight, tmp_path, command):
-    done = run(*(word.format(flight=flight, out=tmp_path) for word in command))
-    assert done.returncode == 2 and "pip install 'airtouch[train]'" in done.stderr and "tensorflow" in done.stderr, done.stderr
-    assert "Traceback" not in done.stderr and not list(tmp_path.iterdir())
+def test_a_report_without_matplotlib_says_which_extra_brings_pictures(done):
+    page = (done[WORKS[2]].out / "gap.html").read_text(encoding="utf-8")
+    assert "airtouch[plots]" in page and "<img" not in page
 
 
-def test_a_report_without_matplotlib_says_which_extra_brings_pictures(flight, tmp_path):
-    done = run("gap", "measure", flight, "--report", tmp_path / "gap.html")
-    page = (tmp_path / "gap.html").read_text(encoding="utf-8")
-    assert done.returncode == 0 and "airtouch[plots]" in page and "<img" not in page
-
-
-@pytest.mark.parametrize("command, extra", [(("map", "{flight}", "--truth", "--out", "{out}/m.geojson"), "map"),
-                                            (("gap", "blind", "run", "{out}/set", "-n", "1"), "plots")])
-def test_plots_say_at_once_what_is_missing(flight, tmp_path, command, extra):
-    done = run(*(word.format(flight=flight, out=tmp_path) for word in command))
-    assert done.returncode == 2 and f"pip install 'airtouch[{extra}]'" in done.stderr and "Traceback" not in done.stderr
-    assert not list(tmp_path.iterdir())
+@pytest.mark.parametrize("command", DRAWS)
+def test_plots_say_at_once_what_is_missing(done, command):
+    said = done[command]
+    assert said.code == 2 and f"pip install 'airtouch[{DRAWS[command]}]'" in said.error and "Traceback" not in said.error
+    assert not list(said.out.iterdir())
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch):

@@ -40,12 +40,12 @@ FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-
 INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link", "firmware/app/src",
             "gap8/kernels", "gap8/model", "gap8/app/src"]
 XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
-# The shipped network's kernels with address alone: half of the time of the targets that run it at every step. `gap8` runs
-# the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
-ADDRESS = ["-fno-sanitize=undefined,float-cast-overflow,float-divide-by-zero"]
 #: A target's own flags, for its harness and the sources below gap8/, and whose source it is.
-VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP), "app": ("app", ADDRESS),
-            "stream_detector": ("stream_detector", ADDRESS)}
+VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
+# In long runs, the shipped network's kernels with address alone: half of the time of the targets that run it at every
+# step. `gap8` runs the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
+ADDRESS = ("-fno-sanitize=undefined,float-cast-overflow,float-divide-by-zero",)
+SHIPPED = ("app", "stream_detector")
 # Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
 # says it.
 OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
@@ -152,7 +152,7 @@ def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None =
     driver = [FUZZ / "standalone.c"] if made_by.name == "standalone" else []
 
     def program(name: str) -> tuple[str, Path]:
-        more = tuple(VARIANTS.get(name, ("", []))[1])
+        more = (*VARIANTS.get(name, ("", []))[1], *(ADDRESS if flags == LONG and name in SHIPPED else ()))
         objects = [_compile(made_by, path, flags + more) for path in (targets()[name], *driver)]
         # From an archive only what the target needs is linked in, and counted.
         library = folder / f"lib{name}.a"

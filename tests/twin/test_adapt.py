@@ -15,9 +15,10 @@ from airtouch.detector.score import EdgeScore, FlightScore
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.twin import adapt
+from skips import needs
 from twin_courses import PLAIN
 
-pytest.importorskip("tensorflow")
+pytestmark = needs("tensorflow")
 
 
 @pytest.fixture

@@ -11,8 +11,9 @@ from airtouch.cli import airtouch
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch, scenario
 from airtouch.twin.course import course
+from skips import needs
 
-pytest.importorskip("sklearn")
+pytestmark = needs("sklearn")
 
 
 def run(*arguments):

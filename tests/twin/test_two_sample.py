@@ -10,9 +10,10 @@ from airtouch.errors import AirTouchError
 from airtouch.twin.channels import channels
 from airtouch.twin.course import course
 from airtouch.twin.two_sample import area, area_within, number_names, two_sample, windows
+from skips import needs
 from twin_courses import PLAIN, made_course
 
-pytest.importorskip("sklearn")
+pytestmark = needs("sklearn")
 
 
 def flown(fly_course, count, seed, effects=PLAIN, **options):
