@@ -7,8 +7,10 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch.cli.ablate import command
+from airtouch.detector import best
 from airtouch.detector.ablation import ABLATIONS
 from airtouch.reference.motion_channels import NAMES, MotionConfig, motion_channels
+from made_flight import SMALL
 
 
 def run(*arguments: object):
@@ -16,9 +18,10 @@ def run(*arguments: object):
 
 
 @pytest.mark.slow
-def test_a_channel_group_a_size_and_a_variant(generated, tmp_path):
+def test_a_channel_group_a_size_and_a_variant(generated, tmp_path, monkeypatch):
     pytest.importorskip("tensorflow")
-    arguments = [generated, "--out", tmp_path / "folds", "--json", tmp_path / "a.json", "--steps", 8, "--epochs", 1,
+    monkeypatch.setattr(best, "Recipe", lambda: SMALL)
+    arguments = [generated, "--out", tmp_path / "folds", "--json", tmp_path / "a.json", "--steps", SMALL.steps, "--epochs", 1,
                  "--only", "f_w-only", "--only", "sparsity-85", "--only", "no-filter"]
     result = run(*arguments)
     assert result.exit_code == 0, result.output

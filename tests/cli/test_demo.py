@@ -6,7 +6,9 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch.cli import demo, flights
+from airtouch.detector import best
 from airtouch.errors import AirTouchError
+from made_flight import SMALL
 
 
 def run(*arguments):
@@ -18,7 +20,8 @@ def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
     pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
     monkeypatch.setattr(demo, "find_flights", lambda: None)
     monkeypatch.setattr(demo, "GENERATED", 8)
-    monkeypatch.setattr(demo, "STEPS", 40)
+    monkeypatch.setattr(demo, "STEPS", SMALL.steps)
+    monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     out = tmp_path / "demo"
     result = run("--out", out, "--epochs", 1)
     assert result.exit_code == 0, result.output

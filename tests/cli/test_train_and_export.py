@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from airtouch import logs
 from airtouch.cli import export as export_command
 from airtouch.cli import train as train_command
-from airtouch.detector import registry, simulated
+from airtouch.detector import best, registry, simulated
 from airtouch.errors import AirTouchError
+from made_flight import SMALL, made_flight
 from small_model import random_model
 
 
@@ -76,9 +78,10 @@ def train(*arguments: object):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("detector", "short"), [("best", ("--steps", 4)), ("paper", ("--epochs", 1))])
-def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, detector: str, short: tuple) -> None:
+@pytest.mark.parametrize(("detector", "short"), [("best", ("--steps", SMALL.steps)), ("paper", ("--epochs", 1))])
+def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, monkeypatch, detector: str, short: tuple) -> None:
     pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
+    monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     out = tmp_path / "m.npz"
     result = train("--simulated", 4, "--scenario", "paper-low", "--without", "gust", "--detector", detector, *short,
                    "--seed", 3, "--out", out)
@@ -119,10 +122,6 @@ def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple
 
 
 def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path) -> None:
-    from airtouch import logs
-    from airtouch.detector import best
-    from made_flight import SMALL, made_flight
-
     for folder, count in (("mine", 3), ("calm", 1)):
         (tmp_path / folder).mkdir()
         for i in range(count):
@@ -130,7 +129,7 @@ def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path
             if folder == "calm":
                 log.columns["zrange_m"][:] = 0.8
             logs.write(log, tmp_path / folder / f"f{i}.csv")
-    best.fit([made_flight(8)], recipe=SMALL, steps=5).save(tmp_path / "old.npz")
+    best.fit([made_flight(8)], recipe=SMALL).save(tmp_path / "old.npz")
     result = train(tmp_path / "mine", "--start", tmp_path / "old.npz", "--labelled", 2, "--free-air", tmp_path / "calm",
                    "--steps", 5, "--out", tmp_path / "new.npz")
     assert result.exit_code == 0, result.output

@@ -13,12 +13,6 @@ from airtouch.logs.flight_log import FlightLog
 from made_flight import SMALL, made_flight
 
 
-@pytest.fixture(scope="module")
-def small():
-    pytest.importorskip("tensorflow")
-    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
-
-
 def blind(log: FlightLog) -> FlightLog:
     return FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
 
@@ -114,13 +108,11 @@ def test_a_model_without_hashes_knows_names():
     assert not training_set.contains({}, log)
 
 
-def test_a_training_that_was_stopped_goes_on_to_the_same_bits(tmp_path, monkeypatch):
-    pytest.importorskip("tensorflow")
+def test_a_training_that_was_stopped_goes_on_to_the_same_bits(small, tmp_path, monkeypatch):
     from airtouch.detector.stream import training
 
     monkeypatch.setattr(training, "KEEP_EVERY", 10)
-    flights, recipe = [made_flight(0), made_flight(1)], replace(SMALL, steps=60)
-    whole = best.fit(flights, seed=3, recipe=recipe)
+    flights = [made_flight(0), made_flight(1)]
     seen = []
 
     def stop(stage, done, _total, _note):
@@ -129,9 +121,9 @@ def test_a_training_that_was_stopped_goes_on_to_the_same_bits(tmp_path, monkeypa
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        best.fit(flights, seed=3, recipe=recipe, work=tmp_path, progress=stop)
+        best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
     assert len(list(tmp_path.iterdir())) == 1 and ("steps", 50) in seen
     seen.clear()
-    again = best.fit(flights, seed=3, recipe=recipe, work=tmp_path, progress=stop)
+    again = best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
     assert ("steps", 50) not in seen and not list(tmp_path.iterdir())
-    assert again.to_bytes() == whole.to_bytes()
+    assert again.to_bytes() == small.to_bytes()

@@ -15,12 +15,6 @@ from airtouch.logs.flight_log import GYRO
 from made_flight import SMALL, made_flight
 
 
-@pytest.fixture(scope="module")
-def small():
-    pytest.importorskip("tensorflow")
-    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
-
-
 @pytest.mark.parametrize("sensor", sensors.SENSORS)
 def test_the_channels_of_a_missing_sensor_are_zero_and_the_others_as_they_were(sensor):
     log = made_flight(3)
@@ -75,7 +69,7 @@ def test_flight_is_told_causally():
 def test_a_sensor_that_no_training_flight_has_is_silent_for_good():
     pytest.importorskip("tensorflow")
     bare = [sensors.without(made_flight(i), ("acceleration",)) for i in (0, 1)]
-    model = best.fit(bare, recipe=SMALL, steps=5)
+    model = best.fit(bare, recipe=SMALL)
     assert set(sensors.CHANNELS_OF["acceleration"]) <= set(model.recipe.muted)
     log = made_flight(6)
     assert best.run(log, model).edges == best.run(sensors.without(log, ("acceleration",)), model).edges

@@ -22,13 +22,6 @@ from airtouch.reference.stream_int8 import run_stream
 from made_flight import SMALL, made_flight
 
 
-@pytest.fixture(scope="module")
-def small():
-    """A small model, trained for a moment on made flights."""
-    pytest.importorskip("tensorflow")
-    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
-
-
 def test_the_same_arguments_give_the_same_bits(small):
     best.fit([made_flight(2)], seed=4, recipe=SMALL)  # what was compiled is used again and must remember nothing
     again = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)

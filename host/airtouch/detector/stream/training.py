@@ -16,6 +16,8 @@ from airtouch.logs.files import write_bytes
 PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
 KEEP_EVERY = 100  #: steps between two states that are kept
 RANK_EVERY = 20  #: steps between two rankings of the weights
+#: fields of a recipe that a compiled step of learning follows from; the others are of crops and pruning
+COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "peak_rate", "weight_decay", "event_weight")
 
 Weights = dict[str, np.ndarray]
 
@@ -79,16 +81,19 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
 
 def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
     """(model with these weights, optimizer, masks, learn(x, y) -> loss), as if nothing had been learnt yet."""
-    model, optimizer, untouched, masks, learn = _compiled(recipe)
+    model, optimizer, untouched, masks, learn = _compiled(Recipe(**{name: getattr(recipe, name) for name in COMPILED}))
     model.set_weights(weights)
     for variable, value in zip(optimizer.variables, untouched, strict=True):
         variable.assign(value)
     return model, optimizer, masks, learn
 
 
-@lru_cache(maxsize=4)  # of a cross-validation all folds are of one recipe, and compiling takes as long as a hundred steps
+@lru_cache(maxsize=4)  # all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
 def _compiled(recipe: Recipe) -> tuple:
-    """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning."""
+    """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning.
+
+    recipe: with nothing of its own but COMPILED.
+    """
     import keras
     import tensorflow as tf
 
