@@ -1,6 +1,8 @@
 """The streaming network: quantised, saved, run; against tflite-micro, NumPy and its own windowed form."""
 
+import inspect
 import io
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 
 from airtouch import kernels, logs
 from airtouch.detector import best
-from airtouch.detector.stream import batches, quantisation
+from airtouch.detector.stream import batches, quantisation, training
 from airtouch.detector.stream import model as model_file
 from airtouch.detector.stream.float_network import float_logits
 from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
@@ -26,6 +28,13 @@ def test_the_same_arguments_give_the_same_bits(small):
     best.fit([made_flight(2)], seed=4, recipe=SMALL)  # what was compiled is used again and must remember nothing
     again = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
     assert again.to_bytes() == small.to_bytes()
+
+
+def test_what_is_compiled_is_known_by_all_that_it_reads():
+    """A field that the compiled step read and COMPILED lacked would be taken from another recipe."""
+    read = {name for part in (training._compiled.__wrapped__, training.build, Recipe.shapes.fget)
+            for name in re.findall(r"(?:recipe|self)\.(\w+)", inspect.getsource(part))}
+    assert read - {"shapes"} == set(training.COMPILED)
 
 
 def test_pruned_blocks_are_whole_and_exact(small):
@@ -76,8 +85,6 @@ def test_the_float_network_is_what_was_quantised(small):
 
 
 def test_the_float_network_is_the_one_that_keras_trained(small):
-    from airtouch.detector.stream import training
-
     keras_model = training.build(SMALL)
     last = len(SMALL.shapes) - 1
     shapes = [v.shape for v in keras_model.trainable_variables]
