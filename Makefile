@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
 
-.PHONY: help setup demo test docs fuzz fuzz-logs repeat bench firmware emulate gap8 flash clean
+.PHONY: help setup demo test lint docs fuzz fuzz-logs repeat bench firmware emulate gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -24,6 +24,9 @@ demo: setup  ## the main job: train, prune, export, detect through the C kernels
 
 test: setup  ## every test, sanitizers included
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
+
+lint: setup  ## ruff over Python and notebooks, by the settings in pyproject.toml; FIX=1 mends what it can
+	$(BIN)/ruff check $(if $(FIX),--fix) .
 
 docs:  ## build the site of host/docs, strictly: build/site
 	$(PYTHON) -m venv build/docs-env

@@ -1,7 +1,13 @@
 """What every test may ask for."""
 
+import importlib
 import os
 import sys
+
+import pytest
+from hypothesis import settings
+
+import skips
 
 # What Python compiles is kept, whatever the caller's setting: else each of two workers and some forty programs that the
 # tests start would compile the package anew, the workers the tests as well.
@@ -10,11 +16,8 @@ sys.dont_write_bytecode = False
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS"):
     os.environ.setdefault(_name, "1")  # before NumPy: tests run beside one another, and threads that wait spin
 
-import pytest
-from hypothesis import settings
-
-import skips
-from skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401
+pytest_make_collect_report = skips.pytest_make_collect_report
+pytest_runtest_makereport = skips.pytest_runtest_makereport
 
 settings.register_profile("reproducible", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
@@ -23,8 +26,8 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
 def pytest_configure(config):
     """The simulator is compiled once, before several workers would each do so."""
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
-        import airtouch.simulation.batch
-        import airtouch.simulation.replay  # noqa: F401
+        for name in ("batch", "replay"):
+            importlib.import_module(f"airtouch.simulation.{name}")
 
 
 @pytest.fixture(scope="session")

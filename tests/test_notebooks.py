@@ -17,7 +17,8 @@ def printed(name, tmp_path):
     """What the cells of a notebook print, executed in a kernel of this Python."""
     book = nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
     nbformat.validate(book)
-    nbclient.NotebookClient(book, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}).execute()
+    where = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(book, timeout=600, kernel_name="python3", resources=where).execute()
     return "".join(out.get("text", "") for cell in book.cells if cell.cell_type == "code" for out in cell.outputs)
 
 

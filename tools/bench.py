@@ -39,7 +39,8 @@ def compare(ours: Callable[[], object], peer: Callable[[], object]) -> tuple[flo
     """Median seconds of ours and of the peer, and median ratio peer / ours."""
     ours(), peer()
     pairs = [(seconds(ours), seconds(peer)) for _ in range(PAIRS)]
-    return (*(statistics.median(column) for column in zip(*pairs)), statistics.median(b / a for a, b in pairs))
+    return (*(statistics.median(column) for column in zip(*pairs, strict=True)),
+            statistics.median(b / a for a, b in pairs))
 
 
 def flights(limit: int) -> list[FlightLog]:
@@ -80,7 +81,8 @@ def bench_pipelines(table: Table, some: list[FlightLog]) -> None:
     for name, detector in (("paper", paper), ("best", best)):
         model = detector.load(None)
         detector.run(some[0], model)
-        spent = statistics.median(seconds(lambda: [detector.run(log, model) for log in some]) for _ in range(3))
+        spent = statistics.median(seconds(lambda run=detector.run, model=model: [run(log, model) for log in some])
+                                  for _ in range(3))
         table.add_row(f"{name} detector, a flight", f"{1e3 * spent / len(some):.2f} ms", "", f"{flown / spent:.0f}x",
                       "real time", f"n = {len(some)} flights, {flown:.0f} s")
 
@@ -112,7 +114,7 @@ def row_of_peers(table: Table, name: str, ours: Callable[[], object], tflite: by
     for peer, invoke in (("tflite-micro", micro(tflite)), ("LiteRT", litert(tflite))):
         if invoke is None:
             continue
-        a, b, ratio = compare(ours, lambda: [invoke(x[None]) for x in q])
+        a, b, ratio = compare(ours, lambda invoke=invoke: [invoke(x[None]) for x in q])
         row(table, name, a / computed, b / len(q), ratio * computed / len(q), peer, f"n = {computed} and {len(q)}")
 
 
@@ -151,7 +153,7 @@ def litert(content: bytes) -> Callable | None:
 def bench_training(table: Table, some: list[FlightLog]) -> None:
     """Training of the shipped models' size, once."""
     for name, detector in (("paper", paper), ("best", best)):
-        spent = seconds(lambda: detector.fit(some, seed=0))
+        spent = seconds(lambda detector=detector: detector.fit(some, seed=0))
         table.add_row(f"training {name}", f"{spent:.0f} s", "", "", "", f"n = {len(some)} flights")
 
 

@@ -30,7 +30,7 @@ FALSE_M = 0.02  #: what one false edge a minute costs, metres of mean error
 class Flight:
     """One flight: logits and airborne at each step, true edges, what turns seconds into metres, fold."""
 
-    def __init__(self, file: dataset.FlightFile, fold: int, model, silent: tuple[str, ...]) -> None:  # noqa: ANN001
+    def __init__(self, file: dataset.FlightFile, fold: int, model, silent: tuple[str, ...]) -> None:
         log = logs.read(file.path)
         events = best.flight_events(sensors.without(log, silent), model)
         self.file, self.fold, self.speed = file, fold, file.condition.speed_mps
@@ -77,7 +77,7 @@ def score(flight: Flight, config: DecoderConfig, lag: float) -> FlightScore:
 
 def figures(flights: list[Flight], found: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
     """Mean error of the edges found, share missed, false a minute."""
-    errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, found)])
+    errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, found, strict=True)])
     edges = sum(len(f.edges) for f in flights)
     late = np.concatenate([d - lag for d, _ in found])
     return {"error_m": float(errors.mean()) if len(errors) else MISS_M, "missed": 1 - len(errors) / edges,

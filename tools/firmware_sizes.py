@@ -72,7 +72,8 @@ def networks() -> int:
 
 def main(base: Path) -> None:
     """Build and print."""
-    print("| image | flash / RAM / CCM | added to stock | left | deepest stack of the app, bytes |\n|---|---|---|---|---|")
+    print("| image | flash / RAM / CCM | added to stock | left | deepest stack of the app, bytes "
+          "|\n|---|---|---|---|---|")
     for platform in dict.fromkeys(platform for _, platform, _ in IMAGES):
         stock = plain(base, platform)
         print(row(f"{platform}, stock", stock), flush=True)

@@ -163,7 +163,8 @@ def main() -> int:
         for name in options.format or sound.FORMATS:
             c = fuzz(name, options.seed, options.first, options.count, Path(folder))
             failed += c.failed
-            print("\r" * sys.stderr.isatty() + f"{name:13}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}"
+            print("\r" * sys.stderr.isatty()
+                  + f"{name:13}{options.count:9}{c.log:9}{c.refused:9}{c.failed:8}{c.worst_s[0]:9.3f}"
                   f" {c.worst_s[1]:<7}{c.worst_mb[0]:10.1f} {c.worst_mb[1]}", flush=True)
             for what, numbers in sorted(c.failures.items(), key=lambda item: -len(item[1])):
                 print(f"  {len(numbers)} times {what}\n    python tools/fuzz_logs.py --seed {options.seed} "

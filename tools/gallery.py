@@ -2,8 +2,8 @@
 
     airtouch gap demo; airtouch demo --force; python tools/gallery.py
 
-Flights are simulated with fixed seeds. Reports are photographed in Chromium at 1,280 and 390 pixels; without a browser or a
-report those pictures stay as they are, and the tool says so.
+Flights are simulated with fixed seeds. Reports are photographed in Chromium at 1,280 and 390 pixels; without a browser
+or a report those pictures stay as they are, and the tool says so.
 """
 
 import argparse
@@ -34,14 +34,16 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 def main() -> int:
     """Write the pictures; 1 where some could not be made."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--gap", type=Path, default=Path("out/gap-demo/report.html"), help="what `airtouch gap demo` wrote")
+    parser.add_argument("--gap", type=Path, default=Path("out/gap-demo/report.html"),
+                        help="what `airtouch gap demo` wrote")
     parser.add_argument("--demo", type=Path, default=Path("out/demo/report.html"), help="what `airtouch demo` wrote")
     parser.add_argument("--out", type=Path, default=Path("host/docs/img"), help="folder")
     options = parser.parse_args()
     made = {"virtual-flight": virtual_flight(), "zig-zag-map": zig_zag_map(), "virtual-errors": virtual_errors()}
     lacking = []
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    for name, page, width, height in (("gap-report", options.gap, 1280, 1250), ("gap-report-phone", options.gap, 390, 1000),
+    for name, page, width, height in (("gap-report", options.gap, 1280, 1250),
+                                      ("gap-report-phone", options.gap, 390, 1000),
                                       ("demo-report", options.demo, 1280, 1000)):
         if browser and page.exists():
             made[name] = photograph(browser, page, width, height)
@@ -70,7 +72,8 @@ def zig_zag_map() -> bytes:
     found = best.run(log, model).edges
     xy, _ = edge_map.track(log, None)
     points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found],
-                                  sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S), lag_s=best.lag_s(model))
+                                  sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S),
+                                  lag_s=best.lag_s(model))
     return draw_map(xy, points, edge_map.platforms(points), f"zig-zag: {len(points)} edges felt")
 
 
@@ -80,7 +83,8 @@ def virtual_errors(count: int = 20) -> bytes:
     scores = {}
     for name, module in (("best", best), ("paper", paper), ("baseline", baseline)):
         model = module.load(None)
-        scores[name] = [evaluate_flight(FlightFile(Path(log.source), Condition(speed_mps=log.meta["condition"]["speed"])),
+        scores[name] = [evaluate_flight(FlightFile(Path(log.source),
+                                                   Condition(speed_mps=log.meta["condition"]["speed"])),
                                         log, module, model).score for log in flights]
     return error_distribution(scores)
 

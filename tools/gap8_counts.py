@@ -1,7 +1,8 @@
 """What a network costs on the GAP8: bytes, instructions in plain rv32imc, cycles of its cluster. Nothing but emulators.
 
 A model is exported as `airtouch export` does, compiled for the chip's instruction set and run: over whole windows, as
-a stream, and on one to eight cores with XPULP. Outputs come with the counts, so that a count is never of something wrong.
+a stream, and on one to eight cores with XPULP. Outputs come with the counts, so that a count is never of something
+wrong.
 """
 
 import struct
@@ -104,7 +105,8 @@ def stream(chip: Chip, quantised: np.ndarray, outputs: int = 3) -> Run:
 
 
 def team_cycles(chip: Chip, window: np.ndarray, cores: int, outputs: int = 2) -> tuple[Cycles, np.ndarray]:
-    """One window (inputs,) int8 on so many XPULP cores: cycles by the model of tools/emulator/xpulp.py, and each core's output."""
+    """One window (inputs,) int8 on so many XPULP cores:
+    cycles by the model of tools/emulator/xpulp.py, and each core's output."""
     machine = XpulpMachine(chip.elf)
     x, arena = machine.allocate(window.size), _arena(machine, "networkInt8ArenaBytes", chip)
     machine.write(x, np.ascontiguousarray(window, np.int8).tobytes())

@@ -2,7 +2,8 @@
 
     python tools/gap8_figures.py [FLIGHTS] [--out out/gap8] [--counts]
 
-Costs come from emulators, seconds. Accuracy and edge error come from five folds by flight; folds that are done are kept in
+Costs come from emulators, seconds. Accuracy and edge error come from five folds by flight; folds that are done are kept
+in
 --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
 """
 
@@ -16,21 +17,22 @@ from typing import Any
 import click
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airtouch.cli.flights import need_flights  # noqa: E402
-from airtouch.detector import crossval, dataset, evaluate, export, paper, registry, summary  # noqa: E402
-from airtouch.detector.dataset import FlightFile  # noqa: E402
-from airtouch.detector.score import FlightScore  # noqa: E402
-from airtouch.detector.stream.export import golden_flight  # noqa: E402
-from airtouch.errors import AirTouchError  # noqa: E402
-from airtouch.kernels.network import arena_bytes, parameter_bytes  # noqa: E402
-from airtouch.kernels.rolling import rolling_size  # noqa: E402
-from airtouch.kernels.stream import arena_bytes as stream_arena_bytes  # noqa: E402
-from airtouch.logs.files import write_bytes  # noqa: E402
-from airtouch.reference.int8_network import multiplications, stream_multiplications  # noqa: E402
-from tools import gap8_counts  # noqa: E402
+from airtouch.cli.flights import need_flights
+from airtouch.detector import crossval, dataset, evaluate, export, paper, registry, summary
+from airtouch.detector.dataset import FlightFile
+from airtouch.detector.score import FlightScore
+from airtouch.detector.stream.export import golden_flight
+from airtouch.errors import AirTouchError
+from airtouch.kernels.network import arena_bytes, parameter_bytes
+from airtouch.kernels.rolling import rolling_size
+from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
+from airtouch.logs.files import write_bytes
+from airtouch.reference.int8_network import multiplications, stream_multiplications
+from tools import gap8_counts
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,19 @@ ROWS = (Row("`paper`, no zeros", "paper", {"sparsity": 0.0}, shipped=False),
         Row("`best`, 50 % zeros", "best"))
 #: What the paper states (sections 5.3 and 7): 14,375 bytes, 1.10 ms an inference; its split of windows leaks.
 PAPER = "| paper's own, as published | 14,375 | | | 0.27 M | | | 1.10 ms at 175 MHz = 193 k | | | | |"
-HEAD = """| network | parameters, bytes | flash, bytes | L1, bytes | MAC a 10 ms sample | rv32imc instructions a sample, mean / worst | XPULP cycles a window, 1 core | 8 cores | balanced, float / int8, % | edge error, float / int8, mm | int8 more than float on edges that both find, mm | missed, float / int8, % |
-|---|---|---|---|---|---|---|---|---|---|---|---|"""
+COLUMNS = ("network",
+           "parameters, bytes",
+           "flash, bytes",
+           "L1, bytes",
+           "MAC a 10 ms sample",
+           "rv32imc instructions a sample, mean / worst",
+           "XPULP cycles a window, 1 core",
+           "8 cores",
+           "balanced, float / int8, %",
+           "edge error, float / int8, mm",
+           "int8 more than float on edges that both find, mm",
+           "missed, float / int8, %")
+HEAD = f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|"
 
 
 def cost(row: Row, model: Any) -> dict[str, Any]:
@@ -61,7 +74,8 @@ def cost(row: Row, model: Any) -> dict[str, Any]:
     found: dict[str, Any] = {"parameters": parameter_bytes(network), "flash": chip.flash_bytes}
     if chip.kind == "stream":
         run = gap8_counts.stream(chip, golden_flight(network)[0][:200])
-        arena, columns, found["mac"] = stream_arena_bytes(network), network.channels, network.multiplications / network.stride
+        arena, columns = stream_arena_bytes(network), network.channels
+        found["mac"] = network.multiplications / network.stride
     elif chip.kind == "rolling":
         stride = paper.stride(model)
         run = gap8_counts.rolling(chip, export.golden_stream(network, stride)[0][:200], stride)
@@ -119,13 +133,15 @@ def more_error(scores: list[FlightScore], exact: list[FlightScore]) -> tuple[flo
 def line(row: Row, costs: dict[str, Any], figures: dict[str, Any] | None) -> str:
     """One row of the table."""
     step = f"{costs['instructions']:,.0f} / {costs['worst']:,}"
-    cycles = [f"{costs[f'cycles_{n}']:,} ({costs[f'branching_{n}']:,})" if f"cycles_{n}" in costs else "" for n in (1, 8)]
-    cells = [row.name, f"{costs['parameters']:,}", f"{costs['flash']:,}", f"{costs['l1']:,}", f"{costs['mac']:,.0f}", step,
-             *cycles]
+    cycles = [f"{costs[f'cycles_{n}']:,} ({costs[f'branching_{n}']:,})" if f"cycles_{n}" in costs else ""
+              for n in (1, 8)]
+    cells = [row.name, f"{costs['parameters']:,}", f"{costs['flash']:,}", f"{costs['l1']:,}", f"{costs['mac']:,.0f}",
+             step, *cycles]
     if figures:
         mean, low, high, edges = figures["more_m"]
         cells += [_pair(figures, "balanced_accuracy", 100), _pair(figures, "mean_abs_error_m", 1000),
-                  f"{1000 * mean:+.1f} [{1000 * low:.1f}, {1000 * high:.1f}], n = {edges}", _pair(figures, "missed", 100)]
+                  f"{1000 * mean:+.1f} [{1000 * low:.1f}, {1000 * high:.1f}], n = {edges}",
+                  _pair(figures, "missed", 100)]
     else:
         cells += [""] * 4
     return "| " + " | ".join(cells) + " |"
@@ -139,7 +155,8 @@ def _pair(figures: dict[str, Any], key: str, factor: float) -> str:
 
 @click.command()
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), default=ROOT / "out" / "gap8", help="Where finished folds are kept.")
+@click.option("--out", type=click.Path(path_type=Path), default=ROOT / "out" / "gap8",
+              help="Where finished folds are kept.")
 @click.option("--counts", is_flag=True, help="Costs of the shipped models only: no flights, no training.")
 def main(folder: Path | None, out: Path, counts: bool) -> None:
     """Print the table."""

@@ -31,8 +31,8 @@ def main(folder: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for name, (flights, baseline) in questions(folder).items():
         print(f"## {name}: {len(flights)} flights, {len(baseline)} nominal", flush=True)
-        subprocess.run([str(Path(sys.executable).with_name("airtouch")), "gap", "diagnose", *flights, "--vehicle", VEHICLE,
-                        *(["--baseline", *baseline] if baseline else []), "--json", str(out / f"{name}.json"),
+        subprocess.run([str(Path(sys.executable).with_name("airtouch")), "gap", "diagnose", *flights, "--vehicle",
+                        VEHICLE, *(["--baseline", *baseline] if baseline else []), "--json", str(out / f"{name}.json"),
                         "--report", str(out / f"{name}.html"), "--force"], check=True)
 
 

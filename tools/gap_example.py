@@ -24,7 +24,8 @@ def main(folder: Path) -> None:
     real = batch.flights(SCENARIO, 1, effects=list(EFFECT.items()), seed=REAL_SEED, workers=1)
     for name, log in [*((f"nominal_{i}", log) for i, log in enumerate(nominal)), *(("real", log) for log in real)]:
         kept = {k: v for k, v in log.columns.items() if not k.startswith(DROPPED)}
-        about = {"vehicle": log.meta["vehicle"], "acc_frame": log.meta["acc_frame"], "made_by": "python tools/gap_example.py"}
+        about = {"vehicle": log.meta["vehicle"], "acc_frame": log.meta["acc_frame"],
+                 "made_by": "python tools/gap_example.py"}
         logs.write(logs.FlightLog(kept, {**about, "source": name}), folder / f"{name}.csv.gz", force=True)
     (folder / example.ANSWER).write_text(tomli_w.dumps({"effects": EFFECT, "made_by": "python tools/gap_example.py"}))
 

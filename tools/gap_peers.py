@@ -32,7 +32,8 @@ def main(folder: Path) -> None:
     rows = [r for r in csv.DictReader((folder / "manifest.csv").open()) if not r["file"].startswith("cal")]
     first = third = 0
     shrinks, wrong = [], []
-    print("| effect | strength | verdict | named | shrink | with a wrong effect | CPU s |\n|---|---|---|---|---|---|---|")
+    print("| effect | strength | verdict | named | shrink | with a wrong effect | CPU s "
+          "|\n|---|---|---|---|---|---|---|")
     for row in rows:
         v = row["vehicle"]
         began = time.process_time()
@@ -54,7 +55,8 @@ def main(folder: Path) -> None:
     print(f"\ntop-1 {interval(first, len(rows))}; top-3 {interval(third, len(rows))}")
     if shrinks:
         print(f"shrink with the right effect: median {sorted(shrinks)[len(shrinks) // 2]:.2f}, "
-              f">= 0.80 in {sum(s >= 0.8 for s in shrinks)} of {len(shrinks)}; with a wrong one at most {max(wrong):.2f}")
+              f">= 0.80 in {sum(s >= 0.8 for s in shrinks)} of {len(shrinks)}; with a wrong one at most "
+              f"{max(wrong):.2f}")
 
 
 if __name__ == "__main__":

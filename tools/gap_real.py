@@ -1,7 +1,8 @@
 """The diagnosis on recorded flights and on other people's simulators, each row of the table in host/docs/gap-real.md.
 
-    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep cases.jsonl]
-    python tools/gap_real.py --quick          # a few flights of each row; fails where the diagnosis is broken
+    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep
+    cases.jsonl] python tools/gap_real.py --quick          # a few flights of each row; fails where the diagnosis is
+    broken
 
 build: the flights on which settings may be chosen: the authors' folds 0 to 2, neural-swarm's days 19 and 20, three of
 CrazyPAD's conditions in four. view: the rest, of which each look is a line of host/docs/looks.md, and the peers, on
@@ -115,7 +116,8 @@ def _wanted(part: str, build: bool) -> bool:
     return part == "all" or build == (part == "build")
 
 
-_LAST: dict[tuple[str, tuple[str, ...]], Diagnosis] = {}  #: of this process, whose calibration serves the next case alike
+#: of this process, whose calibration serves the next case alike
+_LAST: dict[tuple[str, tuple[str, ...]], Diagnosis] = {}
 ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "peers": peers}
 
 
@@ -190,10 +192,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=list(ROWS))
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
-    parser.add_argument("--quick", action="store_true", help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
+    parser.add_argument("--quick", action="store_true",
+                        help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
     if args.quick:  # of the parts for building, and two peers
-        cases = quick([c for row, make in ROWS.items() for c in make(args.flights, "view" if row == "peers" else "build")])
+        cases = quick([c for row, make in ROWS.items()
+                       for c in make(args.flights, "view" if row == "peers" else "build")])
     else:
         cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
     done = {}
@@ -211,7 +215,8 @@ def main(arguments: list[str] | None = None) -> int:
     show(told)
     wrong = [c["flight"] for c in told if answer(c) != c["truth"]]
     if args.quick and len(wrong) > QUICK_WRONG:
-        print(f"gap_real: {len(wrong)} of {len(told)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}", file=sys.stderr)
+        print(f"gap_real: {len(wrong)} of {len(told)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}",
+              file=sys.stderr)
         return 1
     return 0
 

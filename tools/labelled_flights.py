@@ -1,15 +1,17 @@
 """What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
-    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled [--labelled 2 --labelled 5]
+    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled [--labelled 2 --labelled
+    5]
         [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
 Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
-that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained on the
-same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of learning.
---start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the second the
-other: a twin's detector, whose twin was fitted to the other half. What is in --out already is not done again, so a run that was
-stopped goes on.
-Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the flights scored, each with all its draws.
+that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained
+on the same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of
+learning.
+--start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the
+second the other: a twin's detector, whose twin was fitted to the other half. What is in --out already is not done
+again, so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over
+the flights scored, each with all its draws.
 """
 
 import argparse
@@ -63,7 +65,8 @@ def scored(model: StreamModel, held: Sequence[FlightFile], readable: dict[Path, 
     """Scores of the held-out flights. Raises AirTouchError where the model knows one."""
     for file in held:
         if training_set.contains(model.metadata, readable[file.path]):
-            raise AirTouchError(f"{file.path}: the model to start from was trained on this flight; train one without it")
+            raise AirTouchError(f"{file.path}: the model to start from was trained on this flight; train one without "
+                                "it")
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
@@ -109,7 +112,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--start", type=Path, action="append", default=[],
-                        help="model to go on from, one for all groups or one for each in their order; the rows without it if left out")
+                        help="model to go on from, one for all groups or one for each in their order; the rows without "
+                             "it if left out")
     parser.add_argument("--by", choices=("halves", "day"), default="halves")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"))
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
@@ -126,9 +130,10 @@ def main() -> None:
         raise SystemExit(f"not usable: {left_out[0][1]}")
     groups = sorted({group_of(file, options.by) for file in files})
     if len(options.start) not in (0, 1, len(groups)):
-        raise SystemExit(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one for each")
+        raise SystemExit(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one for "
+                         "each")
     models = [best.load(path) for path in options.start]
-    starts = dict(zip(groups, models if len(models) > 1 else models * len(groups)))
+    starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=True))
 
     def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
         scores: list[FlightScore] = []
@@ -139,7 +144,8 @@ def main() -> None:
                 scores += cell(kind, count, draw, seed, group, held, pool, readable, starts.get(group), options)
         print(line(title, scores, len(draws)), flush=True)
 
-    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute |\n|---|---|---|---|---|---|---|",
+    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute "
+          "|\n|---|---|---|---|---|---|---|",
           flush=True)
     every = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
     if starts:

@@ -42,7 +42,8 @@ def groups(folder: Path) -> Iterator[tuple[str, str, str, Vehicle, list[Log]]]:
     made = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in ("0", "1", "2"):
-            made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(_read(folder / "airtouch" / r["file"]))
+            made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(_read(folder / "airtouch"
+                                                                                        / r["file"]))
     flown = vehicles.load("crazyflie-2.1-flow")
     for key, files in made.items():
         yield "crazyflie, flow deck, radio log", "the authors'", " ".join(key), flown, files
@@ -57,7 +58,8 @@ def groups(folder: Path) -> Iterator[tuple[str, str, str, Vehicle, list[Log]]]:
     flown = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
         logs = blind.nominal(flown, blind.CAL_FIRST, blind.CAL, seed)
-        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, [(f"simulated {seed} {i}", lambda log=log: log)
+        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, [(f"simulated {seed} {i}",
+                                                                                  lambda log=log: log)
                                                    for i, log in enumerate(logs)]
 
 
@@ -72,7 +74,8 @@ def held_out(logs: list[Log], flown: Vehicle, others: list[Log] | None = None) -
         study, _ = calibrate.calibrated(flown, _some([f for _, f in _ready(_some(others), flown)]), scatter=False)
     for i, (name, flight) in enumerate(ready):
         if others is None:
-            study, _ = calibrate.calibrated(flown, _some([f for k, (_, f) in enumerate(ready) if k != i]), scatter=False)
+            study, _ = calibrate.calibrated(flown, _some([f for k, (_, f) in enumerate(ready) if k != i]),
+                                            scatter=False)
         yield name, apparent(Data(study, [flight]))
 
 
@@ -93,7 +96,8 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
         lines += [f'["{name}"]  # {counts[name]}', *([f'vehicle = "{s.vehicle}"'] if s.vehicle else []),
                   f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
                   f'["{name}".root_passing_rates]']
-        lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing_rates.items()] + [f'["{name}".rms]']
+        lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing_rates.items()]
+        lines.append(f'["{name}".rms]')
         lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.rms.items()]
         lines.append("")
     return "\n".join(lines)
@@ -131,7 +135,8 @@ def main() -> None:
                 if others is None:
                     alike[of].append(cases[of][-1])
     classes = {of: replace(measured(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
-    counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups" for of, flights in cases.items()}
+    counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups"
+              for of, flights in cases.items()}
     new = args.out.with_suffix(".new")
     new.write_text(text_of(classes, counts))
     new.rename(args.out)

@@ -38,7 +38,7 @@ def main() -> None:
     write_bytes(reliability({"best": scores}), options.out / "reliability.png", force=True)
 
 
-def draw(log, model, name: str) -> bytes:  # noqa: ANN001
+def draw(log, model, name: str) -> bytes:
     """PNG: what the drone feels, P(over a platform) with edges, and the down range that it never saw."""
     trace, truth = best.run(log, model), logs.true_edges(log)
     x = best.channels_of(log)[0]
@@ -57,7 +57,8 @@ def draw(log, model, name: str) -> bytes:  # noqa: ANN001
         for edge in trace.edges:
             at = edge.sample * 0.01 - lag
             axes[1].plot(at, 1.12, "v" if edge.kind == "entry" else "^", color=OTHER, ms=7)
-        axes[1].set_title(f"felt edges (red; constant lag of {lag:.2f} s taken off) and true ones (dashed green)", loc="left")
+        axes[1].set_title(f"felt edges (red; constant lag of {lag:.2f} s taken off) and true ones (dashed green)",
+                          loc="left")
         axes[2].plot(t, log["zrange_m"], color=TRUE, lw=1)
         axes[2].set(xlabel="time, s", ylabel="m", xlim=(first, last))
         axes[2].set_title("down range: the truth, never an input", loc="left")

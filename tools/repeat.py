@@ -76,7 +76,8 @@ def main() -> int:
     quiet = ["-p", "no:terminal", "-o", "addopts=--strict-markers --import-mode=importlib", "-p", "no:cacheprovider"]
     options = [*quiet, *(["-k", wanted.k] if wanted.k else [])]
     code = pytest.main([*options, *(wanted.tests or concurrent_tests())], plugins=[plugin])
-    print(f"{len(plugin.passed | plugin.failed)} tests: {plugin.passed.total()} passed, {plugin.failed.total()} failed, "
+    print(f"{len(plugin.passed | plugin.failed)} tests: {plugin.passed.total()} passed, {plugin.failed.total()} "
+          "failed, "
           f"{plugin.skipped.total()} skipped")
     return int(code != pytest.ExitCode.OK)
 

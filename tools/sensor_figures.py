@@ -1,4 +1,5 @@
-"""What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made of.
+"""What `best` loses where a log lacks a sensor, into `host/airtouch/models/best_sensors.json`, which its notes are made
+of.
 
     python tools/choose_decoder.py out/folds --json out/all.json
     python tools/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
@@ -6,8 +7,8 @@
     python tools/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds rates=out/rates.json=folds \\
         acceleration=out/november.json="another month"
 
-`out/folds` and `out/any` are what `airtouch crossval` kept, the second with --any-sensor. All figures are of flights that neither
-the weights nor the decoder's settings have seen; the text after the second = says which.
+`out/folds` and `out/any` are what `airtouch crossval` kept, the second with --any-sensor. All figures are of flights
+that neither the weights nor the decoder's settings have seen; the text after the second = says which.
 """
 
 import argparse
@@ -30,7 +31,8 @@ def figures(path: Path, where: str) -> dict[str, float | str]:
             raise AirTouchError(f"{path}: the model was trained on these flights; score others")
         return {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise AirTouchError(f"{path}: not the JSON of tools/choose_decoder.py or `airtouch evaluate`: {error}") from None
+        raise AirTouchError(f"{path}: not the JSON of tools/choose_decoder.py or `airtouch evaluate`: "
+                            f"{error}") from None
 
 
 def main() -> None:

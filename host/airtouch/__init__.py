@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from airtouch.logs.flight_log import FlightLog
 
 __version__ = "0.1.0"
-__all__ = ["AirTouchError", "FlightLog", "__version__", "adapt", "detect", "evaluate", "from_pandas", "gap", "logs", "read",
-           "simulate", "to_pandas", "write"]
+__all__ = ["AirTouchError", "FlightLog", "__version__", "adapt", "detect", "evaluate", "from_pandas", "gap", "logs",
+           "read", "simulate", "to_pandas", "write"]
 _FROM = {"AirTouchError": "airtouch.errors", "FlightLog": "airtouch.logs.flight_log",
-         **dict.fromkeys(("adapt", "detect", "evaluate", "from_pandas", "read", "simulate", "to_pandas", "write"), "airtouch.api")}
+         **dict.fromkeys(("adapt", "detect", "evaluate", "from_pandas", "read", "simulate", "to_pandas", "write"),
+                         "airtouch.api")}
 
 
 def __getattr__(name: str) -> Any:

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     Flight = str | Path | FlightLog | DataFrame
 
-__all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", "read", "simulate", "to_pandas", "write"]
+__all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", "read", "simulate", "to_pandas",
+           "write"]
 DEFAULT_VEHICLE = "crazyflie-2.1-flow"
 
 
@@ -63,7 +64,8 @@ def from_pandas(table: "DataFrame") -> FlightLog:
     """
     names = [str(name) for name in table.columns if str(name) in COLUMNS]
     if not names:
-        raise AirTouchError(f"no column of this table has a name of the flight log; it has {', '.join(map(str, table.columns))}")
+        raise AirTouchError(f"no column of this table has a name of the flight log; it has "
+                            f"{', '.join(map(str, table.columns))}")
     meta = {"source": "pandas table", "format": "pandas", **{str(k): v for k, v in table.attrs.items()}}
     return FlightLog({name: table[name].to_numpy(dtype=float) for name in names}, meta)
 
@@ -71,7 +73,8 @@ def from_pandas(table: "DataFrame") -> FlightLog:
 def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | Path | None = None) -> "Trace":
     """Edges felt in a flight: `.edges` (sample, kind, probability) and `.probability` (n,) of being over a platform.
 
-    detector: best, paper, paper-stream, baseline or an object like those of `detector.registry.Detector`; model: a trained file, the shipped one for None.
+    detector: best, paper, paper-stream, baseline or an object like those of `detector.registry.Detector`; model: a
+    trained file, the shipped one for None.
     """
     from airtouch.detector import evaluate as scoring
     from airtouch.detector import registry
@@ -82,11 +85,12 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
     return chosen.run(log, chosen.model_for(trained, log) if hasattr(chosen, "model_for") else trained)
 
 
-def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = "best", *, speed_mps: float | None = None,
-             model: str | Path | None = None) -> dict[str, Any]:
+def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = "best", *,
+             speed_mps: float | None = None, model: str | Path | None = None) -> dict[str, Any]:
     """Score a detector on flights with known edges: the content of `airtouch evaluate --json`.
 
-    flights: files, folders (by their manifest) or logs; speed_mps: commanded speed where no manifest and no log says it.
+    flights: files, folders (by their manifest) or logs; speed_mps: commanded speed where no manifest and no log says
+    it.
     """
     from airtouch.detector import dataset, registry
     from airtouch.detector import evaluate as scoring
@@ -126,8 +130,8 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
 
 
 def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
-             baseline: "Flight | Iterable[Flight]" = (), *, without: Iterable[str] = (), report: str | Path | None = None,
-             force: bool = False) -> "Diagnosis":
+             baseline: "Flight | Iterable[Flight]" = (), *, without: Iterable[str] = (),
+             report: str | Path | None = None, force: bool = False) -> "Diagnosis":
     """Name the unmodelled effect that the flights have in common, and how much of the gap it is.
 
     vehicle: a built-in name or .toml file; the one that the first log names where left out. baseline: flights without
@@ -175,8 +179,8 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     scene = scenario.load(Path(twin) / files.SCENARIO if twin else "paper-mixed")
     craft = vehicles.load(Path(twin) / files.VEHICLE if twin else DEFAULT_VEHICLE)
-    adapted = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed, hold_out=hold_out,
-                           command="airtouch.adapt(...)")
+    adapted = module.adapt(usable, scene, craft, out.with_suffix(".adapt"), start=best.load(None), seed=seed,
+                           hold_out=hold_out, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return adapted
 

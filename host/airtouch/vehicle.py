@@ -110,7 +110,10 @@ def parse(text: str, source: str) -> Vehicle:
 
 
 def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Fields of a vehicle from a TOML table, as `Vehicle` takes them. Raises AirTouchError for a wrong name or value."""
+    """Fields of a vehicle from a TOML table, as `Vehicle` takes them.
+
+    Raises AirTouchError for a wrong name or value.
+    """
     fields = Vehicle.__dataclass_fields__
     unknown = sorted(set(table) - set(fields))
     if unknown:

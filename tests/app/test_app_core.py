@@ -43,7 +43,7 @@ def test_a_third_of_the_packets_lost_delays_edges_and_changes_none(flight, best_
     drone = Drone("best-gap8", loss=0.3, seed=1)
     found = drone.fly(flight)
     assert [kind for _, kind in found] == [kind for _, kind in best_edges]
-    assert all(0 <= late - at <= 30 for (late, _), (at, _) in zip(found, best_edges))
+    assert all(0 <= late - at <= 30 for (late, _), (at, _) in zip(found, best_edges, strict=True))
     assert drone.app.log.lost == 0
 
 

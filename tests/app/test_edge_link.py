@@ -69,7 +69,7 @@ def result(session, sequence, expected, flags):
 def test_another_model_on_the_gap8_is_refused_and_said():
     app = AppCore({"detector": 2}, have_gap8=True)
     asked = 0
-    for i in range(500):
+    for _ in range(500):
         app.step(**STEP)
         for packet in app.packets():
             assert packet[1] == 1, "nothing but a reset is sent to a GAP8 with another model"

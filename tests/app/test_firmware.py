@@ -101,7 +101,7 @@ def signals():
 def test_the_core_runs_on_a_cortex_m4_within_its_budget(program, signals, detector):
     emulated, desktop = Emulated(program, detector), AppCore({"detector": detector}, have_gap8=True, nonce=7)
     one, other = Gap8Core(), Gap8Core()
-    for acc, gyro, pwm in zip(*(s[600:1300] for s in signals)):
+    for acc, gyro, pwm in zip(*(s[600:1300] for s in signals), strict=True):
         log = emulated.step(np.float32(acc), np.float32(gyro), np.float32(pwm), one)
         desktop.step(acc, gyro, pwm)
         for packet in desktop.packets():
@@ -245,7 +245,8 @@ def test_the_image_links_with_the_firmware(config, platform):
                "NETWORKS=" + ("no" if platform == "cf21bl" else ""))
     assert run.returncode == 0 and "warning:" not in run.stderr, run.stderr[-3000:]
     built = Path((ROOT / "build/firmware/image").read_text().strip())
-    assert built.name == platform + config.removeprefix("app-config") + ".bin" and run.stdout.rstrip().endswith("takes it")
+    assert built.name == platform + config.removeprefix("app-config") + ".bin"
+    assert run.stdout.rstrip().endswith("takes it")
     assert flash.inspect(ROOT / built).target == "stm32"
     image = Elf(ROOT / "build/firmware/firmware/app/build" / f"{platform}.elf")
     assert any("cpx" in name.lower() for name in image.symbols) == (config == "app-config-gap8")

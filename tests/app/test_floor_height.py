@@ -1,4 +1,5 @@
-"""Height over a platform: the C that flies beside its reference, through edges of every kind, and what it leaves alone."""
+"""Height over a platform: the C that flies beside its reference, through edges of every kind, and what it leaves
+alone."""
 
 import ctypes
 import shutil
@@ -16,8 +17,8 @@ TOP = 0.72
 
 
 class State(ctypes.Structure):
-    _fields_ = [("floor", ctypes.c_float), ("range", ctypes.c_float), ("time", ctypes.c_uint32), ("steps", ctypes.c_uint16),
-                ("known", ctypes.c_bool)]
+    _fields_ = [("floor", ctypes.c_float), ("range", ctypes.c_float), ("time", ctypes.c_uint32),
+                ("steps", ctypes.c_uint16), ("known", ctypes.c_bool)]
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,8 @@ def library(tmp_path_factory):
     if compiler is None:
         pytest.skip("no C compiler on this machine")
     out = tmp_path_factory.mktemp("floor") / "floor.so"
-    subprocess.run([compiler, "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-ffp-contract=off", "-shared",
+    subprocess.run([compiler, "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
+                    "-ffp-contract=off", "-shared",
                     "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all", SOURCE, "-lm", "-o", out], check=True)
     found = ctypes.CDLL(str(out))
     found.floorHeightRange.restype = found.floorHeightFlow.restype = ctypes.c_float
@@ -187,7 +189,8 @@ def test_any_readings_leave_finite_numbers(library):
     rng = np.random.default_rng(5)
     flown = Flown(library)
     for _ in range(3000):
-        flown.read(rng.choice([0.0, 0.08, 0.8, 4.0, 1e30, np.nan, rng.uniform(0, 4)]), rng.choice([0.8, 1e30, rng.uniform(-1, 3)]),
+        flown.read(rng.choice([0.0, 0.08, 0.8, 4.0, 1e30, np.nan, rng.uniform(0, 4)]),
+                   rng.choice([0.8, 1e30, rng.uniform(-1, 3)]),
                    rng.choice([0.0, -1.0, 1.0, 1e30]), rng.choice([0.0, 0.3, 1.5, 3.0]), int(rng.choice([1, 25, 200])))
         assert np.isfinite(flown.state.floor) and abs(flown.state.floor) <= 2.5
 

@@ -148,7 +148,7 @@ def test_on_an_emulated_core_the_replies_are_those_of_the_desktop(program, detec
     assert machine.call("gap8CoreInit", core, models, 0).value == 3
     app, counts = AppCore({"detector": DETECTORS.index(detector)}, have_gap8=True), []
     rng = np.random.default_rng(0)
-    for i in range(320):
+    for _ in range(320):
         app.step(rng.normal(0, 1, 3) + [0, 0, 9.81], rng.normal(0, 0.3, 3), rng.uniform(40_000, 45_000, 4))
         for sent in app.packets():
             machine.write(packet, sent)

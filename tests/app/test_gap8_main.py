@@ -141,7 +141,8 @@ def test_packets_of_any_length_and_of_others_are_refused_and_counted(start):
 
 @pytest.mark.parametrize("fault, words", [("open", "the cluster does not open"), ("task", "the cluster takes no task")])
 def test_without_a_cluster_the_stm32_is_told_so_and_computes(start, fault, words):
-    chip, stm32, rng = start(fault), AppCore({"detector": DETECTORS.index("best-gap8")}, have_gap8=True), np.random.default_rng(0)
+    chip, rng = start(fault), np.random.default_rng(0)
+    stm32 = AppCore({"detector": DETECTORS.index("best-gap8")}, have_gap8=True)
     for _ in range(400):
         stm32.step(*sample(rng))
         for reply in chip.exchange([packet(one) for one in stm32.packets()]):

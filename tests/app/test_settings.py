@@ -57,7 +57,9 @@ def test_decoding_as_shipped_is_that_of_the_detector_in_force(recorded):
         edges = pipeline(log[0], settings, np.append(np.nan, probability[:-1]), physical_filter=True).edge
         expected.append([(int(i), ("entry", "exit")[k - 1]) for i, k in enumerate(edges) if k])
     assert len({str(edges) for edges in expected}) == 4, "each setting tells"
-    for edges, changes in zip(expected, ({}, {"probabilityIn": 0.8}, {"probabilityIn": 0.3}, {"probabilityDwell": 300})):
+    for edges, changes in zip(expected,
+                              ({}, {"probabilityIn": 0.8}, {"probabilityIn": 0.3}, {"probabilityDwell": 300}),
+                              strict=True):
         drone = Drone("paper-stream-gap8")
         drone.app.set_params(**changes)
         assert drone.fly(log) == edges

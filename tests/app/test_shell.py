@@ -1,4 +1,5 @@
-"""The app's shell, what surrounds the core in the firmware: tasks, parameters, log tables, and what of CPX it touches."""
+"""The app's shell, what surrounds the core in the firmware:
+tasks, parameters, log tables, and what of CPX it touches."""
 
 import os
 import shutil
@@ -55,8 +56,8 @@ def shells(headers, tmp_path_factory):
     core, error = objects.compiled(compiler, command[1:], CORE)
     assert not error, error[:3000]
     for name, (flags, sources) in BUILDS.items():
-        done = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core, "-lm", "-o",
-                               folder / name], capture_output=True, text=True)
+        done = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core, "-lm",
+                               "-o", folder / name], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr[:3000]
     return {name: folder / name for name in BUILDS}
 

@@ -67,7 +67,8 @@ def test_the_cache_changes_with_the_conditions(generated, tmp_path):
     assert crossval.cache_key("baseline", (files := dataset.collect([generated])), files[2:], 0, {}) != before
 
 
-@pytest.mark.parametrize(("old", "new", "said"), [(",clean,1,", ",clean,0,", "two folds"), (",clean,1,", ",clean,,", "no fold")])
+@pytest.mark.parametrize(("old", "new", "said"),
+                         [(",clean,1,", ",clean,0,", "two folds"), (",clean,1,", ",clean,,", "no fold")])
 def test_folds_are_needed(generated, tmp_path, old, new, said):
     folder = shutil.copytree(generated, tmp_path / "copy")
     manifest = folder / "manifest.csv"

@@ -47,7 +47,8 @@ def test_folder_of_flights(generated, tmp_path):
 
 def test_a_fold_without_flights_is_named(generated):
     result = run(generated, "--detector", "baseline", "--fold", "77")
-    assert isinstance(result.exception, AirTouchError) and str(result.exception) == "no flight is in fold 77 of the manifest"
+    assert isinstance(result.exception, AirTouchError)
+    assert str(result.exception) == "no flight is in fold 77 of the manifest"
 
 
 def test_bad_files_are_named_once_and_the_others_go_on(generated, bad, tmp_path):

@@ -20,8 +20,8 @@ def run(*arguments):
 
 
 @pytest.mark.parametrize(("typed", "meant"), [
-    (("evalute",), "evaluate"), (("gap", "diagnos"), "diagnose"), (("gap", "blind", "scroe"), "score"), (("logs", "chek"), "check"),
-    (("simulat",), "simulate")])
+    (("evalute",), "evaluate"), (("gap", "diagnos"), "diagnose"), (("gap", "blind", "scroe"), "score"),
+    (("logs", "chek"), "check"), (("simulat",), "simulate")])
 def test_a_mistyped_command_gets_the_nearest(typed, meant):
     shown = run(*typed)
     assert shown.exit_code == 2 and f"No such command '{typed[-1]}'; did you mean {meant}" in shown.output
@@ -46,7 +46,8 @@ def test_an_output_that_cannot_be_written_is_told_before_the_work(generated, tmp
     for out in (tmp_path / "file" / "out.x", tmp_path):
         shown = run(*words, out)
         assert shown.exit_code != 0
-        assert any(t in f"{shown.exception} {shown.output}" for t in ("cannot be made", "is a folder", "is a directory")), shown.output
+        said = f"{shown.exception} {shown.output}"
+        assert any(t in said for t in ("cannot be made", "is a folder", "is a directory")), said
 
 
 def test_a_manifest_is_no_flight(generated):

@@ -72,7 +72,8 @@ def test_the_picture_is_a_map_platform_scale_start_and_end():
     assert {"start", "end", "track", "platform (its width is not known)", "entry (1)", "exit (1)"} <= labels
     (strip,) = ax.patches
     corners = strip.get_xy()
-    assert corners[:, 0].min() == 0.0 and corners[:, 0].max() == 1.0 and np.ptp(corners[:, 1]) == pytest.approx(map_figure.STRIP_M)
+    assert corners[:, 0].min() == 0.0 and corners[:, 0].max() == 1.0
+    assert np.ptp(corners[:, 1]) == pytest.approx(map_figure.STRIP_M)
     bar = ax.lines[-1].get_xydata()
     shown = ax.transAxes.inverted().transform(ax.transData.transform(bar))
     assert (shown > 0.0).all() and (shown[:, 1] < 0.2).all() and shown[1, 0] < 0.5  # at the lower left

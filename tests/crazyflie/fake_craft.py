@@ -101,7 +101,7 @@ class FakeCraft:
         if self.leg:
             begin, start, target, seconds = self.leg
             share = min(max((now - begin) / max(seconds, 1e-3), 0.0), 1.0)
-            self.at = [a + share * (b - a) for a, b in zip(start, target)]
+            self.at = [a + share * (b - a) for a, b in zip(start, target, strict=True)]
             if share == 1.0 and self.state == PLAN_LANDING:
                 self.state = PLAN_IDLE
 
@@ -123,6 +123,6 @@ class FakeCraft:
         self.samples.put(Sample(blocks.MOTION.name, stamp % (1 << 24), self.now, values))
         if index % 5 == 0:
             slow = {name: 0 for name in blocks.STATE.names}
-            slow |= {f"stateEstimateZ.{a}": int(1000 * v) for a, v in zip("xyz", self.at)}
+            slow |= {f"stateEstimateZ.{a}": int(1000 * v) for a, v in zip("xyz", self.at, strict=True)}
             slow |= {"stateEstimateZ.quat": 3 << 30, "supervisor.info": 0b11111}
             self.samples.put(Sample(blocks.STATE.name, stamp % (1 << 24), self.now, slow))

@@ -38,7 +38,8 @@ def test_optional_decks_are_only_noted():
     assert "Multi-ranger" in note and checks.notes(GOOD) == []
 
 
-@pytest.mark.parametrize("text, ctype, value", [("255", "uint8_t", 255), ("0x10", "uint8_t", 16), ("-128", "int8_t", -128),
+@pytest.mark.parametrize("text, ctype, value",
+                         [("255", "uint8_t", 255), ("0x10", "uint8_t", 16), ("-128", "int8_t", -128),
                                                 ("1.5", "float", 1.5), ("1e-6", "float", pytest.approx(1e-6))])
 def test_values_that_a_parameter_can_hold(text, ctype, value):
     assert checks.representable("g.n", text, ctype) == value

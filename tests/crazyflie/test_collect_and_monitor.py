@@ -19,9 +19,9 @@ from airtouch.simulation import loop
 from airtouch.sitl.variables import log_variables
 
 pytest.importorskip("cflib", reason="flying needs cflib")
-from missions import HOP  # noqa: E402
+from missions import HOP
 
-from simulated_link import simulated  # noqa: E402
+from simulated_link import simulated
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,8 @@ def test_sweeps_are_flown_logged_and_listed(serve, hop, cache, tmp_path, guards)
     log = logs.read(tmp_path / "hop_0004.csv.gz")
     assert [e.kind for e in logs.true_edges(log)] == ["entry", "exit"] and shown.output.count("\ntrue ") >= 2
     assert set(np.round(np.diff(log["t_s"]), 3)) == {0.01}  # late packets are none lost
-    assert log.meta["lost_samples"] == 0 and log.meta["mission"] == "hop" and log.meta["decks"][:2] == ["bcAI", "bcFlow2"]
+    assert log.meta["lost_samples"] == 0 and log.meta["mission"] == "hop"
+    assert log.meta["decks"][:2] == ["bcAI", "bcFlow2"]
     assert log.meta["settings"] == ["airtouch.detector=1"] and log.meta["acc_frame"] == "body"
     entry, leave = (e.sample for e in logs.true_edges(log))
     assert log["x_m"][leave] - log["x_m"][entry] == pytest.approx(0.6, abs=0.15)
@@ -111,7 +112,8 @@ def test_a_second_collect_starts_where_the_first_did(serve, hop, cache, tmp_path
 
 def test_a_killed_flight_in_mid_air_is_followed_by_one_from_the_ground(serve, hop, cache, tmp_path):
     with serve() as virtual:
-        virtual.drone.commander.planner.command(bytes([7, 0]) + struct.pack("<ff?ff", 0.5, 0.0, True, 0.0, 1.0), virtual.drone.now_s)
+        virtual.drone.commander.planner.command(bytes([7, 0]) + struct.pack("<ff?ff", 0.5, 0.0, True, 0.0, 1.0),
+                                                virtual.drone.now_s)
         virtual.clock.wait_for(lambda: virtual.drone.row[loop.PLACE + 2] > 0.4, 5.0)
         shown = fly(virtual, hop, cache, tmp_path)
         assert shown.exit_code == 0, shown.output
@@ -209,7 +211,8 @@ def test_an_empty_battery_and_a_missing_deck_keep_it_on_the_ground(serve, hop, c
 
 def test_a_gap8_that_never_answers_is_told_by_monitor(serve, cache):
     with serve("gap8-silent=start") as virtual:
-        shown = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache, "--param", "airtouch.detector=2")
+        shown = run("monitor", "--uri", virtual.uri, "--duration", "4", "--cache", cache, "--param",
+                    "airtouch.detector=2")
     assert shown.exit_code == 0 and "the GAP8 does not answer" in shown.output, shown.output
     assert "the drone says: " in shown.output and "another detector runs" in shown.output
     assert re.search(r"\d Hz, 0.0 % lost.*round trip", shown.output)

@@ -21,9 +21,11 @@ def refused(*arguments):
 
 def test_collect_wants_a_drone_and_a_mission(tmp_path):
     assert "give --uri and --mission" in refused("collect", "--out", tmp_path)
-    assert "no mission 'loop'" in refused("collect", "--out", tmp_path, "--uri", "udp://127.0.0.1:1", "--mission", "loop")
+    assert "no mission 'loop'" in refused("collect", "--out", tmp_path, "--uri", "udp://127.0.0.1:1", "--mission",
+                                          "loop")
     assert "--flights must be" in refused("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "-n", "0")
-    assert "group.name=value" in refused("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--param", "a")
+    assert "group.name=value" in refused("collect", "--out", tmp_path, "--uri", "x", "--mission", "sweep", "--param",
+                                         "a")
 
 
 def test_an_existing_flight_is_not_flown_over(tmp_path):

@@ -13,8 +13,8 @@ from airtouch.errors import AirTouchError
 from airtouch.sitl.packet import LOG, Packet
 
 pytest.importorskip("cflib", reason="flying needs cflib")
-from patience import HANG_S  # noqa: E402
-from simulated_link import APPEND, CREATE, SETTINGS, URI, simulated  # noqa: E402
+from patience import HANG_S
+from simulated_link import APPEND, CREATE, SETTINGS, URI, simulated
 
 
 @pytest.fixture

@@ -17,7 +17,8 @@ NAMES = ["t_s", "zrange_m", "m1_pwm"]
 
 
 def rows(times):
-    return np.asarray(times, dtype=np.int64), {"zrange_m": np.asarray(times) / 1e4, "m1_pwm": np.arange(len(times)) * 1.0}
+    return np.asarray(times, dtype=np.int64), {"zrange_m": np.asarray(times) / 1e4,
+                                               "m1_pwm": np.arange(len(times)) * 1.0}
 
 
 def test_rows_are_on_the_disk_at_once_and_sorted_at_the_end(tmp_path):

@@ -26,7 +26,8 @@ def test_a_ramp_climbs_and_holes_are_blank():
     assert sparkline([], 4) == "    " and sparkline([0.0, 9.0], 4, 0.0, 1.0) == "  " + BLOCKS[0] + BLOCKS[-1]
 
 
-@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), max_size=50), st.integers(20, 60), st.integers(3, 20))
+@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), max_size=50), st.integers(20, 60),
+       st.integers(3, 20))
 def test_any_track_fits_the_map(track, width, height):
     lines = text_map(np.array(track).reshape(-1, 2), [(0.0, 0.0, "entry")], width, height)
     assert len(lines) == height

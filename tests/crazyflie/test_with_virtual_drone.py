@@ -22,9 +22,9 @@ from airtouch.simulation import loop
 from airtouch.sitl import serve
 
 pytest.importorskip("cflib", reason="flying needs cflib")
-from missions import HOP  # noqa: E402
+from missions import HOP
 
-from patience import HANG_S  # noqa: E402
+from patience import HANG_S
 
 SPEED = 2.0  #: drone seconds a second
 
@@ -54,8 +54,8 @@ def on_the_ground(virtual):
 def start(virtual, hop, cache, out):
     """`airtouch collect` as a process, in the air and with 100 rows on the disk."""
     code = "from airtouch.cli import main; main()"
-    process = subprocess.Popen([sys.executable, "-c", code, "collect", "--uri", virtual.uri, "--mission", str(hop), "--out",
-                                str(out), "--cache", str(cache), "--link-timeout", str(HANG_S)],
+    process = subprocess.Popen([sys.executable, "-c", code, "collect", "--uri", virtual.uri, "--mission", str(hop),
+                                "--out", str(out), "--cache", str(cache), "--link-timeout", str(HANG_S)],
                                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     part = out / "hop_0001.csv.gz.part"
     until(lambda: process.poll() is not None or height(virtual) > 0.3 and part.exists()

@@ -1,4 +1,5 @@
-"""The nine-channel step is at least twenty times cheaper than nine FFTs by CMSIS-DSP, where its sources were fetched."""
+"""The nine-channel step is at least twenty times cheaper than nine FFTs by CMSIS-DSP, where its sources were
+fetched."""
 
 import numpy as np
 import pytest

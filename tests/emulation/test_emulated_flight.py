@@ -1,4 +1,5 @@
-"""The emulated firmware around the simulator's vehicle: what the desktop's half does, and with a checkout a whole flight."""
+"""The emulated firmware around the simulator's vehicle:
+what the desktop's half does, and with a checkout a whole flight."""
 
 import os
 import shutil
@@ -35,7 +36,8 @@ time_s = 2.0
 def image():
     base = os.environ.get("CRAZYFLIE_BASE")
     if not base or not all(map(shutil.which, ("arm-none-eabi-gcc", "qemu-system-arm"))):
-        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc and qemu-system-arm")
+        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc and "
+                    "qemu-system-arm")
     build.compile_firmware(Path(base), "app-config-height")
     return build.link()
 
@@ -93,7 +95,8 @@ def test_a_command_that_differs_is_counted():
 @pytest.mark.slow
 def test_the_firmware_flies_and_the_app_changes_no_command(image):
     flown = scenario.parse(HOVER, "hover")
-    on, off, again = (flight.fly(image, flown, compare.vehicle(), 1, app=app, whole_milliseconds=True) for app in (True, False, True))
+    on, off, again = (flight.fly(image, flown, compare.vehicle(), 1, app=app, whole_milliseconds=True)
+                      for app in (True, False, True))
     assert on.ending == off.ending == "ok"
     hover = on.table[-100:]
     assert np.abs(hover[:, 3] - 0.5).max() < 0.12 and np.abs(hover[:, 1:3]).max() < 0.3
@@ -105,7 +108,8 @@ def test_the_firmware_flies_and_the_app_changes_no_command(image):
 @pytest.mark.slow
 def test_the_height_is_kept_over_a_platform_where_it_is_asked_for(image):
     case = height.CASES[0]
-    low, high = height.kept(flight.fly(image, height.mission(case), compare.vehicle(), 1, parameters={"atHeight.enable": 1}))
+    low, high = height.kept(flight.fly(image, height.mission(case), compare.vehicle(), 1,
+                                       parameters={"atHeight.enable": 1}))
     assert 0.7 < low < high < 0.95
     stock = flight.fly(image, height.mission(case), compare.vehicle(), 1)
     assert height.kept(stock)[1] > 1.2, "the shipped firmware climbs"

@@ -101,7 +101,8 @@ def test_best_as_a_stream_has_the_desktops_bits(models, chips, flights):
     channels, _ = channels_of(log, model.recipe.motion)
     first = model.int8.convs[0].layer
     quantised = quantise(channels[200:800], first.input_scale, first.input_zero_point)
-    np.testing.assert_array_equal(gap8_counts.stream(chips["best"], quantised).outputs, run_stream(model.int8, quantised))
+    np.testing.assert_array_equal(gap8_counts.stream(chips["best"], quantised).outputs,
+                                  run_stream(model.int8, quantised))
 
 
 @pytest.mark.parametrize("name", ["paper", "paper-stream"])
@@ -109,7 +110,8 @@ def test_best_as_a_stream_has_the_desktops_bits(models, chips, flights):
 def test_xpulp_cores_have_the_desktops_bits(name, cores, models, clusters):
     quantised, _ = golden_vectors(models[name].int8)
     cycles, outputs = gap8_counts.team_cycles(clusters[name], quantised[cores], cores)
-    np.testing.assert_array_equal(outputs, np.repeat(run_int8(models[name].int8, quantised[cores:cores + 1]), cores, axis=0))
+    np.testing.assert_array_equal(outputs,
+                                  np.repeat(run_int8(models[name].int8, quantised[cores:cores + 1]), cores, axis=0))
     if f"cycles_{cores}" in BUDGET[name]:
         assert cycles.looped <= BUDGET[name][f"cycles_{cores}"]
 
@@ -128,7 +130,8 @@ def test_windows_stay_in_the_budget(name, models, chips):
 
 
 def test_streams_stay_in_the_budget(models, chips):
-    rolled = gap8_counts.rolling(chips["paper-stream"], golden_vectors(models["paper"].int8)[0][0].reshape(-1, 3)[:100], 4)
+    rolled = gap8_counts.rolling(chips["paper-stream"], golden_vectors(models["paper"].int8)[0][0].reshape(-1, 3)[:100],
+                                 4)
     streamed = gap8_counts.stream(chips["best"], golden_flight(models["best"].int8)[0][:100])
     for name, run in (("paper-stream", rolled), ("best", streamed)):
         assert run.instructions.mean() <= BUDGET[name]["step_instructions"]

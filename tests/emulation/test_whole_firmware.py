@@ -1,4 +1,5 @@
-"""The whole firmware in QEMU: bad input anywhere; with a checkout (CRAZYFLIE_BASE) the image itself, beside the desktop."""
+"""The whole firmware in QEMU: bad input anywhere;
+with a checkout (CRAZYFLIE_BASE) the image itself, beside the desktop."""
 
 import os
 import shutil
@@ -32,7 +33,8 @@ def log():
 def image():
     base = os.environ.get("CRAZYFLIE_BASE")
     if not base or not all(map(shutil.which, ("arm-none-eabi-gcc", "qemu-system-arm"))):
-        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc and qemu-system-arm")
+        pytest.skip("set CRAZYFLIE_BASE to a checkout of the firmware, and install arm-none-eabi-gcc and "
+                    "qemu-system-arm")
     build.compile_firmware(Path(base))
     return build.link()
 
@@ -65,7 +67,8 @@ def test_without_a_checkout_it_says_where_to_get_one():
 
 
 @pytest.mark.parametrize("there, missing", [((), "no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi"),
-                                            (("arm-none-eabi-gcc",), "no qemu-system-arm: apt-get install qemu-system-arm")])
+                                            (("arm-none-eabi-gcc",),
+                                             "no qemu-system-arm: apt-get install qemu-system-arm")])
 def test_a_missing_tool_is_named(there, missing, path_with, tmp_path):
     one_line(emulate(tmp_path, PATH=path_with(*there)), missing)
 
@@ -149,9 +152,11 @@ def test_the_comparison_notices_another_input(image, log):
 
 @pytest.mark.slow
 def test_a_log_variable_or_a_parameter_that_is_missing_is_named(image):
-    with pytest.raises(AirTouchError, match="no log variable airtouch.nothing"), Board(image, REPLAY, ["airtouch.nothing"]):
+    with (pytest.raises(AirTouchError, match="no log variable airtouch.nothing"),
+          Board(image, REPLAY, ["airtouch.nothing"])):
         pass
-    with pytest.raises(AirTouchError, match="stopped: no such parameter"), Board(image, REPLAY, ["airtouch.steps"]) as board:
+    with (pytest.raises(AirTouchError, match="stopped: no such parameter"),
+          Board(image, REPLAY, ["airtouch.steps"]) as board):
         board.ask("W", FED)
         board.parameter("airtouch.nothing", 1.0)
         board.go()

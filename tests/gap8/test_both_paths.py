@@ -48,8 +48,8 @@ class TestBothPaths:
 
     @settings(FITS, suppress_health_check=list(HealthCheck))
     @given(seed=st.integers(0, 2**31), rows=st.integers(4, 20), columns=st.integers(1, 4),
-           channels=st.sampled_from([1, 2, 3, 4, 8]), stages=STAGES, dense=st.lists(st.integers(1, 9), min_size=1, max_size=2),
-           sparsity=st.sampled_from([0.0, 0.6, 0.95, 1.0]))
+           channels=st.sampled_from([1, 2, 3, 4, 8]), stages=STAGES,
+           dense=st.lists(st.integers(1, 9), min_size=1, max_size=2), sparsity=st.sampled_from([0.0, 0.6, 0.95, 1.0]))
     def test_any_network(self, seed, rows, columns, channels, stages, dense, sparsity):
         if not fits(rows, columns, channels, stages):
             return
@@ -69,7 +69,8 @@ class TestBothPaths:
         ends = [i for i in range(99, len(fused), 3) if np.isfinite(fused[i - 99:i + 1]).all()]
         windows = kernels.z_score_window(np.stack([fused[i - 99:i + 1] for i in ends]))
         assert len(windows) > 200
-        np.testing.assert_array_equal(c_network.infer_int8(model, windows), int8_network.infer_int8(model.int8, windows))
+        np.testing.assert_array_equal(c_network.infer_int8(model, windows),
+                                      int8_network.infer_int8(model.int8, windows))
 
     @settings(FITS, suppress_health_check=list(HealthCheck))
     @given(seed=st.integers(0, 2**31), columns=st.integers(1, 3), channels=st.sampled_from([1, 4]),

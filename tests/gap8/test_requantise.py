@@ -29,7 +29,8 @@ def requantise(request, compiler, tmp_path_factory):
     flags = ["-shared", "-fPIC", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-static-libubsan"]
     if not compiler.has("-fsanitize=undefined", "-static-libubsan", folder=folder):
         flags = flags[:2]
-    library = compiler([folder / "rounding.c"], folder / "rounding.so", *flags, *([EMULATION] if request.param == "xpulp" else []))
+    library = compiler([folder / "rounding.c"], folder / "rounding.so", *flags,
+                       *([EMULATION] if request.param == "xpulp" else []))
     ffi = FFI()
     ffi.cdef("void probe(const int32_t *, const int32_t *, const int8_t *, int32_t, int8_t *);")
     lib = ffi.dlopen(str(library))
@@ -38,7 +39,8 @@ def requantise(request, compiler, tmp_path_factory):
         arrays = [np.ascontiguousarray(a, t) for a, t in ((sums, "i4"), (multipliers, "i4"), (shifts, "i1"))]
         out = np.empty(len(sums), np.int8)
         kinds = ("int32_t *", "int32_t *", "int8_t *")
-        lib.probe(*(ffi.cast(k, a.ctypes.data) for k, a in zip(kinds, arrays)), len(out), ffi.cast("int8_t *", out.ctypes.data))
+        lib.probe(*(ffi.cast(k, a.ctypes.data) for k, a in zip(kinds, arrays, strict=True)), len(out),
+                  ffi.cast("int8_t *", out.ctypes.data))
         return out
 
     return run

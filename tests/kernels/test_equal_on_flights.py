@@ -58,7 +58,8 @@ def test_disturbance_force(real_signals):
         error = max(error, worst(ours, truth, np.maximum(terms, 1e-9)))
         relative = max(relative, worst(reference.force_norm(ours), reference.force_norm(truth),
                                        np.maximum(reference.force_norm(truth), 1e-9)))
-    print(f"\ndisturbance force: max error {error / EPS:.2g} eps of m |a - g| + Psi; of the norm {relative:.1e} relative")
+    print(f"\ndisturbance force: max error {error / EPS:.2g} eps of m |a - g| + Psi; of the norm {relative:.1e} "
+          "relative")
     assert error <= 4 * EPS < RELATIVE
 
 
@@ -81,7 +82,8 @@ def test_normalisation(real_signals):
         truth = reference.z_score_window(windows)
         per_window = max(per_window, worst(kernels.z_score_window(windows), truth, np.maximum(1, np.abs(truth))))
         truth = reference.streaming_z_score(features, 500.0)
-        streaming = max(streaming, worst(kernels.streaming_z_score(features, 500.0), truth, np.maximum(1, np.abs(truth))))
+        streaming = max(streaming,
+                        worst(kernels.streaming_z_score(features, 500.0), truth, np.maximum(1, np.abs(truth))))
     print(f"\nz-score: max error {per_window:.1e} a window, {streaming:.1e} streaming, in standard deviations")
     assert per_window <= RELATIVE and streaming <= RELATIVE
 

@@ -18,8 +18,11 @@ SPECIAL = [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-45, -1e-40, 1.2e-38, 3.4e38, -
 checks = settings(max_examples=80, deadline=None, derandomize=True)
 
 
+ROWS = st.integers(0, 700)
+
+
 @st.composite
-def signals(draw, columns, rows=st.integers(0, 700)):
+def signals(draw, columns, rows=ROWS):
     """(n, columns) float32: a constant, step, ramp, sine or noise a column, special values strewn over it."""
     n = draw(rows)
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
@@ -51,7 +54,8 @@ def test_band_power(x, setting, hop):
     full = kernels.band_power(x, window=window, band_hz=band)
     assert (np.isnan(full) == np.isnan(every)).all()
     if len(x) >= window:
-        np.testing.assert_array_equal(full[reference.window_ends(len(x), window, hop)], ours[np.isfinite(ours).all(axis=1)])
+        np.testing.assert_array_equal(full[reference.window_ends(len(x), window, hop)],
+                                      ours[np.isfinite(ours).all(axis=1)])
         clean, _ = reference.hold_finite(x)
         assert band_power_excess(full[window - 1:], every[window - 1:], clean, window).max() <= 16.0
 

@@ -55,6 +55,6 @@ def test_plain_c_is_c11_and_nothing_else(source, tmp_path):
     used = [*KERNELS.glob("*.[ch]"), *GAP8.glob("*.h")]
     for header in re.findall(r"#include <(.*?)>", "".join(path.read_text() for path in used)):
         (tmp_path / header).write_text("")  # so that none of the C library's own words are there
-    text = subprocess.run([*command, "-std=c11", "-nostdinc", f"-I{tmp_path}", f"-I{KERNELS}", f"-I{GAP8}", PLAIN, "-E", "-P",
-                           source], capture_output=True, text=True, check=True).stdout
+    text = subprocess.run([*command, "-std=c11", "-nostdinc", f"-I{tmp_path}", f"-I{KERNELS}", f"-I{GAP8}", PLAIN, "-E",
+                           "-P", source], capture_output=True, text=True, check=True).stdout
     assert len(text) > 500 and WORDS.findall(text) == [] and "_Pragma" not in text and "#pragma" not in text

@@ -29,7 +29,8 @@ def test_names_mirror_the_reference():
 
 def test_threshold_factor():
     for p_fa in (1e-6, 1e-2, 0.9, 0.999999):
-        assert kernels.threshold_factor(50, p_fa) == pytest.approx(reference.threshold_factor(50, np.float32(p_fa)), rel=1e-6)
+        assert kernels.threshold_factor(50, p_fa) == pytest.approx(reference.threshold_factor(50, np.float32(p_fa)),
+                                                                   rel=1e-6)
 
 
 VEHICLE = load("crazyflie-2.1-flow")

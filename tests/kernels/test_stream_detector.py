@@ -1,5 +1,7 @@
 """The streaming detector: C equals its NumPy definition, piece by piece and whole."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -88,7 +90,7 @@ def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, ar
     assert not len(first) or _near_threshold(logits, config, first[0])
     at = np.flatnonzero(edges)
     assert not edges[~airborne].any()
-    for a, b in zip(at, at[1:]):
+    for a, b in pairwise(at):
         flown = airborne[a:b + 1].all()
         assert not flown or ((hold or b - a >= dwell) and edges[a] != edges[b])
 

@@ -7,10 +7,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
 
-import fuzz_logs  # noqa: E402
-from airtouch import logs  # noqa: E402
-from airtouch.logs.files import parse  # noqa: E402
-from log_fuzzing import sound, walk  # noqa: E402
+import fuzz_logs
+from airtouch import logs
+from airtouch.logs.files import parse
+from log_fuzzing import sound, walk
 
 COUNT = 80  #: inputs of each format; `tools/fuzz_logs.py` runs more
 

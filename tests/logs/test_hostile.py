@@ -5,23 +5,19 @@ import json
 import os
 import struct
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-
-from airtouch import logs  # noqa: E402
-from airtouch.cli import main  # noqa: E402
-from airtouch.crazyflie.recorder import recover  # noqa: E402
-from airtouch.errors import AirTouchError, shown  # noqa: E402
-from airtouch.logs import clock, public  # noqa: E402
-from airtouch.logs.files import parse  # noqa: E402
-from airtouch.logs.flight_log import FlightLog  # noqa: E402
-from log_fuzzing.hostile import HOSTILE, table, usd  # noqa: E402
-from log_fuzzing.sound import META, canonical, motion, packed, parquet, si_columns  # noqa: E402
+from airtouch import logs
+from airtouch.cli import main
+from airtouch.crazyflie.recorder import recover
+from airtouch.errors import AirTouchError, shown
+from airtouch.logs import clock, public
+from airtouch.logs.files import parse
+from airtouch.logs.flight_log import FlightLog
+from log_fuzzing.hostile import HOSTILE, table, usd
+from log_fuzzing.sound import META, canonical, motion, packed, parquet, si_columns
 
 
 def flying(n=200, **changed):

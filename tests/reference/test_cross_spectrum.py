@@ -25,7 +25,7 @@ def test_equals_exact_arithmetic_for_any_number_of_axes(axes):
     powers = 10.0 ** rng.uniform(-30, 30, size=(50, axes))
     powers[:, axes // 2:] = 1 / powers[:, :axes - axes // 2]  # the root stays in range, the way there does not
     ours = cascaded_cross_spectrum(powers, groups=(axes,))[:, 0]
-    for row, value in zip(powers, ours):
+    for row, value in zip(powers, ours, strict=True):
         expected = exact_root(row)
         if expected < Fraction(float(np.finfo(np.float32).max)):
             assert abs(Fraction(float(value)) / expected - 1) < 1e-13

@@ -28,7 +28,8 @@ def test_counted_false_alarms_on_exponential_noise(p_fa):
     _, alert = fr_cfar(power, p_fa=p_fa)
     tested = alert[cells - 1::cells]
     interval = binomtest(int(tested.sum()), len(tested)).proportion_ci(0.999)
-    print(f"P_FA {p_fa:g}: counted {tested.mean():.3g}, 99.9 % [{interval.low:.3g}, {interval.high:.3g}], n {len(tested)}")
+    print(f"P_FA {p_fa:g}: counted {tested.mean():.3g}, 99.9 % [{interval.low:.3g}, {interval.high:.3g}], n "
+          f"{len(tested)}")
     assert interval.low <= p_fa <= interval.high
 
 

@@ -21,7 +21,10 @@ N = 600
 EDGES = [Edge(200, "entry", 0.8, 0.05), Edge(400, "exit", 0.05, 0.8)]
 
 
-def shown(name="a<b>.csv", detections=(Detection(210, "entry", 0.9), Detection(50, "exit", 0.8))):
+DETECTIONS = (Detection(210, "entry", 0.9), Detection(50, "exit", 0.8))
+
+
+def shown(name="a<b>.csv", detections=DETECTIONS):
     rng = np.random.default_rng(0)
     log = FlightLog({"zrange_m": np.full(N, 0.8)}, {"source": name})
     signals = {"channels": rng.normal(size=(N, 9)), "band_power": rng.exponential(size=(N, 9)),
@@ -82,5 +85,6 @@ def test_plots_are_made_of_whatever_is_there():
     flight = shown()
     bare = Trace(np.full(N, np.nan), [])
     for image in (figures.flight(flight.log, bare, None, {}), figures.reliability({"none": []}),
-                  figures.reliability({"paper": [flight.score]}), figures.error_distribution({"paper": [flight.score]})):
+                  figures.reliability({"paper": [flight.score]}),
+                  figures.error_distribution({"paper": [flight.score]})):
         assert image.startswith(b"\x89PNG") and len(image) > 5000

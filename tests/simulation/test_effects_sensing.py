@@ -107,7 +107,8 @@ def test_time_jitter_has_its_rms_and_never_runs_backwards():
 
 
 def test_where_a_row_lies_in_the_controllers_cycle(sweep):
-    """The kick of a velocity step lasts 2 ms: a row at the position controller's run has it, one 4 ms behind has not."""
+    """The kick of a velocity step lasts 2 ms:
+    a row at the position controller's run has it, one 4 ms behind has not."""
     def kick(behind):
         log = sweep({"time_jitter": {"rms": 0.0, "behind": behind}})
         pitch = (log["m1_pwm"] - log["m2_pwm"] - log["m3_pwm"] + log["m4_pwm"])[400:1400]
@@ -219,7 +220,8 @@ def test_range_delay_makes_the_log_late(sweep):
 
 
 def test_a_late_range_makes_no_kick_of_the_flow(sweep):
-    """Flow and range see the platform at once; only the reading is late: the motors' pitch stays as calm at the entry."""
+    """Flow and range see the platform at once; only the reading is late:
+    the motors' pitch stays as calm at the entry."""
     def kick(delay):
         log = sweep({"range_bias": {"near": 0.0, "dip": 0.0, "delay": delay}})
         entry = true_edges(log)[0].sample
@@ -238,7 +240,8 @@ def test_flow_latency_is_the_plants_delay(quiet):
 
 def test_reach_sees_the_platform_before_and_after_the_beam_does(sweep):
     """By reach over speed at both edges, and the beam alone at none."""
-    plain, wide = (true_edges(sweep({"range_bias": {"near": 0.0, "dip": 0.0, "reach": reach}})) for reach in (0.0, 0.06))
+    plain, wide = (true_edges(sweep({"range_bias": {"near": 0.0, "dip": 0.0, "reach": reach}}))
+                   for reach in (0.0, 0.06))
     assert plain[0].sample - wide[0].sample == pytest.approx(100 * 0.06 / 0.3, abs=4)
     assert wide[1].sample - plain[1].sample == pytest.approx(100 * 0.06 / 0.3, abs=6)
 

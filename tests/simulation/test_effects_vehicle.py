@@ -138,7 +138,8 @@ def test_firmware_compensation_undoes_the_sag(quiet, steady, firmware):
 
     def command(p, v):
         """The command whose compensation is p, by bisection."""
-        return brentq(lambda c: battery_compensation.compensate(plant["firmware"], plant, v, c) - p, 10000.0, 65000.0, xtol=2.0)
+        return brentq(lambda c: battery_compensation.compensate(plant["firmware"], plant, v, c) - p, 10000.0, 65000.0,
+                      xtol=2.0)
     commands = [command(p, v) for p, v in zip(pwm, volts, strict=True)]
     # the firmware takes thrust to follow PWM times voltage; here it follows a curve of PWM times voltage squared
     assert abs(commands[1] - commands[0]) < 0.6 * abs(pwm[1] - pwm[0])

@@ -33,7 +33,8 @@ def test_preset_is_the_measured_curve(preset, signals):
         signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.01 * height + STANDING_M
         gain = wrench({"preset": preset}, signals)[2] / signals[0, at.THRUST:at.THRUST + 4].sum()
         apart.append(100 * gain - measured)
-        print(f"{preset} at {height:g} cm: {100 * gain:.2f} % of weight, measured {measured:g}, residual {apart[-1]:+.2f}")
+        print(f"{preset} at {height:g} cm: {100 * gain:.2f} % of weight, measured {measured:g}, residual "
+              f"{apart[-1]:+.2f}")
     assert np.abs(apart).max() < 0.8
     assert np.sqrt(np.mean(np.square(apart))) < 0.45
 

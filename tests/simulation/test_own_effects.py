@@ -15,7 +15,8 @@ def settings(plant, v):
     {body}
 
 
-EFFECT = Effect("{name}", "made up", (Parameter("size", "{unit}", {default}, 0.0, {most}, 0.0, "how much"),), settings=settings)
+SIZE = Parameter("size", "{unit}", {default}, 0.0, {most}, 0.0, "how much")
+EFFECT = Effect("{name}", "made up", (SIZE,), settings=settings)
 '''
 FALLS = HEAD + '''
 @wrench
@@ -30,9 +31,12 @@ EFFECT = Effect("own_load", "falls onto the drone", (Parameter("size", "N", 0.03
 FILES = {
     "own_battery": SETTINGS.format(name="own_battery", unit="ohm", default=0.3, most=1.0, body=(
         'plant["battery_strength"], plant["battery_charge"], plant["battery_resistance"] = 1.0, 0.9, v["size"]')),
-    "own_gyro": SETTINGS.format(name="own_gyro", unit="1", default=0.3, most=1.0, body='plant["gyro_scale"] *= 1.0 + v["size"]'),
-    "own_slow": SETTINGS.format(name="own_slow", unit="s", default=0.05, most=1.0, body='plant["motor_slowness"][2] = v["size"]'),
-    "own_zone": SETTINGS.format(name="own_zone", unit="1", default=1500.0, most=60000.0, body='plant["motor_dead_zone"][2] = v["size"]'),
+    "own_gyro": SETTINGS.format(name="own_gyro", unit="1", default=0.3, most=1.0,
+                                body='plant["gyro_scale"] *= 1.0 + v["size"]'),
+    "own_slow": SETTINGS.format(name="own_slow", unit="s", default=0.05, most=1.0,
+                                body='plant["motor_slowness"][2] = v["size"]'),
+    "own_zone": SETTINGS.format(name="own_zone", unit="1", default=1500.0, most=60000.0,
+                                body='plant["motor_dead_zone"][2] = v["size"]'),
     "own_load": FALLS}
 
 

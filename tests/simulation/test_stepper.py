@@ -38,5 +38,6 @@ def test_a_second_flight_begins_with_the_rotors_of_the_first():
     stepper = Stepper(plan, vehicle.load(), 5, 2, choose(plan, {"motor_noise": {"rms": 0.05}}))
     for _ in range(3):
         stepper.begin(plan.setpoints[0])
-        np.testing.assert_array_equal(stepper.memory[0]["gain"], Stepper(plan, vehicle.load(), 5, 2, choose(plan)).plant[0]["gain"])
+        np.testing.assert_array_equal(stepper.memory[0]["gain"],
+                                      Stepper(plan, vehicle.load(), 5, 2, choose(plan)).plant[0]["gain"])
         stepper.fly(plan.setpoints[:300], np.empty((300, loop.COLUMNS)))

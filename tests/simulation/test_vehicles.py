@@ -84,7 +84,8 @@ def test_a_scenario_may_change_fields_of_the_vehicle():
 
 
 @pytest.mark.parametrize("line, said", [
-    ("mas_kg = 1", "unknown key mas_kg"), ("mass_kg = -1", "must be positive"), ("flow_noise_mps = 1", "must be 2 numbers"),
+    ("mas_kg = 1", "unknown key mas_kg"), ("mass_kg = -1", "must be positive"),
+    ("flow_noise_mps = 1", "must be 2 numbers"),
     ("firmware = '1999'", "mine.toml"), ("name = 'other'", "every field of a vehicle but its name")])
 def test_wrong_fields_are_told_with_their_file(line, said):
     with pytest.raises(AirTouchError, match=said) as told:

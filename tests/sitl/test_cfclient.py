@@ -8,6 +8,7 @@ import json
 import os
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
 
@@ -79,4 +80,4 @@ def test_headless_client_log_configurations_and_log_files(tmp_path):
     header, *lines = told["files"][0].splitlines()
     assert header == "Timestamp,stabilizer.roll,stabilizer.pitch,stabilizer.yaw"
     stamps = [int(line.split(",")[0]) for line in lines]
-    assert len(stamps) > 15 and {b - a for a, b in zip(stamps, stamps[1:])} == {20}
+    assert len(stamps) > 15 and {b - a for a, b in pairwise(stamps)} == {20}

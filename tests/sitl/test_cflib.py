@@ -9,7 +9,7 @@ from patience import HANG_S
 from sitl.clients import connected, log_block, wait_for
 
 pytest.importorskip("cflib")
-from simulated_link import simulated  # noqa: E402
+from simulated_link import simulated
 
 MOTION = {**{f"acc.{a}": "FP16" for a in "xyz"}, **{f"gyro.{a}": "FP16" for a in "xyz"},
           **{f"motor.m{i}": "uint16_t" for i in (1, 2, 3, 4)}, "range.zrange": "uint16_t", "pm.vbat": "FP16"}
@@ -90,7 +90,7 @@ def test_clients_come_and_go(cflib, tmp_path):
                 cf.console.receivedChar.add_callback(said.append)
                 line = "hello, a long line on the console of the drone"
                 virtual.firmware.say(line)
-                wait_for(lambda said=said: line + "\n" in "".join(said))
+                wait_for(lambda said=said, line=line: line + "\n" in "".join(said))
         with connected(virtual.uri) as cf:
             wait_for(lambda: cf.link_statistics.latency.latency > 0.0)
             assert "Can fly" in cf.supervisor.read_state_list()
@@ -135,7 +135,8 @@ def test_sweep_over_a_platform_is_felt(monkeypatch):
         assert len(counted) >= 2  # in and out again
         assert any(start <= x[i] <= end + 0.7 for i in counted)
         assert rows[-1][1]["airtouch.edge"] in (1, 2) and rows[-1][1]["airtouch.health"] == 0
-        assert virtual.drone.height_over_floor < 0.05  # its down range reads short near the floor: let go a little above
+        # its down range reads short near the floor: let go a little above
+        assert virtual.drone.height_over_floor < 0.05
 
 
 def test_motion_commander_flies_a_step(monkeypatch):

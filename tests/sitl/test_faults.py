@@ -12,7 +12,7 @@ from airtouch.sitl.packet import CONSOLE, LOG, PARAM, Packet
 from sitl.clients import connected, log_block
 
 pytest.importorskip("cflib")
-from simulated_link import simulated  # noqa: E402
+from simulated_link import simulated
 
 
 @pytest.mark.parametrize("text, fault", [
@@ -33,7 +33,7 @@ def test_badly_written_faults_are_named(text):
 def test_a_lossy_line_loses_that_share():
     log, answer = Packet(LOG, 2, b"1234"), Packet(PARAM, 1, b"123")
     for fault, kept in (("loss=0.3", (0.7, 1.0)), ("loss=0.3,all", (0.7, 0.7))):
-        for packet, share in zip((log, answer), kept):
+        for packet, share in zip((log, answer), kept, strict=True):
             line = Line([parse(fault)], np.random.default_rng(0))
             for _ in range(5000):
                 line.put(packet, None, 0.0)
@@ -111,7 +111,8 @@ def test_faults_can_be_ordered_in_flight(bench):
 
 def test_without_an_ai_deck_the_stm32_does_it(bench):
     craft, _ = flying(bench, ai_deck=False)
-    assert craft.drone.app.sent == 0 and craft.drone.app.read("detector") == 1 and math.isfinite(craft.drone.app.read("prob"))
+    assert craft.drone.app.sent == 0 and craft.drone.app.read("detector") == 1
+    assert math.isfinite(craft.drone.app.read("prob"))
     assert craft.firmware.param.values["deck.bcAI"] == 0
 
 

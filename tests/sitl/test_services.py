@@ -4,6 +4,7 @@ import errno
 import re
 import struct
 import zlib
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -97,7 +98,7 @@ def test_time_stamps_have_24_bits(bench):
     craft.log(CREATE, 1, *variable(craft, "acc.z", 7))
     craft.log(START, 1, 1)
     stamps = [int.from_bytes(p.data[1:4], "little") for p in craft.fly(0.05) if p.port == LOG]
-    assert [(b - a) % (1 << 24) for a, b in zip(stamps, stamps[1:])] == [10] * (len(stamps) - 1)
+    assert [(b - a) % (1 << 24) for a, b in pairwise(stamps)] == [10] * (len(stamps) - 1)
     assert stamps[-1] < stamps[0] or stamps[0] < 100
 
 

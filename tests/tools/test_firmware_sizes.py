@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from tools import firmware_sizes  # noqa: E402
+from tools import firmware_sizes
 
 STOCK = """Build for the cf2 platform!
 Flash |  307244/1032192 (30%),  724948 free | text: 298392, data: 8852, ccmdata: 0

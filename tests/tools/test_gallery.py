@@ -20,9 +20,10 @@ def test_every_picture_of_the_page_is_made_by_the_tool_and_small():
 
 
 def test_a_palette_keeps_the_picture():
-    import gallery
     import numpy as np
     from PIL import Image
+
+    import gallery
 
     picture = np.zeros((40, 60, 3), np.uint8)
     picture[10:20] = (11, 87, 208)

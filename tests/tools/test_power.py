@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import ina219
+import power
 from airtouch.errors import AirTouchError
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-import ina219  # noqa: E402
-import power  # noqa: E402
 
 KNOWN = tuple(power.PAPER_MW)
 
@@ -74,7 +73,8 @@ def test_gaps_and_a_reset_of_the_arduino_are_no_energy():
 ])
 def test_any_order_unit_and_separator(header, row, expected):
     lines = [row.format(t=str(k * 0.005).replace(".", ","), us=5000 * k, ms=5 * k) for k in range(500)]
-    found = ina219.power(ina219.parse("\ufeff# made by hand\r\n" + "\r\n".join([*([header] if header else []), *lines]), "f"))
+    found = ina219.power(ina219.parse("\ufeff# made by hand\r\n" + "\r\n".join([*([header] if header else []), *lines]),
+                                      "f"))
     assert found.mw == pytest.approx(expected) and found.seconds == pytest.approx(2.495)
 
 
@@ -99,7 +99,8 @@ def test_what_is_no_log_is_said_in_one_line(content, says):
     assert str(error.value).startswith("run.csv") and "\n" not in str(error.value)
 
 
-@given(st.text(max_size=300) | st.lists(st.lists(st.sampled_from(["1", "2.5", "nan", "-1e999", "time_ms", "x", ""]), max_size=5),
+@given(st.text(max_size=300)
+       | st.lists(st.lists(st.sampled_from(["1", "2.5", "nan", "-1e999", "time_ms", "x", ""]), max_size=5),
                                         max_size=30).map(lambda rows: "\n".join(",".join(r) for r in rows)))
 def test_any_text_gives_a_trace_or_one_line(content):
     try:

@@ -9,8 +9,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 #: what may stand in the top folder; anything else belongs into one of its folders or was left by a run
-ALLOWED = (".*", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md", "pyproject.toml",
-           "*.lock", "firmware", "gap8", "host", "tests", "tools")
+ALLOWED = (".*", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "Makefile", "README.md",
+           "pyproject.toml", "*.lock", "firmware", "gap8", "host", "tests", "tools")
 
 
 def strangers(root: Path) -> set[str]:
@@ -20,7 +20,8 @@ def strangers(root: Path) -> set[str]:
     return {name for name in names if not any(fnmatch(name, pattern) for pattern in ALLOWED)}
 
 
-@pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(), reason="no git checkout on this machine")
+@pytest.mark.skipif(shutil.which("git") is None or not (ROOT / ".git").exists(),
+                    reason="no git checkout on this machine")
 def test_the_top_folder_holds_only_what_it_may():
     assert strangers(ROOT) == set()
 

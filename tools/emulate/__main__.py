@@ -25,7 +25,8 @@ from tools.emulate.replay import Replay, replay
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
 CLONE = "git clone --recursive --branch 2026.08 https://github.com/bitcraze/crazyflie-firmware ~/crazyflie-firmware"
 #: step -> parameters: three that are taken over, one out of range, the other detector and back
-CHANGES = {100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0}, 300: {"detector": 1, "scoreIn": 2.3}}
+CHANGES = {100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0},
+           300: {"detector": 1, "scoreIn": 2.3}}
 
 
 def recorded(count: int) -> list[FlightLog]:
@@ -43,7 +44,8 @@ def show(what: str, seconds: float, found: Replay) -> None:
     task, words = found.least_left
     print(f"{what}: {found.steps} steps, {found.different} differ, prob within {found.prob_off:.1g}; edges "
           f"{' '.join(f'{kind}@{step}' for step, kind in found.edges) or 'none'}\n  late {found.late}, longest step "
-          f"{found.longest_us} us; app's stack {found.stack_bytes} of 1600 bytes, least left of any task {4 * words} ({task});\n  "
+          f"{found.longest_us} us; app's stack {found.stack_bytes} of 1600 bytes, least left of any task {4 * words} "
+          f"({task});\n  "
           f"{found.steps / 100:.1f} s of flight in {seconds:.0f} s", flush=True)
     if found.first:
         print(f"  first difference: {found.first}")
@@ -57,7 +59,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--steps", type=int, default=2400, help="of each flight (2400)")
     parser.add_argument("--built", action="store_true", help="take what `make firmware` built last")
     parser.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
-    parser.add_argument("--height", action="store_true", help="closed loop over edges of every kind: the height kept or not")
+    parser.add_argument("--height", action="store_true",
+                        help="closed loop over edges of every kind: the height kept or not")
     given = parser.parse_args(arguments)
     build.tools()
     if not given.built:
@@ -73,7 +76,8 @@ def main(arguments: list[str]) -> int:
         changes = CHANGES if i == len(logs) - 1 else {}
         begun = time.monotonic()
         found = replay(elf, log, given.steps, changes)
-        name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes else "")
+        name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
+                                                                      else "")
         show(name, time.monotonic() - begun, found)
         different += found.different
     return 1 if different else 0
@@ -82,7 +86,8 @@ def main(arguments: list[str]) -> int:
 if __name__ == "__main__":
     try:
         if len(sys.argv) < 2 or not sys.argv[1]:
-            raise AirTouchError(f"say where the firmware's sources are: make emulate CRAZYFLIE_BASE=~/crazyflie-firmware; {CLONE}")
+            raise AirTouchError(f"say where the firmware's sources are: make emulate "
+                                f"CRAZYFLIE_BASE=~/crazyflie-firmware; {CLONE}")
         sys.exit(main(sys.argv[1:]))
     except AirTouchError as error:
         sys.exit(f"make emulate: {error}")

@@ -74,7 +74,8 @@ class Board:
                 os.set_blocking(file, True)
                 return file
         self._qemu.kill()
-        raise AirTouchError(f"QEMU does not run the image: {self._qemu.communicate()[0].decode(errors='replace')[-500:]}")
+        raise AirTouchError(f"QEMU does not run the image: "
+                            f"{self._qemu.communicate()[0].decode(errors='replace')[-500:]}")
 
     def ask(self, kind: str, names: Sequence[str]) -> list[int]:
         """Have names looked up in the firmware's tables: the type of each. AirTouchError where one is missing."""
@@ -116,7 +117,8 @@ class Board:
                 raise AirTouchError(f"the firmware stopped: {content.decode(errors='replace')}; {self._last()}")
             elif kind == "X":
                 registers = struct.unpack("<8I", content)
-                raise AirTouchError(f"hard fault in {self._where(registers[6])}, called from {self._where(registers[5])}; {self._last()}")
+                raise AirTouchError(f"hard fault in {self._where(registers[6])}, called from "
+                                    f"{self._where(registers[5])}; {self._last()}")
             elif kind in self._handlers:
                 self._handlers[kind](content)
 

@@ -32,10 +32,11 @@ WRAPPED = (
     "VL53L1_GetRangingMeasurementData", "consolePutchar", "assertFail", "storeAssertTextData",
     "storeAssertHardfaultData", "EXTI_GetITStatus", "appMain", "vTaskDelayUntil", "xTaskIncrementTick")
 #: functions of hardware that is not there, which do nothing and return 0
-LEFT_OUT = ("i2cdevInit", "i2cdevRead", "i2cdevReadReg8", "i2cdevReadReg16", "i2cdevWrite", "i2cdevWriteReg8", "i2cdevWriteReg16",
-            "usblinkInit", "adcInit", "buzzerInit", "watchdogInit")
+LEFT_OUT = ("i2cdevInit", "i2cdevRead", "i2cdevReadReg8", "i2cdevReadReg16", "i2cdevWrite", "i2cdevWriteReg8",
+            "i2cdevWriteReg16", "usblinkInit", "adcInit", "buzzerInit", "watchdogInit")
 CORE = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
-OWN, BOARDS, PAGE = 0x1FFF7000, 0x08001000, 0x1000  #: where the STM32 keeps its type, number and size, and board.ld does
+#: where the STM32 keeps its type, number and size, and board.ld does
+OWN, BOARDS, PAGE = 0x1FFF7000, 0x08001000, 0x1000
 
 
 def tools() -> None:
@@ -74,8 +75,8 @@ def _flags() -> tuple[list[str], Path]:
 
 
 def _objects() -> list[Path]:
-    """The objects of the firmware's last link, each for itself: what was joined to built-in.o on the way is taken apart,
-    since a name that is defined in the same object cannot be replaced."""
+    """The objects of the firmware's last link, each for itself: what was joined to built-in.o on the way is taken
+    apart, since a name that is defined in the same object cannot be replaced."""
     where = BUILT / "firmware/app/build"
 
     def parts(path: Path) -> list[Path]:

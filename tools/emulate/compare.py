@@ -41,8 +41,10 @@ def apart(one: Flown, log: FlightLog, until_s: float) -> dict[str, float]:
     def rms(emulated: np.ndarray, own: np.ndarray) -> float:
         return float(np.sqrt(np.mean(np.square(emulated[:n][flies] - own[:n][flies]))))
 
-    return {"seconds": float(flies.sum() / 100.0), "height m": rms(table[:, 3], log["z_m"]), "x m": rms(table[:, 1], log["x_m"]),
-            "y m": rms(table[:, 2], log["y_m"]), "mean motor PWM": rms(table[:, 4:8].mean(axis=1), log.stack(PWM).mean(axis=1))}
+    return {"seconds": float(flies.sum() / 100.0), "height m": rms(table[:, 3], log["z_m"]),
+            "x m": rms(table[:, 1], log["x_m"]),
+            "y m": rms(table[:, 2], log["y_m"]),
+            "mean motor PWM": rms(table[:, 4:8].mean(axis=1), log.stack(PWM).mean(axis=1))}
 
 
 def differing(one: Flown, other: Flown) -> tuple[int, int, int, int]:
@@ -59,7 +61,8 @@ def report(elf: Path, seed: int = 1) -> bool:
     on, off = fly(elf, flown, vehicle(), seed), fly(elf, flown, vehicle(), seed, app=False)
     other, n, first, by = differing(on, off)
     print(f"there-and-back, seed {seed}: with the app {on.ending}, without {off.ending}")
-    print(f"motors: {other} of {n} commands differ" + (f", the first at {first * STEP_S - BOOT_S:.2f} s by {by} of 65535" if other else ""))
+    print(f"motors: {other} of {n} commands differ"
+          + (f", the first at {first * STEP_S - BOOT_S:.2f} s by {by} of 65535" if other else ""))
     coarse = [fly(elf, flown, vehicle(), seed, app=app, whole_milliseconds=True) for app in (True, False)]
     same, n, _, _ = differing(*coarse)
     print(f"with a clock of whole milliseconds: {same} of {n} commands differ")

@@ -1,7 +1,7 @@
 """The shipped image flies: its stabilizer, estimator and controllers closed-loop around the simulator's vehicle.
 
-Every two milliseconds the board hands over the motors that it drives, and gets what its sensors read. Set-points, voltage
-and parameters reach it as packets of its radio.
+Every two milliseconds the board hands over the motors that it drives, and gets what its sensors read. Set-points,
+voltage and parameters reach it as packets of its radio.
 """
 
 import struct
@@ -91,8 +91,8 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
         blind_s: Sequence[tuple[float, float]] = ()) -> Flown:
     """One flight of a scenario by the emulated firmware.
 
-    app, whole_milliseconds: Board. parameters: set by radio before take-off. blind_s: seconds of the mission in which the down range
-    sees nothing.
+    app, whole_milliseconds: Board. parameters: set by radio before take-off. blind_s: seconds of the mission in which
+    the down range sees nothing.
     """
     plan = draw_flight(scenario, seed, flight)
     plant = Plant(plan, vehicle, seed, flight, choose(plan))
@@ -130,7 +130,8 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
                         board.say("L", set_parameter(name, value))
                 if step >= wait:
                     board.say("L", _order(plan.setpoints[(step - wait) // loop.LOG_STEPS]))
-                rows.append([now, *plant.place, *motors, *(values[n] for n in ESTIMATE), values["range.zrange"] / 1000.0, plant.top])
+                rows.append([now, *plant.place, *motors, *(values[n] for n in ESTIMATE),
+                             values["range.zrange"] / 1000.0, plant.top])
             if values["airtouch.edges"] > edges:
                 edges = int(values["airtouch.edges"])
                 found.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))

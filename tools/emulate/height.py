@@ -10,7 +10,8 @@ from airtouch.simulation.scenario import Scenario
 from tools.emulate.compare import SCENARIO, vehicle
 from tools.emulate.flight import Flown, fly
 
-CRUISE_M, SETTLED_S, LAND_S = 0.8, 4.5, 3.5  #: of there-and-back: height, end of the take-off's swing, landing at the end
+#: of there-and-back: height, end of the take-off's swing, landing at the end
+CRUISE_M, SETTLED_S, LAND_S = 0.8, 4.5, 3.5
 _PLATFORM = """[[platform]]
 shape = "rectangle"
 size_m = [{size}, 4.0]
@@ -54,14 +55,15 @@ def mission(case: Case) -> Scenario:
     text = SCENARIO.read_text()
     head, rest = text.split("[[platform]]", 1)
     platforms = "".join(_PLATFORM.format(size=b - a, at=0.5 * (a + b), top=h) for a, b, h in case.surfaces)
-    return scenario.parse(head + platforms + "\n[mission]" + rest.split("[mission]", 1)[1].replace("0.3\n", f"{case.speed}\n"),
-                          case.name)
+    return scenario.parse(head + platforms + "\n[mission]"
+                          + rest.split("[mission]", 1)[1].replace("0.3\n", f"{case.speed}\n"), case.name)
 
 
 def kept(one: Flown) -> tuple[float, float]:
     """Least and greatest true height over the floor between take-off and landing, m."""
     t = one.table[:, 0]
-    cruise = one.table[(t >= SETTLED_S) & (t < t[-1] - LAND_S), 3] if one.ending == "ok" else one.table[t >= SETTLED_S, 3]
+    cruise = one.table[(t >= SETTLED_S) & (t < t[-1] - LAND_S), 3] if one.ending == "ok" else one.table[t >= SETTLED_S,
+                                                                                                        3]
     return (float(cruise.min()), float(cruise.max())) if len(cruise) else (np.nan, np.nan)
 
 

@@ -49,7 +49,8 @@ class Plant:
 
 
 @njit(nogil=True)
-def _step(plant_array, corners, first, surface, box, effects, used, parameters, effect_streams, streams, memory_array, out):
+def _step(plant_array, corners, first, surface, box, effects, used, parameters, effect_streams, streams, memory_array,
+          out):
     plant, memory = plant_array[0], memory_array[0]
     ground = (corners, first, surface, box)
     h, k = plant.step, memory.step

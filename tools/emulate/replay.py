@@ -18,7 +18,8 @@ VEHICLE = "crazyflie-2.1-flow"  #: that `make firmware` builds cf2 for
 GRAVITY, DEGREE = np.float32(9.81), np.float32(0.01745329252)  #: app_sensors.c
 #: log variables that the app reads, in its order
 FED = ("stateEstimate.ax", "stateEstimate.ay", "stateEstimate.az", "gyro.x", "gyro.y", "gyro.z", "motor.m1", "motor.m2",
-       "motor.m3", "motor.m4", "pm.vbat", "stateEstimate.qx", "stateEstimate.qy", "stateEstimate.qz", "stateEstimate.qw")
+       "motor.m3", "motor.m4", "pm.vbat", "stateEstimate.qx", "stateEstimate.qy", "stateEstimate.qz",
+       "stateEstimate.qw")
 TIMING = {"load", "loadMax", "late", "gap8Up"}  #: log variables that a desktop has no part in
 APP_STACK_WORDS = 400  #: CONFIG_APP_STACKSIZE
 TIMING_HEALTH = 128 | 256  #: late, stalled
@@ -51,15 +52,16 @@ def rows(log: FlightLog) -> np.ndarray:
     """
     missing = [name for name in (*GYRO, *PWM) if name not in log.columns]
     if missing:
-        raise AirTouchError(f"{log.meta.get('source', 'the flight')} has no {', '.join(missing)}: the app needs acceleration, "
+        raise AirTouchError(f"{log.meta.get('source', 'the flight')} has no {', '.join(missing)}: the app needs "
+                            "acceleration, "
                             "rates and motors; fly with the log configuration of host/docs/collect.md")
     acc, n = level_acceleration(log) / float(GRAVITY), len(log)
     acc[:, 2] -= 1.0
     attitude = np.tile([0.0, 0.0, 0.0, 1.0], (n, 1))
     if log.has(*ATTITUDE):
         (sr, sp, sy), (cr, cp, cy) = (f(0.5 * np.nan_to_num(log.stack(ATTITUDE)).T) for f in (np.sin, np.cos))
-        attitude = np.column_stack([sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
-                                    cr * cp * cy + sr * sp * sy])
+        attitude = np.column_stack([sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
+                                    cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy])
     volts = log["vbat_V"] if log.has("vbat_V") else np.full(n, np.nan)
     pwm = np.clip(np.round(np.nan_to_num(log.stack(PWM))), 0, 65535)
     return np.column_stack([acc, log.stack(GYRO) / float(DEGREE), pwm, volts, attitude]).astype(np.float32)

@@ -79,7 +79,7 @@ def compile_objects(sources: Sequence[Path], core: str, folder: Path, *, include
     objects = [folder / f"{Path(source).stem}.o" for source in sources]
     if len(set(objects)) < len(objects):
         raise AirTouchError("two sources have the same file name")
-    for source, made in zip(sources, objects):
+    for source, made in zip(sources, objects, strict=True):
         _run([*command, *FLAGS, *(f"-I{path}" for path in include), *flags, "-c", source, "-o", made],
              _environment(cache))
     return objects
@@ -140,7 +140,7 @@ def _make(folder: Path, core: Core, compiler: str, flags: list[str], sources: li
         objects = [new / f"{source.stem}.o" for source in [*sources, *extra]]
         if len({path.name for path in objects}) < len(objects):
             raise AirTouchError("two sources have the same file name")
-        for source, target in zip([*sources, *extra], objects):
+        for source, target in zip([*sources, *extra], objects, strict=True):
             _run([*compile_, *flags, "-c", source, "-o", target], environment)
         libraries = [] if compiler == "zig" else ["-lm", "-lc", "-lgcc"]
         kept = [f"-Wl,-u,{name}" for path in objects[:len(sources)]

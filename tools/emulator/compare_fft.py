@@ -95,7 +95,8 @@ def main() -> None:
             steps = code.fly("edge_pipeline", flight)
             step = steps.instructions[steps.ready].mean()
             least, most = min(least or fft, fft), max(most, step)
-            print(f"{compiler + ' ' + optimise:18}{fft:9,}{CHANNELS * fft:10,}{step:10,.0f}{CHANNELS * fft / step:8.1f}")
+            name, nine = f"{compiler} {optimise}", CHANNELS * fft
+            print(f"{name:18}{fft:9,}{nine:10,}{step:10,.0f}{nine / step:8.1f}")
     print(f"{'best / worst':18}{least:9,}{CHANNELS * least:10,}{most:10,.0f}{CHANNELS * least / most:8.1f}")
 
 

@@ -51,7 +51,8 @@ class Elf:
         headers = _section_headers(data)
         self.sections = [_section(data, header) for header in headers if header["flags"] & _ALLOC and header["size"]]
         self.symbols = {symbol.name: symbol for symbol in _symbols(data, headers, thumb=self.machine == ARM)}
-        self.undefined = {name for name, _, _, info, section in _symbol_table(data, headers) if not section and info >> 4}
+        self.undefined = {name
+                          for name, _, _, info, section in _symbol_table(data, headers) if not section and info >> 4}
         self._functions = sorted((s for s in self.symbols.values() if s.is_function), key=lambda s: s.address)
 
     def where(self, address: int) -> str:
@@ -78,7 +79,7 @@ def _section_headers(data: bytes) -> list[dict]:
     offset, = struct.unpack_from("<I", data, 32)
     size, count, names = struct.unpack_from("<HHH", data, 46)
     fields = ("name", "type", "flags", "address", "offset", "size", "link", "info")
-    headers = [dict(zip(fields, struct.unpack_from("<8I", data, offset + i * size))) for i in range(count)]
+    headers = [dict(zip(fields, struct.unpack_from("<8I", data, offset + i * size), strict=True)) for i in range(count)]
     name_table = headers[names]["offset"]
     for header in headers:
         header["name"] = _text(data, name_table + header["name"])

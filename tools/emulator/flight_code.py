@@ -147,7 +147,8 @@ def samples(acc: np.ndarray, gyro: np.ndarray, pwm: np.ndarray, *, thrust_axis: 
 
 
 def made_flight(n: int = 1500, seed: int = 0) -> np.ndarray:
-    """(n,) of edgeSample_t: a second on the ground, take-off, hover with bursts of motion in the band and odd values."""
+    """(n,) of edgeSample_t: a second on the ground, take-off, hover with bursts of motion in the band and odd
+    values."""
     rng = np.random.default_rng(seed)
     t = np.arange(n)
     burst = 1.0 + 6.0 * ((t // 150) % 3 == 2)

@@ -194,9 +194,9 @@ def _word(values: Sequence[int]) -> int:
 
 def _simd(funct7: int, a: int, b: int, d: int) -> int | None:
     if funct7 == 0x54:  # cv.sdotsp.b
-        return (d + sum(x * y for x, y in zip(_bytes(a), _bytes(b)))) & 0xFFFF_FFFF
+        return (d + sum(x * y for x, y in zip(_bytes(a), _bytes(b), strict=True))) & 0xFFFF_FFFF
     if funct7 == 0x18:  # cv.max.b
-        return _word([max(x, y) for x, y in zip(_bytes(a), _bytes(b))])
+        return _word([max(x, y) for x, y in zip(_bytes(a), _bytes(b), strict=True)])
     if funct7 == 0x7C:  # cv.packlo.b
         return d & 0xFFFF_0000 | (a & 0xFF) << 8 | b & 0xFF
     if funct7 == 0x7D:  # cv.packhi.b
@@ -248,7 +248,8 @@ def _innermost(words: Sequence[int]) -> dict[int, tuple[int]]:
     for at, word in enumerate(words):
         if word & 0x7F != _BRANCH:
             continue
-        offset = _signed((word >> 31) << 12 | (word >> 7 & 1) << 11 | (word >> 25 & 63) << 5 | (word >> 8 & 15) << 1, 13)
+        offset = _signed((word >> 31) << 12 | (word >> 7 & 1) << 11 | (word >> 25 & 63) << 5 | (word >> 8 & 15) << 1,
+                         13)
         target = at + offset // 4
         if offset < 0 and not any(w & 0x7F in (_BRANCH, *_JUMPS) for w in words[target:at]):
             found[at] = (target,)

@@ -19,18 +19,21 @@ MORE = 5  #: flights that the outlook is given for
 
 @click.command(name="adapt")
 @click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), default=Path("mine.npz"), show_default=True, help="Model file to write.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("mine.npz"), show_default=True,
+              help="Model file to write.")
 @click.option("--twin", "twin_folder", type=click.Path(path_type=Path, file_okay=False),
               help="Folder of `airtouch twin`; one is fitted to the flights if left out.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
 @click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
               help="Commanded speed over the platform; else the manifest's, else from the logs.")
-@click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N",
+              help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
 @click.option("--withhold-range", is_flag=True,
               help="Take no labels from the flights in the last stage: what unlabelled flights bring.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes every bit of the result on one machine.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
+              help="Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, origin: str, speed: float | None,
             folds: tuple[int, ...], hold_out: bool, withhold_range: bool, seed: int, force: bool) -> None:
@@ -91,7 +94,8 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
     listed = levers.default(craft)
     with Bar("fitting a twin") as bar:
         state = fit.fit(fit.target(recorded.courses, recorded.features), craft, listed, rounds=ROUNDS, flights=BATCH,
-                        seed=seed, fixed=levers.FIXED, kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
+                        seed=seed, fixed=levers.FIXED, kept=kept / "fit.json",
+                        progress=lambda done, total, _: bar(done, total))
     made = files.write(kept, craft, listed, fit.best(state), recorded.courses, levers.FIXED, force=True)
     return scenario.load(made[1]), vehicles.load(made[0]), f"twin fitted to {len(recorded.courses)} of them"
 

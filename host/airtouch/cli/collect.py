@@ -183,7 +183,8 @@ def _report(outcome) -> None:
     start = log["t_s"][0]
     edges = logs.true_edges(log)
     if outcome.use == "free-air":
-        click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the mission sweep "
+        click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the "
+                   "mission sweep "
                    "does over its own")
     for edge in edges:
         click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: "

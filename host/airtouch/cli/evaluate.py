@@ -18,7 +18,8 @@ from airtouch.logs.files import check_free
               help="Trained model (.npz); the shipped one if left out.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
               help="Commanded speed of flights whose manifest does not say.")
-@click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N",
+              help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
 @click.option("--force", is_flag=True, help="Replace the JSON file.")
 def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed: float | None,
@@ -57,7 +58,8 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
     trained_on = len(result["in_training"])
     if trained_on:
-        screen.print(f"warning: the model was trained on {trained_on} of these {len(scores)} flights; how it does on others "
+        screen.print(f"warning: the model was trained on {trained_on} of these {len(scores)} flights; how it does on "
+                     "others "
                      "is what airtouch crossval says")
     if json_path:
         show.write_json(json_path, result, force)

@@ -129,15 +129,16 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         if report:
             from airtouch.report import gap_report
 
-            gap_report.write_diagnosis(report, found, command=_line("diagnose", real, baseline, vehicle_name), force=force)
+            gap_report.write_diagnosis(report, found, command=_line("diagnose", real, baseline, vehicle_name),
+                                       force=force)
         gap_show.diagnosis(scores.console(), found)
     gap_show.left_out([*flights.failed.values(), *nominal.failed.values()])
     _written(json_path, report)
 
 
 @command.command("demo")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/gap-demo"), show_default=True,
-              help="Folder for the report and the JSON.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/gap-demo"),
+              show_default=True, help="Folder for the report and the JSON.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
 def demo_command(out: Path, force: bool) -> None:
     """Diagnose a flight that comes with the package, whose effect is withheld, and compare with what it was.
@@ -161,13 +162,15 @@ def demo_command(out: Path, force: bool) -> None:
     nominal = [read(p) for p in example.nominal()]
     with gap_show.Steps(began) as say:
         say("reading and compiling")
-        found = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say, pictures=True)
+        found = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
+                         pictures=True)
     scores.write_json(json_path, found.plain(), force)
     gap_report.write_diagnosis(report, found, command="airtouch gap demo", force=force)
     gap_show.diagnosis(scores.console(), found)
     true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
     told = words.joined([e.name for e in found.effects]) or found.verdict
-    click.echo(f"\nSwitched on when the flight was made: {'; '.join(f'{n} ({p})' for n, p in true.items())}; found: {told}.")
+    click.echo(f"\nSwitched on when the flight was made: {'; '.join(f'{n} ({p})' for n, p in true.items())}; found: "
+               f"{told}.")
     click.echo(f"{time.monotonic() - began:.0f} s; open {report} in a browser")
 
 

@@ -63,7 +63,8 @@ def files_of(names: Sequence[str]) -> list[Path]:
                 continue
             some = [path]
         else:
-            some = [Path(p) for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file() and Path(p).name != MANIFEST]
+            some = [Path(p)
+                    for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file() and Path(p).name != MANIFEST]
         if not some:
             raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
         found.update(dict.fromkeys(some))

@@ -87,7 +87,8 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
               show_default=True, help="Kind of file to write.")
 @click.option("--columns", "mapping", type=click.Path(), metavar="MAP.toml",
               help="Read CSVs of someone else's by this file, which says which of their columns is which of ours.")
-@click.option("--plain", is_flag=True, help="With csv: a header and numbers alone, as PlotJuggler and spreadsheets want it.")
+@click.option("--plain", is_flag=True,
+              help="With csv: a header and numbers alone, as PlotJuggler and spreadsheets want it.")
 @click.option("--rate", type=float, help="Resample to exactly this rate in Hz (else samples stay as logged).")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, plain: bool, rate: float | None,
@@ -192,7 +193,8 @@ def _print_table(rows: list[dict[str, Any]]) -> None:
               "condition")
     cells = [titles] + [
         (Path(r["source"]).name, r["format"], str(r["samples"]), f"{r['duration_s']:.1f}",
-         _hertz(r["rate_hz"]), str(r["entries"]), str(r["exits"]), str(r["warnings"]), " ".join(r["channels"]), r["condition"])
+         _hertz(r["rate_hz"]), str(r["entries"]), str(r["exits"]), str(r["warnings"]), " ".join(r["channels"]),
+         r["condition"])
         for r in rows
     ]
     widths = [max(len(row[i]) for row in cells) for i in range(len(titles))]

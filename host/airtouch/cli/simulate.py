@@ -58,8 +58,8 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     """Fly SCENARIO (a built-in name or a .toml file) and write one log a flight.
 
     The vehicle's firmware flies, or the scenario's (firmware = "2026.08" or "authors-2024-01", range_module = "map",
-    "platform", "none" or "firmware" in the file). The same command continues after a kill. Flights that diverge are reported with their
-    number and never written; the exit code is then 1.
+    "platform", "none" or "firmware" in the file). The same command continues after a kill. Flights that diverge are
+    reported with their number and never written; the exit code is then 1.
     """
     from airtouch import vehicle as vehicles
     from airtouch.simulation import batch, cluster, effects, local, store

@@ -50,7 +50,8 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
                     ai_deck=not no_ai_deck, record=record, force=force)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: server.stop())
-    click.echo(f"{server.uri}: ready; {scenario}, {vehicle}; each `airtouch collect` starts at the start; Ctrl-C ends it")
+    click.echo(f"{server.uri}: ready; {scenario}, {vehicle}; each `airtouch collect` starts at the start; Ctrl-C ends "
+               "it")
     server.run(click.echo)
     if record:
         click.echo(f"{server.drone.now_s:.0f} s of flight log in {record}")

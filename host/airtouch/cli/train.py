@@ -23,7 +23,8 @@ from airtouch.logs.flight_log import FlightLog
 
 @click.command(name="train")
 @click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--detector", default="best", show_default=True, help="Which detector to train: best, paper or paper-stream.")
+@click.option("--detector", default="best", show_default=True,
+              help="Which detector to train: best, paper or paper-stream.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
               help="Model file to write.")
 @click.option("--epochs", type=click.IntRange(1), help="paper: at most so many; its own number if left out.")
@@ -96,7 +97,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
             failures = 0
         if detector == "best":
             options["work"] = out.with_suffix(".training")
-        model = module.fit([sensors.without(log, silence) for log in chosen], seed=seed, progress=progress, command=_command(), **options)
+        model = module.fit([sensors.without(log, silence) for log in chosen], seed=seed, progress=progress,
+                           command=_command(), **options)
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)
@@ -156,7 +158,7 @@ def _command() -> str:
     return shlex.join(["airtouch", *sys.argv[1:]])
 
 
-def _stderr():  # noqa: ANN202 - a rich.console.Console
+def _stderr():
     from rich.console import Console
 
     return Console(stderr=True)

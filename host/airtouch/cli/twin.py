@@ -24,7 +24,8 @@ FIT, SUMMARY, REPORT = "fit.json", "twin.json", "report.html"
               help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
 @click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
               help="Commanded speed over the platform; else the manifest's, else from the logs.")
-@click.option("--fold", "folds", type=int, multiple=True, metavar="N", help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N",
+              help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
 @click.option("--batch", type=click.IntRange(40), default=240, show_default=True, help="Simulated flights a round.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes the result.")
@@ -70,7 +71,8 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     listed = levers.default(craft, recorded.near)
     workers = workers or available_cores()
     with Bar("fitting") as bar:
-        state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers, fixed=levers.FIXED,
+        state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers,
+                        fixed=levers.FIXED,
                         kept=out / FIT, progress=lambda done, total, now: bar(done, total, _misfit(now)))
     values = fit.best(state)
     files.write(out, craft, listed, values, recorded.courses, levers.FIXED, force=True)
@@ -78,10 +80,12 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
         flown, lost = compare.flown(recorded.courses, craft, listed, values, seed, levers.FIXED, progress=bar)
     with Bar("telling apart") as bar:
         phases: list[str] = []
-        found = compare.compare(recorded, aim, flown, lost, seed, lambda name: (phases.append(name), bar(len(phases), 6, name)))
+        found = compare.compare(recorded, aim, flown, lost, seed,
+                                lambda name: (phases.append(name), bar(len(phases), 6, name)))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     by_name = {lever.name: float(value) for lever, value in zip(listed, values, strict=True)}
-    write_bytes(json.dumps(_summary(found, by_name, state.history, recorded, typed), indent=1).encode(), out / SUMMARY, force=True)
+    write_bytes(json.dumps(_summary(found, by_name, state.history, recorded, typed), indent=1).encode(), out / SUMMARY,
+                force=True)
     twin_report.write_report(out / REPORT, recorded, found, listed, values, state.history[0]["misfit"],
                              command=typed, force=True)
     click.echo(f"{len(recorded.courses)} flights; misfit in scatters: {_misfit(state.history[0]['misfit'])} "

@@ -101,7 +101,8 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
 
 
 def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readiness:
-    """Check log variables, block size, decks; start the log blocks; set parameters. A virtual drone is put to its start.
+    """Check log variables, block size, decks; start the log blocks; set parameters. A virtual drone is put to its
+    start.
 
     Raises AirTouchError with one line a fault. Nothing has moved yet.
     """

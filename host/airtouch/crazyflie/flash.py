@@ -65,7 +65,8 @@ def flash(image: Image, uri: str | None) -> None:
         raise AirTouchError("the AI-deck is flashed while the firmware runs: give --uri radio://...")
     done = subprocess.run(command(image, uri))
     if done.returncode != 0:
-        hint = "; a GAP8 is flashed through firmware with the AI-deck's driver: the stock one, or CONFIG=app-config-gap8"
+        hint = ("; a GAP8 is flashed through firmware with the AI-deck's driver: the stock one, or "
+                "CONFIG=app-config-gap8")
         raise AirTouchError(f"cfloader failed with exit code {done.returncode}; see what it printed above"
                             + (hint if image.target == "gap8" else ""))
 

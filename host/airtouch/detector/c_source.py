@@ -60,7 +60,8 @@ extern const int8_t {names[1]}[{outputs.size}];
 
 def golden_source(header: str, names: tuple[str, str], inputs: np.ndarray, outputs: np.ndarray) -> str:
     """Their definitions."""
-    arrays = (array("int8_t", name, values.ravel(), False) for name, values in zip(names, (inputs, outputs)))
+    arrays = (array("int8_t", name, values.ravel(), False)
+              for name, values in zip(names, (inputs, outputs), strict=True))
     return (f'#include "{header}"\n\n' + "".join(arrays)).rstrip("\n") + "\n"
 
 

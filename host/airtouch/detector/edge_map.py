@@ -6,6 +6,7 @@ its outline. Everything is in metres, in the frame of the positions given.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -85,7 +86,7 @@ def edge_points(
 def passes(points: list[EdgePoint]) -> list[tuple[EdgePoint, EdgePoint]]:
     """Entry and the exit that follows it; an entry without an exit, or the reverse, is left out."""
     ordered = sorted(points, key=lambda p: p.sample)
-    return [(a, b) for a, b in zip(ordered, ordered[1:]) if a.kind == "entry" and b.kind == "exit"]
+    return [(a, b) for a, b in pairwise(ordered) if a.kind == "entry" and b.kind == "exit"]
 
 
 def platforms(points: list[EdgePoint]) -> list[Platform]:
@@ -96,7 +97,7 @@ def platforms(points: list[EdgePoint]) -> list[Platform]:
     """
     crossed = passes(points)
     groups: list[list[tuple[EdgePoint, EdgePoint]]] = []
-    gaps = np.array([_apart(a, b) for a, b in zip(crossed, crossed[1:])])
+    gaps = np.array([_apart(a, b) for a, b in pairwise(crossed)])
     rows = gaps[gaps > 0.3 * np.quantile(gaps, 0.9)] if len(gaps) else gaps
     reach = 4.0 * float(np.median(rows)) if len(rows) else 0.0
     for crossing in crossed:

@@ -72,7 +72,7 @@ def check(log: FlightLog, spare: int = 0) -> None:
     for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
         if spread == 0.0:
             raise AirTouchError(f"{log.source}: {name} is constant in flight; the sensor or the log is stuck")
-    for rate, acceleration in zip(RATES, ACCELERATIONS):
+    for rate, acceleration in zip(RATES, ACCELERATIONS, strict=True):
         if {rate, acceleration} <= set(names):
             pair = used[:, names.index(rate)], used[:, names.index(acceleration)]
             if np.corrcoef(*pair)[0, 1] > 0.999999:

@@ -135,7 +135,8 @@ def _rolling_header(model: Model) -> str:
     rows, columns, channels = network.input_shape
     return f"""// The `paper-stream` detector: {parameter_bytes(network)} bytes of constants.
 // Input: {columns * channels} fused features a sample, on airtouchRollingScale (fixedScaleApply), then quantised:
-// networkInt8Quantise. rollingInt8Init at stride AIRTOUCH_ROLLING_STRIDE, then rollingInt8Step: {network.outputs} logits
+// networkInt8Quantise. rollingInt8Init at stride AIRTOUCH_ROLLING_STRIDE, then rollingInt8Step: {
+    network.outputs} logits
 // on every {step}th sample, {size.ahead} samples before the window is full. The same network runs over whole windows.
 #pragma once
 

@@ -71,4 +71,6 @@ def feature_windows(fused: np.ndarray, rows: int,
     raw = np.moveaxis(sliding_window_view(scale.apply(fused) if scale else fused, rows, axis=0), 2, 1)
     usable = np.isfinite(raw).all(axis=(1, 2))
     ends = np.arange(rows - 1, len(fused))[usable]
-    return np.ascontiguousarray(raw[usable]) if scale else reference.z_score_window(raw[usable]).astype(np.float32), ends
+    if scale:
+        return np.ascontiguousarray(raw[usable]), ends
+    return reference.z_score_window(raw[usable]).astype(np.float32), ends

@@ -32,7 +32,8 @@ def read(folders: Iterable[Path], tell: Callable[[str], None] = lambda _: None) 
                 raise AirTouchError(f"{path}: its down range shows an edge, so this is not free air; leave it out")
             flights.append(log)
     if not flights:
-        raise AirTouchError("no flight in free air that can be used; give folders of logs with motors and accelerations")
+        raise AirTouchError("no flight in free air that can be used; give folders of logs with motors and "
+                            "accelerations")
     return flights
 
 

@@ -15,7 +15,7 @@ def edge_loss(df_lambda: float = DEFAULT_LAMBDA, class_weights: tuple[float, flo
     import keras
     from keras import ops
 
-    def loss(target, logits):  # noqa: ANN001, ANN202 - Keras tensors
+    def loss(target, logits):
         cross_entropy = keras.losses.sparse_categorical_crossentropy(
             ops.cast(target[:, 0], "int32"), logits, from_logits=True)
         predicted = ops.sigmoid(logits[:, 1] - logits[:, 0])
@@ -26,7 +26,7 @@ def edge_loss(df_lambda: float = DEFAULT_LAMBDA, class_weights: tuple[float, flo
     return loss
 
 
-def disturbance_force_loss(alert, predicted, ops):  # noqa: ANN001, ANN201 - arrays of either library
+def disturbance_force_loss(alert, predicted, ops):
     """L_F = exp|y_hat - 1| - 1 where f_w reached its threshold, exp|y_hat| - 1 elsewhere, (n,).
 
     alert: (n,) 1.0 or 0.0. ops: numpy or keras.ops. Both cases are exp|y_hat - alert| - 1.

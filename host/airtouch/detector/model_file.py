@@ -2,8 +2,8 @@
 
 Arrays: "<layer>.kernel" and "<layer>.bias" float32 as Keras lays them out, "int8.<layer>.weights",
 "int8.<layer>.bias", "int8.<layer>.weight_scale", "int8.scale" and "int8.zero_point" (input, then
-each layer's output), "scale.mean" and "scale.deviation" where inputs are on a fixed scale, "tflite" (the same int8 network as a TFLite file, for comparison) and
-"metadata" (JSON, UTF-8). Nothing in the file is ever executed.
+each layer's output), "scale.mean" and "scale.deviation" where inputs are on a fixed scale, "tflite" (the same int8
+network as a TFLite file, for comparison) and "metadata" (JSON, UTF-8). Nothing in the file is ever executed.
 """
 
 import hashlib

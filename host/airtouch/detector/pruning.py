@@ -58,7 +58,7 @@ def pruning(final_sparsity: Mapping[str, float], steps: int, block: int = BLOCK)
         def __init__(self, mask: object):
             self.mask = mask
 
-        def __call__(self, kernel):  # noqa: ANN001, ANN204
+        def __call__(self, kernel):
             return kernel * self.mask
 
     class Schedule(keras.callbacks.Callback):

@@ -28,7 +28,7 @@ def quantise(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]
 def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
     import tensorflow as tf
 
-    def network(x):  # noqa: ANN001, ANN202
+    def network(x):
         for kind, name, _, _, kernel, relu in GRAPH:
             if kind == "max_pool":
                 x = tf.nn.max_pool2d(x, kernel, kernel, "VALID")

@@ -21,7 +21,8 @@ DETECTORS = {
 class Detector(Protocol):
     """What a detector's module offers. `model` is whatever its `fit` and `load` return.
 
-    A module with `model_for(model, log)` has several models and picks the one for a log. One that says SPARE_SENSORS = k takes logs that lack k of acceleration, rates and motors; others need all.
+    A module with `model_for(model, log)` has several models and picks the one for a log. One that says SPARE_SENSORS =
+    k takes logs that lack k of acceleration, rates and motors; others need all.
     """
 
     def run(self, log: FlightLog, model: Any = None) -> Trace:

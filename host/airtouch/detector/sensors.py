@@ -17,8 +17,8 @@ CHANNELS_OF = {ACCELERATION: (0, 1, 2, 10), RATES: (3, 4, 5), MOTORS: (6, 7, 8, 
 
 GRAVITY_MPS2 = 9.81  #: what a missing acceleration reads: rest
 FLYING_PWM = 40000.0  #: what missing motors read in the air; their channels are silent, so only "in the air" counts
-#: rad/s, rms change of the rates from sample to sample over FLYING_WINDOW samples, above which the drone flies: of 49,979
-#: samples on the ground none reach 0.0127, of 431,415 in the air none fall below 0.0184 (the authors' flights).
+#: rad/s, rms change of the rates from sample to sample over FLYING_WINDOW samples, above which the drone flies: of
+#: 49,979 samples on the ground none reach 0.0127, of 431,415 in the air none fall below 0.0184 (the authors' flights).
 FLYING_CHANGE_RADPS = 0.015
 FLYING_WINDOW = 50
 
@@ -44,11 +44,11 @@ def missing(log: FlightLog) -> tuple[str, ...]:
     return tuple(sensor for sensor in SENSORS if not log.has(*needed(log, sensor)))
 
 
-def signals(log: FlightLog, rates_before: np.ndarray = np.empty((0, 3))) -> Signals:
+def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals:
     """The log's signals, with rest or level flight in place of one missing sensor.
 
-    rates_before: (k, 3) rates of the samples before, where the log is a piece of a flight; FLYING_WINDOW + 1 are enough.
-    Raises AirTouchError, naming columns, where more than one sensor is missing.
+    rates_before: (k, 3) rates of the samples before, where the log is a piece of a flight; FLYING_WINDOW + 1 are
+    enough. Raises AirTouchError, naming columns, where more than one sensor is missing.
     """
     absent = missing(log)
     if len(absent) > 1:
@@ -57,7 +57,8 @@ def signals(log: FlightLog, rates_before: np.ndarray = np.empty((0, 3))) -> Sign
     acc = np.tile([0.0, 0.0, GRAVITY_MPS2], (n, 1)) if ACCELERATION in absent else level_acceleration(log)
     gyro = np.zeros((n, 3)) if RATES in absent else log.stack(GYRO)
     if MOTORS in absent:
-        pwm = FLYING_PWM * np.tile(flying(np.vstack([rates_before, gyro]))[len(rates_before):, None], (1, 4))
+        rates = np.vstack([np.reshape(rates_before, (-1, 3)), gyro])
+        pwm = FLYING_PWM * np.tile(flying(rates)[len(rates_before):, None], (1, 4))
     else:
         pwm = log.stack(PWM)
     return Signals(acc, gyro, pwm, absent)

@@ -79,8 +79,8 @@ def train_paper(
     features = features_of(flights, told)
     scale = None
     if fixed_scale:
-        scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features)])
-    windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features))])
+        scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features, strict=True)])
+    windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features, strict=True))])
     held = held_out(len(flights), seed)
     kept = ~np.isin(windows.flight, held)
     if not kept.any() or len(np.unique(windows.over[kept])) < 2:
@@ -111,7 +111,8 @@ def features_of(flights: Sequence[FlightLog], progress: Progress) -> list[Featur
 
 def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Windows:
     """Every full window of every flight that ends in the air, z-scored by itself."""
-    return join([windows_of(log, f, i) for i, (log, f) in enumerate(zip(flights, features_of(flights, progress)))])
+    return join([windows_of(log, f, i)
+                 for i, (log, f) in enumerate(zip(flights, features_of(flights, progress), strict=True))])
 
 
 def join(parts: Sequence[Windows]) -> Windows:
@@ -184,7 +185,7 @@ def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, blo
 
 
 def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-              progress: Progress, conv_sparsity: float = 0.0):  # noqa: ANN201 - (keras.Model, list[float])
+              progress: Progress, conv_sparsity: float = 0.0):
     """The trained Keras model and the loss on the held-out windows after each epoch (on the training
     windows where none are held out). Windows may be of any length where sparsity is 0."""
     import keras
@@ -213,20 +214,20 @@ def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block
     return model, history.history["val_loss" if len(held.x) else "loss"]
 
 
-def _rate_table(steps: int):  # noqa: ANN202 - a Keras class that exists only here
+def _rate_table(steps: int):
     import keras
     from keras import ops
 
     table = np.array([one_cycle(step, steps) for step in range(steps + 1)], dtype=np.float32)
 
     class OneCycle(keras.optimizers.schedules.LearningRateSchedule):
-        def __call__(self, step):  # noqa: ANN001, ANN204
+        def __call__(self, step):
             return ops.take(table, ops.minimum(ops.cast(step, "int32"), steps))
 
     return OneCycle()
 
 
-def _batches(windows: Windows, shuffle: bool):  # noqa: ANN202 - a tf.data.Dataset
+def _batches(windows: Windows, shuffle: bool):
     """Cached windows in batches; the order of each epoch follows from the seed."""
     import tensorflow as tf
 

@@ -149,9 +149,11 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[object, list[np.ndarray]]:
     padded = [np.pad(np.ravel(weights), (0, -weights.size % 4)) for weights, _, _ in packed]
     constants = [layer.c_constants() for layer in weighted]
     weights, counts, skips = (_joined(parts, dtype) for parts, dtype in
-                              zip((padded, *list(zip(*packed))[1:]), (np.int8, np.uint16, np.uint8)))
+                              zip((padded, *list(zip(*packed, strict=True))[1:]), (np.int8, np.uint16, np.uint8),
+                                  strict=True))
     bias, multiplier, shift = (_joined(parts, dtype)
-                               for parts, dtype in zip(zip(*constants), (np.int32, np.int32, np.int8)))
+                               for parts, dtype in zip(zip(*constants, strict=True), (np.int32, np.int32, np.int8),
+                                                       strict=True))
     shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,

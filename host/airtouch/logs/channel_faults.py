@@ -108,4 +108,5 @@ def _medians(values: np.ndarray) -> np.ndarray:
     count = (~np.isnan(values)).sum(axis=1)
     below, above = np.maximum(count - 1, 0) // 2, count // 2
     rows = np.arange(len(values))
-    return np.where(count > 0, 0.5 * (ordered[rows, below] + ordered[rows, np.minimum(above, values.shape[1] - 1)]), 0.0)
+    return np.where(count > 0, 0.5 * (ordered[rows, below] + ordered[rows, np.minimum(above, values.shape[1] - 1)]),
+                    0.0)

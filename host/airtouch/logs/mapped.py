@@ -58,7 +58,8 @@ def read(path: str | Path, mapping: str | Path) -> FlightLog:
     columns = {}
     for name, how in table["columns"].items():
         if how["from"] not in header:
-            raise AirTouchError(f"{path}: no column {how['from']!r}{nearest(how['from'], header)} ({mapping}: [columns.{name}])")
+            raise AirTouchError(f"{path}: no column {how['from']!r}{nearest(how['from'], header)} ({mapping}: "
+                                f"[columns.{name}])")
         place = header.index(how["from"])
         theirs = np.array([_number(r[place]) if place < len(r) else np.nan for r in rows[1:]])
         columns[name] = (theirs + how.get("offset", 0.0)) * how.get("scale", 1.0)

@@ -16,7 +16,8 @@ def log_of(streams: Mapping[str, Stream], meta: Mapping[str, object]) -> FlightL
     """A flight log at 100 Hz from {column: (times, values)}.
 
     Accelerations and rates that came faster than 100 Hz are averaged over each 10 ms, everything else holds its last
-    value for at most HELD_S. The clock begins where accelerations or rates do. Raises AirTouchError where there are none.
+    value for at most HELD_S. The clock begins where accelerations or rates do. Raises AirTouchError where there are
+    none.
     """
     streams = {name: _sorted(*pair) for name, pair in streams.items() if len(pair[0])}
     leading = [streams[name][0] for name in (*GYRO, *ACC) if name in streams]

@@ -17,8 +17,8 @@ from airtouch.logs.streams import Stream, log_of
 MAGIC = b"ULog\x01\x12\x35"
 FLIP = (1.0, -1.0, -1.0)  #: of forward, right, down to forward, left, up
 MOTORS = (0, 3, 1, 2)  #: PX4's number of our motors 1 to 4, from 0
-TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position", "distance_sensor", "battery_status", "actuator_motors",
-          "actuator_outputs")
+TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position", "distance_sensor", "battery_status",
+          "actuator_motors", "actuator_outputs")
 
 
 def read(data: bytes, source: str) -> FlightLog:
@@ -31,7 +31,8 @@ def read(data: bytes, source: str) -> FlightLog:
     from pyulog import ULog
 
     try:
-        topics = {d.name: d.data for d in reversed(ULog(io.BytesIO(data), list(TOPICS)).data_list)}  # the first instance counts
+        # the first instance counts
+        topics = {d.name: d.data for d in reversed(ULog(io.BytesIO(data), list(TOPICS)).data_list)}
     except Exception as error:  # whatever a damaged file makes the library raise
         raise AirTouchError(f"{source}: not a whole ULog file: {type(error).__name__}: {error}") from None
     streams: dict[str, Stream] = {}
@@ -58,9 +59,12 @@ def read(data: bytes, source: str) -> FlightLog:
 
 
 def _motors(topics: dict) -> dict[str, Stream]:
-    for topic, field, low, high in (("actuator_motors", "control", 0.0, 1.0), ("actuator_outputs", "output", 1000.0, 2000.0)):
+    for topic, field, low, high in (("actuator_motors", "control", 0.0, 1.0),
+                                    ("actuator_outputs", "output", 1000.0, 2000.0)):
         table = topics.get(topic, {})
         if all(f"{field}[{i}]" in table for i in MOTORS):
-            share = [np.clip((np.asarray(table[f"{field}[{i}]"], float) - low) / (high - low), 0.0, 1.0) for i in MOTORS]
-            return {name: (table["timestamp"] * 1e-6, np.nan_to_num(65535.0 * s)) for name, s in zip(PWM, share, strict=True)}
+            share = [np.clip((np.asarray(table[f"{field}[{i}]"], float) - low) / (high - low), 0.0, 1.0)
+                     for i in MOTORS]
+            return {name: (table["timestamp"] * 1e-6, np.nan_to_num(65535.0 * s))
+                    for name, s in zip(PWM, share, strict=True)}
     return {}

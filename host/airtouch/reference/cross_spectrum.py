@@ -1,6 +1,7 @@
 """CCS-FF: the axes of each sensor fused into one feature (paper, section 4.3)."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +24,7 @@ def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)
     if power.ndim != 2 or not groups or min(groups) < 1 or sum(groups) != power.shape[1]:
         raise AirTouchError(f"cross-spectrum: groups {groups} do not add up to powers of shape {power.shape}")
     edges = np.cumsum((0,) + groups)
-    return np.column_stack([_root_of_product(power[:, a:b]) for a, b in zip(edges[:-1], edges[1:])])
+    return np.column_stack([_root_of_product(power[:, a:b]) for a, b in pairwise(edges)])
 
 
 def _root_of_product(power: np.ndarray) -> np.ndarray:

@@ -51,7 +51,7 @@ def streaming_z_score(features: np.ndarray, time_constant: float) -> np.ndarray:
 def _standardise(held: np.ndarray, time_constant: float) -> np.ndarray:
     out = np.zeros(len(held))
     mean, variance = held[0], 0.0
-    for i, (sample, gain) in enumerate(zip(held, exponential_gain(len(held), time_constant))):
+    for i, (sample, gain) in enumerate(zip(held, exponential_gain(len(held), time_constant), strict=True)):
         step = sample - mean
         mean += gain * step
         variance = (1 - gain) * (variance + gain * step * step)

@@ -79,10 +79,10 @@ def multiplications(network: Int8Network) -> int:
     """Multiplications of one inference as the C kernels do it: pruned layers skip their empty blocks, and
     no position is computed that the pool after a convolution drops."""
     total = 0
-    for layer, after in zip(network.layers, (*network.layers[1:], None)):
+    for layer, after in zip(network.layers, (*network.layers[1:], None), strict=True):
         rows, columns, _ = layer.output_shape
         if after is not None and after.kind == "max_pool":
-            rows, columns = (n - n % k for n, k in zip((rows, columns), after.kernel))
+            rows, columns = (n - n % k for n, k in zip((rows, columns), after.kernel, strict=True))
         total += rows * columns * _weights_used(layer)
     return total
 

@@ -18,7 +18,9 @@ def rows(found: Mapping[str, Any]) -> Rows:
     def add(name: str, value: Mapping[str, Any] | None, goal: str = "", key: str = "value") -> None:
         if value is None or value.get(key) is None:
             return
-        text = f"{value[key]:.1%} ({value['low']:.1%} to {value['high']:.1%})" if "low" in value else f"{value[key]:.3f}"
+        text = f"{value[key]:.3f}"
+        if "low" in value:
+            text = f"{value[key]:.1%} ({value['low']:.1%} to {value['high']:.1%})"
         out.append((name, text, str(value.get("n", "")), goal))
 
     add("top-1, single effects", found["top_1"], "at least 95 %")

@@ -15,7 +15,8 @@ from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
 
 TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
-COLOURS = {"best": FOUND, "paper": OTHER, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}  #: of a detector, in every plot
+#: of a detector, in every plot
+COLOURS = {"best": FOUND, "paper": OTHER, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
 KINDS = {"entry": "v", "exit": "^", "edge": "o"}
 STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
 

@@ -37,7 +37,8 @@ def write_measurement(path: Path, found: Measurement, pictures: Pictures | None 
         cells=found.map.cells, floor_from=found.map.floor_from, where=found.where, pictures=pictures,
         calibration=gap_tables.named(found.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),
-               ("What these logs cannot say", found.cannot), ("Notes", _notes(found.notes, pictures)), ("Left out", found.left_out)],
+               ("What these logs cannot say", found.cannot), ("Notes", _notes(found.notes, pictures)),
+               ("Left out", found.left_out)],
         flights=_flights(found.flights, found.vehicle, found.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -54,14 +55,16 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         headline=diagnosis.headline, cells=cells, floor_from=diagnosis.map.floor_from if diagnosis.map else "",
         where=diagnosis.where, steps=diagnosis.next, anchor=ANCHOR, effects=gap_tables.effect_rows(diagnosis),
         ranking=gap_tables.ranking_rows(diagnosis),
-        indistinguishable=[f"These logs cannot tell {words.joined(list(g))} apart." for g in diagnosis.indistinguishable],
+        indistinguishable=[f"These logs cannot tell {words.joined(list(g))} apart."
+                           for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None,
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
         remaining=words.remaining_in_words(left[:gap_tables.MOST_RANKED]), remaining_count=len(left),
         unexplained=[words.open_in_words(u) for u in diagnosis.unexplained],
         nearest=words.nearest_in_words(diagnosis.unexplained[0]) if diagnosis.unexplained else [],
         calibration=gap_tables.named(diagnosis.calibration),
-        lists=[("What these logs cannot say", diagnosis.cannot), ("Notes", _notes(diagnosis.notes, diagnosis.pictures))],
+        lists=[("What these logs cannot say", diagnosis.cannot),
+               ("Notes", _notes(diagnosis.notes, diagnosis.pictures))],
         flights=_flights(diagnosis.flights, diagnosis.vehicle, diagnosis.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -70,7 +73,8 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
           **context: Any) -> str:
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((resources.files("airtouch.report") / "gap.html").read_text("utf-8"))
-    absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [], "remaining": [],
+    absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": None, "phase_figures": [],
+              "remaining": [],
               "remaining_count": 0, "unexplained": [], "nearest": [], "steps": (), "calibration": [], "anchor": ANCHOR}
     own = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
     return template.render({

@@ -84,7 +84,8 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """The parameters of the effects named."""
     return [{"effect": e.name if i == 0 else "", "parameter": k, "value": f"{q.value:.3g}",
              "interval": "" if q.low is None or q.high is None else f"{q.low:.3g} to {q.high:.3g}",
-             "unit": "" if q.unit == "1" else q.unit, "seconds": "acts " + seconds if i == 0 and (seconds := seconds_in_words(e))
+             "unit": "" if q.unit == "1" else q.unit,
+             "seconds": "acts " + seconds if i == 0 and (seconds := seconds_in_words(e))
              else ""}
             for e in diagnosis.effects for i, (k, q) in enumerate(e.parameters.items())]
 
@@ -108,7 +109,8 @@ def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
     if diagnosis.control:
         sources.append((f"wrong effect: {diagnosis.control.get('name', 'control')}", diagnosis.control))
     sources += [(f"{named}, vehicle as {name}", arm) for name, arm in diagnosis.arms.items()
-                if isinstance(arm, Mapping) and arm.get("shrink") != (diagnosis.shrink.plain() if diagnosis.shrink else None)]
+                if isinstance(arm, Mapping)
+                and arm.get("shrink") != (diagnosis.shrink.plain() if diagnosis.shrink else None)]
     rows = [{"name": name, "cells": [figure(some.get(k)) for k in keys]} for name, some in sources]
     rows = [r for r in rows if any(v != "-" for v in r["cells"])]
     return {"columns": keys, "rows": rows} if rows else None

@@ -34,7 +34,8 @@ def drawn(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Platf
             ends = (platform.near, platform.far)
             if platform.outline is None and all(isinstance(end, Point) for end in ends):
                 strip = _strip(*(np.array(end.coords[0]) for end in ends))
-                ax.add_patch(PolygonPatch(strip, facecolor=TRUE, alpha=0.12, lw=0, label="platform (its width is not known)"))
+                ax.add_patch(PolygonPatch(strip, facecolor=TRUE, alpha=0.12, lw=0,
+                                          label="platform (its width is not known)"))
             elif platform.outline is not None:
                 ax.add_patch(patch_from_polygon(platform.outline, facecolor=TRUE, alpha=0.12, lw=0, label="platform"))
             if platform.outline is not None:
@@ -55,7 +56,7 @@ def drawn(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Platf
                 ax.scatter(*np.array(at).T, s=14, color=colour, zorder=3, label=f"{kind} ({len(at)})")
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
         handles, labels = ax.get_legend_handles_labels()
-        unique = dict(zip(labels, handles))
+        unique = dict(zip(labels, handles, strict=True))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
         figure.draw_without_rendering()  # settles the limits, which equal axes change
         _scale_bar(ax)

@@ -26,7 +26,8 @@ def overlaid(recorded: Recorded, simulated: Sequence[Flown]) -> bytes:
         figure = Figure(figsize=(7.2, 10.5), layout="constrained")
         axes = figure.subplots(6, 2, sharex=True)
         for k, axis in enumerate(axes.T.ravel()):
-            for data, of, colour, label in ((x, course, REAL, "recorded"), (one.channels, one.course, TWIN, "simulated")):
+            for data, of, colour, label in ((x, course, REAL, "recorded"),
+                                            (one.channels, one.course, TWIN, "simulated")):
                 span = slice(max(of.entry - 200, 0), min(of.exit + 200, len(data)))
                 level = 0.0 if k == ch.DOWN else np.median(data[of.free, k])
                 axis.plot((np.arange(span.start, span.stop) - of.entry) / RATE_HZ, data[span, k] - level,

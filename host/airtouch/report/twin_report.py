@@ -59,4 +59,5 @@ def gap_row(gap: Gap) -> tuple[str, str, str, str, int]:
     """(where, what, difference with unit, in scatters, flights) of one feature."""
     digits = ".0f" if gap.feature.unit in ("PWM", "PWM/s") else ".2f"
     unit = "" if gap.feature.unit == "1" else f" {gap.feature.unit}"
-    return (gap.feature.group, gap.feature.name, f"{gap.difference:+{digits}}{unit}", f"{gap.scatters:+.1f}", gap.flights)
+    return (gap.feature.group, gap.feature.name, f"{gap.difference:+{digits}}{unit}", f"{gap.scatters:+.1f}",
+            gap.flights)

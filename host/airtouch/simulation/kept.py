@@ -28,15 +28,16 @@ MEMORY_DTYPE = np.dtype([
     ("state", _F, (13,)), ("speed", _F, (4,)), ("force", _F, (6,)), ("slope", _F, (13,)), ("ground", _F),
     ("charge", _F), ("volts", _F), ("effects", _F, (SLOTS, MEMORY)),
     # motors: their command and its delay line, noise, phase, thrust of each over nominal
-    ("pwm", _F, (4,)), ("commands", _F, (RING, 4)), ("slowed", _F, (4,)), ("held", _F, (4,)), ("flicker", _F, (8,)), ("phase", _F, (4,)), ("gain", _F, (4,)),
+    ("pwm", _F, (4,)), ("commands", _F, (RING, 4)), ("slowed", _F, (4,)), ("held", _F, (4,)), ("flicker", _F, (8,)),
+    ("phase", _F, (4,)), ("gain", _F, (4,)),
     # the IMU: true motion at the last step and now, samples as logged and as filtered, what the firmware has
     ("motion", _F, (6,)), ("now", _F, (6,)), ("acc", _F, (3,)), ("gyro", _F, (3,)), ("imu", _F, (imu.RING, 6)),
     ("seen_acc", _F, (3,)), ("seen_gyro", _F, (3,)), ("acc_rms", _F, (3,)), ("gyro_rms", _F, (3,)),
     *((name, _F, (5,)) for name in _FILTERS), *((name, _F, (3, 2)) for name in _PASTS),
     # ranging: measurements not yet handed over, what is below, the last reading's offset, flow noise, walls
     ("looks", _I), ("distances", _F, (ranging.RANGES,)), ("tops", _F, (ranging.RANGES,)),
-    ("kicks", _F, (ranging.RANGES,)), ("flows", _F, (ranging.FLOWS, 2)), ("top", _F), ("beneath", _F), ("changed", _F), ("rose", _F),
-    ("down", _F), ("offset", _F), ("drift", _F, (3,)), ("ranges", _F, (4,)),
+    ("kicks", _F, (ranging.RANGES,)), ("flows", _F, (ranging.FLOWS, 2)), ("top", _F), ("beneath", _F), ("changed", _F),
+    ("rose", _F), ("down", _F), ("offset", _F), ("drift", _F, (3,)), ("ranges", _F, (4,)),
     # the firmware: its own state, and what it hands from part to part
     ("est", kalman.STATE), ("module", range_module.STATE), ("pid", controller.STATE),
     ("setpoint", controller.SETPOINT), ("reading", estimator.READING), ("thrust_tick", _I), ("supply", _F),

@@ -102,7 +102,10 @@ def _motors(plant, memory, noise, k, h, volts, stream):
 
 @jit
 def move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover, volts, stream):
-    """The vehicle over physics step k under memory.pwm (4,): motors, effects, body. How the flight stands (OK or a reason)."""
+    """The vehicle over physics step k under memory.pwm (4,): motors, effects, body.
+
+    How the flight stands (OK or a reason).
+    """
     corners, first, surface, box = ground
     h, leg = plant.step, plant.range_below_rotors + plant.leg_below_range
     state, s, force, effect_memory = memory.state[:], memory.signals[:], memory.force[:], memory.effects
@@ -179,8 +182,8 @@ def fly(plant_array, corners, first, surface, box, room, setpoints, effects, use
         autopilot.steer(plant, memory, setpoints[row], 2 * (k + ahead))
         if n % LOG_STEPS == 0:
             _log(plant, memory, k * h, volts, table[row])
-        ending = move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover, volts,
-                      streams[0])
+        ending = move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover,
+                      volts, streams[0])
         if ending != OK:
             return ending, row + (ending != NOT_FINITE)
     memory.step = begun + rows * LOG_STEPS

@@ -57,7 +57,8 @@ def noise_gain(b):
 
 @jit
 def delayed(ring, at, steps, column):
-    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (a power of two, columns)."""
+    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (a power of two,
+    columns)."""
     whole = int(steps)
     part = steps - whole
     mask = ring.shape[0] - 1

@@ -113,7 +113,8 @@ class Drone:
         self.state, self.emergency = PRE_FLIGHT, False
 
     def start_over(self) -> None:
-        """Put back to where the scenario's mission starts, on the ground, with the battery as at first, or as it was drained."""
+        """Put back to where the scenario's mission starts, on the ground, with the battery as at first, or as it was
+        drained."""
         self.restart()
         self._stepper.begin(self._start)
         self._setpoint[0] = self._start

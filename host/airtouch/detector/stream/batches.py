@@ -141,7 +141,8 @@ def _augment(x: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndar
     angle = np.radians(recipe.yaw_deg) * rng.uniform(-1, 1, (b, 1))
     ax, ay = x[..., 0].copy(), x[..., 1].copy()
     x[..., 0], x[..., 1] = np.cos(angle) * ax - np.sin(angle) * ay, np.sin(angle) * ax + np.cos(angle) * ay
-    x *= np.exp(recipe.gain * (rng.standard_normal((b, 1, 1)) + rng.standard_normal((b, 1, CHANNELS)))).astype(np.float32)
+    gain = rng.standard_normal((b, 1, 1)) + rng.standard_normal((b, 1, CHANNELS))
+    x *= np.exp(recipe.gain * gain).astype(np.float32)
     x += (recipe.offset * rng.standard_normal((b, 1, CHANNELS))).astype(np.float32)
     x += np.float32(recipe.noise) * rng.standard_normal((b, n, CHANNELS), dtype=np.float32)
     return np.clip(x, -MotionConfig.limit, MotionConfig.limit, out=x)

@@ -66,7 +66,8 @@ def _source(model: StreamModel) -> str:
     for i, conv in enumerate(network.convs):
         text, inside = layer(f"conv{i}", conv.layer)
         arrays.append(text)
-        convs.append(f"    {{.dilation = {conv.dilation}, .zeroPoint = {conv.layer.input_zero_point}, .layer =\n     {inside}}},")
+        convs.append(f"    {{.dilation = {conv.dilation}, .zeroPoint = {conv.layer.input_zero_point}, .layer =\n"
+                     f"     {inside}}},")
     text, head = layer("head", network.head)
     first = network.convs[0].layer
     settings = {

@@ -33,8 +33,8 @@ _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 @dataclass(frozen=True)
 class StreamModel:
     """weights: float32 arrays (`Recipe.weight_shapes`); int8: what flies; tflite: the same over one window;
-    metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by its
-    name, in files of their own."""
+    metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by
+    its name, in files of their own."""
 
     recipe: Recipe
     weights: dict[str, np.ndarray]
@@ -65,7 +65,8 @@ class StreamModel:
         try:
             return DecoderConfig(**table)
         except TypeError:
-            raise AirTouchError(f"the model's decoder settings are not those of this version; {archive.REMEDY}") from None
+            raise AirTouchError(f"the model's decoder settings are not those of this version; "
+                                f"{archive.REMEDY}") from None
 
     @property
     def digest(self) -> str:
@@ -95,7 +96,10 @@ class StreamModel:
 
 
 def load(path: str | Path | None = None) -> StreamModel:
-    """A model from its file, the shipped one with its spares for None. Raises AirTouchError, one line, for anything else."""
+    """A model from its file, the shipped one with its spares for None.
+
+    Raises AirTouchError, one line, for anything else.
+    """
     if path is None:
         spares = {sensor: _shipped(name) for sensor, name in SPARES.items()}
         return replace(_shipped(SHIPPED), spares=spares)
@@ -135,7 +139,8 @@ def parse(data: bytes, source: str) -> StreamModel:
 
 
 def _recipe(table: object, source: str) -> Recipe:
-    wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; {archive.REMEDY}")
+    wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; "
+                          f"{archive.REMEDY}")
     try:
         recipe = Recipe(**{**_BEFORE, **table, "dilations": tuple(table["dilations"]),
                             "muted": tuple(table["muted"])})

@@ -40,14 +40,14 @@ def quantise(weights: dict[str, np.ndarray], recipe: Recipe, representative: np.
     return network_of(read_weighted(content), recipe), content
 
 
-def _graph(weights: dict[str, np.ndarray], recipe: Recipe):  # noqa: ANN202 - a function of tensors
+def _graph(weights: dict[str, np.ndarray], recipe: Recipe):
     """The network over one window (1, 1, samples, 12): its last row only, (1, 1, 1, 3)."""
     import tensorflow as tf
 
     def kernel(i: int) -> np.ndarray:
         return weights[f"layer{i}.kernel"][None]
 
-    def network(x):  # noqa: ANN001, ANN202
+    def network(x):
         x = tf.nn.relu(tf.nn.conv2d(x, kernel(0), (1, STRIDE), "VALID") + weights["layer0.bias"])
         rows = []
         for i, dilation in enumerate(recipe.dilations, start=1):
@@ -66,7 +66,8 @@ def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> Strea
     layers = [_layer(a, shape, relu=i < len(recipe.shapes) - 1)
               for i, (a, shape) in enumerate(zip(arrays, recipe.shapes, strict=True))]
     dilations = (1, *recipe.dilations)
-    return StreamNetwork(tuple(StreamConv(la, d) for la, d in zip(layers, dilations)), layers[-1], STRIDE, 1)
+    return StreamNetwork(tuple(StreamConv(la, d) for la, d in zip(layers[:-1], dilations, strict=True)), layers[-1],
+                         STRIDE, 1)
 
 
 def _layer(arrays: dict[str, np.ndarray], shape: tuple[int, int, int], relu: bool) -> Int8Layer:

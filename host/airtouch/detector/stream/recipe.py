@@ -19,12 +19,12 @@ class Recipe:
     sparsity: share of zero blocks of four in those layers. delay: samples after an edge at which the
     event logits are to peak, spread over event_sigma; the over logit is to change over_delay after it.
     The rest: learning (steps, batch, crop in samples of which warm_up are not scored, one-cycle peak,
-    weight decay, loss weights), channels that are muted (held at 0, for ablations) and augmentation (share of crops around an edge, flights of the rare
-    heights drawn `balance` times as often, gains, offsets and noise in usual swings, yaw in degrees,
-    time warp, share mirrored left to right). silent_acceleration, silent_rates, silent_motors: shares of the crops in
-    which that sensor's channels are held at 0, so that one network also runs without it; a sensor that no training
-    flight has is always silent. phases: share of the crops that hold take-off or landing. free_air_share: share of the crops
-    from flights without edges, where there are such.
+    weight decay, loss weights), channels that are muted (held at 0, for ablations) and augmentation (share of crops
+    around an edge, flights of the rare heights drawn `balance` times as often, gains, offsets and noise in usual
+    swings, yaw in degrees, time warp, share mirrored left to right). silent_acceleration, silent_rates, silent_motors:
+    shares of the crops in which that sensor's channels are held at 0, so that one network also runs without it; a
+    sensor that no training flight has is always silent. phases: share of the crops that hold take-off or landing.
+    free_air_share: share of the crops from flights without edges, where there are such.
     """
 
     width: int = 24
@@ -79,5 +79,5 @@ class Recipe:
     def weight_shapes(self) -> dict[str, tuple[int, ...]]:
         """Name and shape of each float array: kernels (taps, in, out) and biases (out,)."""
         names = [f"layer{i}" for i in range(len(self.shapes))]
-        kernels = {f"{name}.kernel": shape for name, shape in zip(names, self.shapes)}
-        return kernels | {f"{name}.bias": shape[-1:] for name, shape in zip(names, self.shapes)}
+        kernels = {f"{name}.kernel": shape for name, shape in zip(names, self.shapes, strict=True)}
+        return kernels | {f"{name}.bias": shape[-1:] for name, shape in zip(names, self.shapes, strict=True)}

@@ -122,7 +122,8 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
     except AirTouchError:
         raise
     except Exception as error:
-        raise AirTouchError(f"{source}{_line_of(error, source)}: {type(error).__name__}: {str(error).splitlines()[0]}") from None
+        raise AirTouchError(f"{source}{_line_of(error, source)}: {type(error).__name__}: "
+                            f"{str(error).splitlines()[0]}") from None
     found = [v for v in scope.values() if isinstance(v, Effect)]
     if not found:
         raise AirTouchError(f"{source}: defines no Effect")

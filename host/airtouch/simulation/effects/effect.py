@@ -60,7 +60,8 @@ def _nothing(p, s, memory, stream, out):
 
 
 class Wrenches(tuple):
-    """`wrench` functions as compiled code takes them: always `count`, the places left over filled with one that does nothing.
+    """`wrench` functions as compiled code takes them: always `count`, the places left over filled with one that does
+    nothing.
 
     A type of its own, so that numba need not work it out at each call.
     """

@@ -11,7 +11,8 @@ STRENGTH, FOUNTAIN, FADE, TURBULENCE, TURBULENCE_TIME, HEAVE, PITCH, SWIRL, EVEN
 LIFT = 4  #: 4, of the memory: mean lift of each rotor over its thrust
 STEP, DECAY, FRESH = range(8, 11)  #: of the memory: what follows from the step's length
 WHOLE = 11  #: of the memory: height of the rotors when one surface was last below all of them, m
-LEAVING_FADE_M = 0.2  #: rotor height over a surface beyond which nothing is lost at its end; the flights show it up to 0.12
+#: rotor height over a surface beyond which nothing is lost at its end; the flights show it up to 0.12
+LEAVING_FADE_M = 0.2
 LEAST_HEIGHT_RADII = 0.75  #: the formula diverges below it
 
 
@@ -126,8 +127,10 @@ EFFECT = Effect(
      Parameter("even", "1", 0.0, 0.0, 1.0, None,
                "how far the rotors share their mean lift evenly; 1: no pitch moment where an edge covers some of them",
                "at exits the authors' flights pitch the other way than a partly covered drone should"),
-     Parameter("leaving", "1", 0.0, -0.2, 0.2, 0.0, "share of the thrust lost when the drone is half beyond the surface's end",
-               "authors' flights: 0.2 m/s^2 downwards at exits that no thrust explains, none at entries; cause not known")),
+     Parameter("leaving", "1", 0.0, -0.2, 0.2, 0.0,
+               "share of the thrust lost when the drone is half beyond the surface's end",
+               "authors' flights: 0.2 m/s^2 downwards at exits that no thrust explains, none at entries; cause not "
+               "known")),
     wrench=ground_effect,
     presets={
         # lift against height of neural-swarm's flights (Shi et al. 2020), rotors 0.029 m over the floor when

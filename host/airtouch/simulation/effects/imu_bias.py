@@ -11,7 +11,7 @@ def settings(plant, v):
 EFFECT = Effect(
     "imu_bias", "constant error of the IMU",
     tuple(Parameter(f"acc_{a}", "m/s^2", d, -5.0, 5.0, 0.0, f"accelerometer {a}", "BMI088: 20 mg zero offset")
-          for a, d in zip("xyz", (0.15, 0.1, 0.1)))
+          for a, d in zip("xyz", (0.15, 0.1, 0.1), strict=True))
     + tuple(Parameter(f"gyro_{a}", "rad/s", d, -1.0, 1.0, 0.0, f"gyro {a}", "BMI088: 1 deg/s zero offset")
-            for a, d in zip("xyz", (0.02, -0.02, 0.02))),
+            for a, d in zip("xyz", (0.02, -0.02, 0.02), strict=True)),
     settings=settings)

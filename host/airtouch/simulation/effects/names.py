@@ -1,4 +1,7 @@
-"""Names that an effect file uses, checked before numba sees them: a wrong one is told with its line and what is near."""
+"""Names that an effect file uses, checked before numba sees them.
+
+A wrong one is told with its line and what is near.
+"""
 
 import ast
 from collections.abc import Iterator
@@ -11,7 +14,10 @@ FIELDS = tuple(name for name, *_ in plant.FIELDS)
 
 
 def check(text: str, source: str) -> None:
-    """Raise AirTouchError, `file:line: ...; did you mean ...`, for a signal, plant field or parameter that there is not."""
+    """Raise AirTouchError for a signal, plant field or parameter that there is not.
+
+    It reads `file:line: ...; did you mean ...`.
+    """
     tree = ast.parse(text, source)
     known = set(_signal_modules(tree))
     for node in ast.walk(tree):
@@ -32,7 +38,8 @@ def check(text: str, source: str) -> None:
 
 def _known(name: str, names: tuple[str, ...], what: str, source: str, line: int) -> None:
     if name not in names:
-        raise AirTouchError(f"{source}:{line}: no {what} {name!r}{nearest(name, names) or '; the page on effects lists them'}")
+        raise AirTouchError(f"{source}:{line}: no {what} "
+                            f"{name!r}{nearest(name, names) or '; the page on effects lists them'}")
 
 
 def _signal_modules(tree: ast.Module) -> Iterator[str]:
@@ -47,8 +54,8 @@ def _signal_modules(tree: ast.Module) -> Iterator[str]:
 def _parameters(tree: ast.Module) -> Iterator[str]:
     """Names of the parameters that the file declares."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Parameter" and node.args \
-                and isinstance(node.args[0], ast.Constant):
+        named = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Parameter"
+        if named and node.args and isinstance(node.args[0], ast.Constant):
             yield str(node.args[0].value)
 
 

@@ -1,4 +1,5 @@
-"""The tables of effects, signals and plant fields in host/docs/effects.md: `python -m airtouch.simulation.effects.table FILE`."""
+"""The tables of effects, signals and plant fields in host/docs/effects.md:
+`python -m airtouch.simulation.effects.table FILE`."""
 
 import inspect
 import re
