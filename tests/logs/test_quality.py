@@ -60,6 +60,16 @@ def test_lost_samples_are_told_from_bursts():
     assert [(g.sample, g.lost) for g in lost_samples(arrival, period)] == [(1000, 17), (2483, 1)]
 
 
+def test_rows_lost_in_the_air_are_no_ground():
+    log = sound_flight()
+    whole = logs.segments(log)
+    hover = next(s for s in whole if s.kind not in ("ground", "take-off", "landing") and s.stop - s.start > 120)
+    hole = slice(hover.start + 10, hover.start + 90)
+    holed = log.with_columns({k: np.where(np.isin(np.arange(len(log)), np.r_[hole]), np.nan, v)
+                              for k, v in log.columns.items() if k != "t_s"})
+    assert [s.kind for s in logs.segments(holed)] == [s.kind for s in whole]
+
+
 def test_segments_of_a_made_flight():
     kinds = [(s.kind, s.start, s.stop) for s in logs.segments(sound_flight())]
     assert [k for k, _, _ in kinds] == ["ground", "take-off", "cruise", "over platform", "cruise", "landing",

@@ -9,14 +9,16 @@ AIRBORNE_RANGE_M = 0.10  #: where no PWM is logged: down range that only a flyin
 
 
 def airborne(log: FlightLog) -> np.ndarray:
-    """Whether the drone flies, bool (n,): mean PWM > 15000.
+    """Whether the drone flies, bool (n,): mean PWM > 15000, in rows that were lost as in the last that was not.
 
     Without PWM: from the first to the last sample with a down range (or height)
     above 0.10 m. Raises AirTouchError when the log has neither.
     """
     if log.has(*PWM):
         with np.errstate(invalid="ignore", over="ignore"):
-            return log.stack(PWM).mean(axis=1) > AIRBORNE_PWM
+            power = log.stack(PWM).mean(axis=1)
+        last = np.maximum.accumulate(np.where(np.isfinite(power), np.arange(len(power)), 0))
+        return power[last] > AIRBORNE_PWM
     high = log["z_m" if log.has("z_m") and not log.has("zrange_m") else "zrange_m"] > AIRBORNE_RANGE_M
     flying = np.zeros(len(log), dtype=bool)
     where = np.flatnonzero(high)
