@@ -11,7 +11,7 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 from airtouch.simulation.random_stream import normal
 
-STRENGTH, X, Y, WIDTH, TURBULENCE, TURBULENCE_TIME = range(6)
+STRENGTH, X, Y, WIDTH, TURBULENCE, TURBULENCE_TIME, SWIRL = range(7)
 STEP, DECAY, FRESH = range(8, 11)  #: of the memory: what follows from the step's length
 
 
@@ -22,7 +22,9 @@ def downwash(p, s, memory, stream, out):
         memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
     r = at.ROTATION
     quarter = 0.25 * p[STRENGTH] * s[at.MASS] * s[at.GRAVITY]
+    spin = -1.0
     for i in range(4):
+        spin = -spin  # front right turns as rear left, against the two others
         memory[i] = memory[DECAY] * memory[i] + memory[FRESH] * normal(stream)
         share = 1.0
         if p[WIDTH] > 0.0:
@@ -30,10 +32,12 @@ def downwash(p, s, memory, stream, out):
             dx = s[at.POSITION] + s[r] * forward + s[r + 1] * left - p[X]
             dy = s[at.POSITION + 1] + s[r + 3] * forward + s[r + 4] * left - p[Y]
             share = math.exp(-(dx * dx + dy * dy) / (p[WIDTH] * p[WIDTH]))
-        force = -quarter * share * (1.0 + p[TURBULENCE] * memory[i])
+        unsteady = p[TURBULENCE] * memory[i]
+        force = -quarter * share * (1.0 + unsteady)
         out[2] += force
         out[3] += s[at.ROTOR_Y + i] * force
         out[4] -= s[at.ROTOR_X + i] * force
+        out[5] += p[SWIRL] * spin * quarter * share * unsteady
 
 
 EFFECT = Effect(
@@ -45,6 +49,8 @@ EFFECT = Effect(
      Parameter("width", "m", 0.1, 0.0, 100.0, None, "distance at which the push is 1/e of that on the axis; 0: everywhere",
                "Crazyflies: 3 % of the weight 0.15 to 0.25 m aside"),
      Parameter("turbulence", "1", 0.3, 0.0, 5.0, 0.0, "rms of a rotor's push over its mean"),
-     Parameter("turbulence_time", "s", 0.05, 0.002, 1.0, None, "its correlation time",
-               "rotor radius over wake speed, x 6")),
+     Parameter("turbulence_time", "s", 0.02, 0.002, 1.0, None, "its correlation time",
+               "roll and pitch of Crazyflies under others, neural-swarm: falls off from 8 Hz"),
+     Parameter("swirl", "m", 0.01, 0.0, 0.2, None, "unsteady yaw torque over unsteady push of a rotor",
+               "Crazyflies under others, neural-swarm: yaw over roll and pitch at 12 to 18 Hz")),
     wrench=downwash)
