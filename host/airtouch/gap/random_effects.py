@@ -20,6 +20,7 @@ from airtouch.simulation import rigid_body, sensors
 from airtouch.simulation.flight import prepare
 
 SEEDS = 4
+LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by
 SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
 
@@ -131,13 +132,15 @@ def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndar
     out = {}
     for r in shape:
         f = frequencies(r)
-        folded = sum((4.0 * tau / (1.0 + (2.0 * np.pi * tau * g) ** 2))
-                     for g in (f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f))
+        density = lambda g: 4.0 * tau / (1.0 + (2.0 * np.pi * tau * g) ** 2)
+        aliases = (f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f)
+        folded = np.repeat(sum(density(g) for g in aliases)[:, None], 4, axis=1)
+        folded[:, 1:] = sum(density(g) * np.sinc(g * PERIOD_S) ** 2 for g in aliases)[:, None]  # the gyro's differences
         made = np.zeros(shape[r])
         for b, first in enumerate(data.first[i][r]):
             size = (thrust[first:first + 256] ** 2).mean(axis=0)
             strength = rms ** 2 * (arms ** 2 @ size)
-            made[b, :, 2:6] = folded[:, None] * strength
+            made[b, :, 2:6] = folded * strength
         if r != "air":
             made[:] = 0.0
         out[r] = made
@@ -154,6 +157,15 @@ def _vibration(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarra
     if data.flights[i].rates is not None:
         out[AIR][:, :, TORQUE] = term.values["gyro"] ** 2 * _difference(AIR)[:, None] * line
     return out
+
+
+def _over_a_sample() -> np.ndarray:
+    """Power (bins,) of the gyro's differences, which are means over a sample, over that of means of two samples,
+
+    as `channels.residual` takes them; near 50 Hz, where the latter have none, no more than LEAST_PASSED allows.
+    """
+    turns = frequencies(AIR) * PERIOD_S
+    return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
 
 
 def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
@@ -176,6 +188,8 @@ def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
         if not np.ndim(total) or not len(total):
             out[r] = np.zeros(data.base[i][r].shape)
             continue
+        if r == AIR:
+            total[:, :, TORQUE] *= _over_a_sample()[:, None]
         shape = total.mean(axis=0, keepdims=True)
         strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
         out[r] = shape * strength
