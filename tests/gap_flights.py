@@ -31,7 +31,7 @@ def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=Non
     made = Flight(
         name, log, replay.signals_of(log, VEHICLE), np.zeros((n, 3)), np.zeros((n, 3)) + gyro, pwm,
         np.tile(np.eye(3), (n, 1, 1)), np.broadcast_to(np.int8(phase), n).copy(), np.ones(n, bool),
-        np.zeros(n), np.zeros(n, bool) if lost is None else lost)
+        np.zeros(n), np.zeros(n, bool) if lost is None else lost, np.zeros(n, bool))
     return replace(made, acceleration=force - residual(made, VEHICLE)[:, :3])
 
 

@@ -9,9 +9,12 @@ from airtouch.gap import candidates, flight, gates
 from airtouch.gap.channels import inside, residual
 from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
+from airtouch.gap.fit import judge
+from airtouch.gap.problem import whole_of
 from airtouch.gap.result import Cell
 from airtouch.gap.select import select
 from airtouch.gap.unexplained import unexplained
+from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
 from gap_flights import VEHICLE, flown
@@ -56,6 +59,48 @@ def test_the_diagnosis_says_when(study, quiet):
     assert stretches and all(name == quiet.name for name, _, _ in stretches)
     plain = next(e for e in told.plain()["effects"] if "seconds" in e)
     assert FROM_S - 2.0 < plain["seconds"][0]["from_s"] < plain["seconds"][-1]["to_s"] < TO_S + 2.0
+
+
+def test_commands_that_are_livelier_than_the_floor_are_no_gain_of_what_comes_and_goes(study, quiet):
+    """Its random force cannot be seen in the commands, so nothing may be gained by being less sure of their floor."""
+    calm = replace(study, controller=replace(study.controller, floor=0.2 * study.controller.floor))
+    t = np.arange(len(quiet)) * flight.PERIOD_S
+    burst = ((t >= FROM_S) & (t < FROM_S + 2.0)) * np.random.default_rng(4).normal(size=len(t))
+    data = Data(calm, [replace(quiet, acceleration=quiet.acceleration + burst[:, None] * [0.0, 0.0, 0.5])])
+    level = [judge(data, whole_of(data), (), wide) for wide in (False, True)]
+    assert level[1] - level[0] > 100.0  # else this flight tests nothing
+    assert gates.gated(data)["gust"].gain < 12.0  # it pushes sideways, the burst upwards
+
+
+def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
+    wake = {"strength": 0.03, "width": 0.0, "turbulence": 1.0, "turbulence_time": 0.02, "swirl": 0.01}
+    assert brief(study, flown(1, 906, (("downwash", wake),))).effects[0].name == "downwash"
+    noise = {"rms": 0.05, "time": 0.02, "fast": 0.0, "fast_time": 0.01}
+    found = brief(study, flown(1, 904, (("motor_noise", noise),))).effects[0]
+    assert found.name == "motor_noise"
+    assert found.parameters["rms"].value == pytest.approx(0.05, rel=0.25)
+
+
+def test_what_adds_most_to_the_others_is_told_first(study, quiet):
+    both = pushed(quiet, 0.06)
+    both = replace(both, rates=both.rates + np.array([0.0, 0.05, 0.0]))
+    found = select(Data(study, [both]), candidates.every())
+    shares = {s.name: s.share for s in found.named}
+    assert set(shares) == {"downwash", "imu_bias"}
+    assert [s.name for s in found.named] == sorted(shares, key=lambda n: -shares[n])
+    assert all(share > 12.0 for share in shares.values())
+
+
+def test_samples_in_which_legs_may_touch_are_nobodys(quiet):
+    n = 800
+    z = np.r_[np.full(100, 0.05), np.linspace(0.05, 0.4, 100), np.full(600, 0.4)]
+    z[500:510] = 0.052
+    log = FlightLog({"t_s": np.arange(n) * 0.01, **{m: np.where(z > 0.0501, 40000.0, 0.0) for m in PWM},
+                     "acc_x_mps2": np.zeros(n), "acc_y_mps2": np.zeros(n), "acc_z_mps2": np.full(n, 9.81), "z_m": z},
+                    {"source": "made"})
+    made = flight.ready(log, VEHICLE)
+    assert list(np.flatnonzero(made.touching[300:])) == list(range(195, 215))
+    assert not made.touching[:90].any()
 
 
 def test_outside_its_gate_an_effect_changes_nothing(quiet):

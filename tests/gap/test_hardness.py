@@ -22,7 +22,7 @@ class Rolling:
         self.phase = np.ones(512)
         self.on_ground = np.zeros(512, bool)
         self.usable = np.ones(512, bool)
-        self.lost = np.zeros(512, bool)
+        self.bridged = np.zeros(512, bool)
 
     def __len__(self):
         return 512

@@ -121,7 +121,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
     member = regimes(flight, vehicle)
     parts: list[tuple] = []
     for start, stop in stretches(flight):
-        good = ~flight.lost[start:stop]
+        good = ~flight.bridged[start:stop]
         values = _bridged(residual[start:stop], good)
         bands = filtered(values)
         flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
@@ -141,7 +141,7 @@ def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
 def stretches(flight: Flight) -> list[tuple[int, int]]:
     """First sample and the one after the last of each stretch without contact, in the air or at rest."""
     air = (flight.phase != GROUND) & ~flight.on_ground
-    kind = np.where(flight.on_ground, 1, np.where(air, 2, 0)) * (flight.usable | flight.lost)
+    kind = np.where(flight.on_ground, 1, np.where(air, 2, 0)) * (flight.usable | flight.bridged)
     bounds = np.r_[0, np.flatnonzero(np.diff(kind)) + 1, len(kind)]
     return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
 

@@ -6,7 +6,7 @@ An effect that this table does not know (a user's own) has every parameter with 
 value free, and counts as random when two seeds give two forces.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -42,7 +42,7 @@ _LATER = {"battery_sag": ("charge", "capacity"), "slung_load": ("length",)}
 _ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are also tried alone
 _FIXED = {"ground_effect": {"turbulence": 0.0}, "downwash": {"turbulence": 0.0, "width": 0.0}}
 GATED = ("wind", "gust", "downwash")  #: effects that may come and go within a flight
-ONLY_GATED = frozenset({"downwash"})  #: what acts all the time is a wake of nothing that is known
+SHAKES = frozenset({"downwash"})  #: effects that are only tried with their random part: the mean alone has other names
 UNSTEADY = ("ground_effect", "downwash")  #: effects with a random part, where and when their mean part acts
 COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
 #: names for one thing in the logs at hand, with what would tell them apart
@@ -113,9 +113,11 @@ class Term:
     def among_all(self, x: np.ndarray, other: float = 0.0) -> np.ndarray:
         """Values (k,) of the first k free parameters in their places among all that its effect may have free.
 
-        other: the value of those that this variant leaves alone.
+        other: the value of those that this variant leaves alone. A random part has its own alone.
         """
         names = _free(self.effect)
+        if not set(names) & set(self.free):
+            return np.array(x[:len(self.free)])
         out = np.full(len(names), other)
         for name, value in zip(self.free, x, strict=False):
             if name in names:
@@ -175,9 +177,11 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
     """
     without = set(without)
-    out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without and name not in ONLY_GATED}
-    if "ground_effect" in out:  # its air is unsteady as well
-        out["ground_effect"] += [(*v, _unsteady("ground_effect")) for v in out["ground_effect"]]
+    out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    for name in UNSTEADY:
+        if name in out:
+            shaking = [(*v, _unsteady(name)) for v in out[name]]
+            out[name] = shaking if name in SHAKES else out[name] + shaking
     for name in COMPANIONS:
         if name in out and COMPANIONS[name] not in without:
             drag = [replace(t, companion=True) for t in terms(COMPANIONS[name])]
@@ -197,6 +201,11 @@ def _unsteady(name: str) -> Term:
     effect = get(name)
     neutral = {"turbulence": 0.0, **({"width": 0.0} if name == "downwash" else {})}
     return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, **neutral}), True)
+
+
+def telling(terms: Sequence[Term]) -> Term:
+    """The term of an effect whose strength says how much of it there is: its random part, where it is only tried with that."""
+    return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 
 def term_of(effect: Found) -> Term:

@@ -100,4 +100,4 @@ def angular_acceleration(flight: Flight) -> np.ndarray:
     out = np.zeros((len(flight), 3))
     if flight.rates is not None:
         out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
-    return held(np.where(flight.lost[:, None], np.nan, out))
+    return held(np.where(flight.bridged[:, None], np.nan, out))

@@ -247,9 +247,13 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
 def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray,
               told: np.ndarray) -> Term:
     """A random effect's strength of highest likelihood, the others as they are."""
-    term = random[which]
     others = told + problem.random_power([t for i, t in enumerate(random) if i != which])
-    low, high = term.bounds()
+    return strongest(problem, random[which], values, others)
+
+
+def strongest(problem: Problem, term: Term, values: np.ndarray, others: np.ndarray) -> Term:
+    """A random effect with its strength of highest likelihood. values: what is left; others: power added by others."""
+    _, high = term.bounds()
     unit = problem.random_power([term.fitted(np.ones(len(term.free)))])
     if not unit.any():
         return term

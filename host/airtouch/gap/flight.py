@@ -28,6 +28,7 @@ KNOCK = 7.0  #: usual deviations
 CONTACT_S = 0.3  #: left out around the moments at which the vehicle touches the ground
 JOLT = 40.0  #: usual deviations in flight: it hit something (set-points that step reach 35)
 MOST_JOLTED = 0.1  #: of a flight; more is no accident
+TOUCH_M, TOUCH_S = 0.006, 0.05  #: height above standing below which legs may touch in flight; how long that rings
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class Flight:
     signals (n, COUNT) for effects; acceleration (n, 3) m/s^2: specific force, body axes;
     rates (n, 3) rad/s or None; pwm (n, 4); turn (n, 3, 3) body to world; phase (n,) places
     in `segments.KINDS`; usable (n,): neither lost nor close to touching the ground;
-    clock_s (m,): logged times of the m rows that arrived minus the regular ones.
+    clock_s (m,): logged times of the m rows that arrived minus the regular ones; lost (n,): rows that did not;
+    touching (n,): in flight, so low that the legs may touch.
     """
 
     name: str
@@ -51,12 +53,18 @@ class Flight:
     usable: np.ndarray
     clock_s: np.ndarray
     lost: np.ndarray
+    touching: np.ndarray
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     memory: dict = field(default_factory=dict, repr=False)  #: what was worked out once
 
     def __len__(self) -> int:
         return len(self.pwm)
+
+    @property
+    def bridged(self) -> np.ndarray:
+        """Samples whose gap is nobody's, bool (n,): the log lost them, or the floor held the legs."""
+        return self.lost | self.touching
 
     @property
     def on_ground(self) -> np.ndarray:
@@ -118,11 +126,16 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     if heights is not None:
         signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
         signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
+    touching = np.zeros(len(log), bool)
+    if heights is not None and not log.has("zrange_m"):
+        standing = row["range_below_rotors"] + row["leg_below_range"]
+        low = (phase != GROUND) & (heights.mean(axis=1) < standing + TOUCH_M)
+        touching = np.convolve(low, np.ones(2 * int(TOUCH_S / PERIOD_S) + 1), "same") > 0.5
     rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
     usable = ~lost & ~_near_contact(phase, pwm) & ~_knocks(force, (phase == GROUND) & (pwm.max(axis=1) <= 0.0))
     usable &= ~_jolts(force, rates, phase != GROUND)
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
-                  tuple(notes), tuple(cannot))
+                  touching, tuple(notes), tuple(cannot))
 
 
 def _sane(log: FlightLog) -> tuple[FlightLog, list[str]]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap import candidates
-from airtouch.gap.candidates import Term
+from airtouch.gap.candidates import SPECTRUM, Term
 from airtouch.gap.channels import residual
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over
@@ -49,7 +49,7 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     nothing = _each(data, whole, ())
     if len(nothing) < LEAST_BLOCKS:
         return {}
-    level, bursts = judge(data, whole, ()), _bursts(data)
+    level, bursts = {wide: judge(data, whole, (), wide) for wide in (False, True)}, _bursts(data)
     out = {}
     for name, variants in candidates.gated(without).items():
         judged = [_judged(data, whole, name, terms, gate, cost, level, len(nothing)) for variant in variants
@@ -59,13 +59,17 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     return out
 
 
-def _judged(data: Data, whole: Part, name: str, terms: Sequence[Term], gate: Gate, cost: float, level: float,
-            blocks: int) -> Gated:
-    """An effect fitted within a gate, whose choice costs `cost`. level: log likelihood without any effect."""
+def _judged(data: Data, whole: Part, name: str, terms: Sequence[Term], gate: Gate, cost: float,
+            level: dict[bool, float], blocks: int) -> Gated:
+    """An effect fitted within a gate, whose choice costs `cost`.
+
+    level: log likelihood without any effect, as sure of the commands' floor as without and with random ones.
+    """
     acting = [replace(t, gate=gate) for t in terms]
     fitted = fit(data, whole, acting)
     free = sum(len(t.free) for t in acting)
-    return Gated(name, fitted, judge(data, whole, fitted.terms) - level - cost - 0.5 * free * np.log(blocks), cost)
+    without = level[any(t.kind == SPECTRUM for t in acting)]
+    return Gated(name, fitted, judge(data, whole, fitted.terms) - without - cost - 0.5 * free * np.log(blocks), cost)
 
 
 def _by_blocks(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term]) -> tuple[Sequence[Term], Gate, float]:
@@ -102,7 +106,7 @@ def _bursts(data: Data) -> tuple[Gate, float]:
     gate, price = [], 0.0
     for flight in data.flights:
         force = np.nan_to_num(residual(flight, data.study.vehicle, data.study.calibration)[:, 2])
-        force[flight.on_ground | flight.lost] = 0.0
+        force[flight.on_ground | flight.bridged] = 0.0
         size = int(PIECE_S / PERIOD_S)
         pieces = _highpassed(force)[:len(force) // size * size].reshape(-1, size)
         power = (pieces ** 2).mean(axis=1)

@@ -11,6 +11,7 @@ import numpy as np
 
 from airtouch.gap.candidates import MEAN, Term
 from airtouch.gap.data import Data, spectra
+from airtouch.gap.fit import strongest
 from airtouch.gap.least_squares import bounded_step, limits, weights_of, without_offsets
 from airtouch.gap.problem import Part, Problem, problem_of
 from airtouch.gap.twin import COMMAND_ONLY
@@ -101,6 +102,22 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         found.append(x[:n])
         variances.append(np.diag(covariance)[:n])
     return gain, found, variances
+
+
+def random_look(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray], added: Sequence[np.ndarray],
+                term: Term) -> tuple[float, np.ndarray]:
+    """Held-out gain of a random effect beside what is chosen, which stays as it is, and its scaled strength (k,).
+
+    left, added: as for `first_order`.
+    """
+    gain, strengths = 0.0, []
+    for train, test in ((0, 1), (1, 0)):
+        problem, other = (problem_of(screen.data, parts[k]) for k in (train, test))
+        found = strongest(problem, term, left[train], added[train])
+        more = other.random_power([found])
+        gain += other.likelihood(left[test], added[test] + more) - other.likelihood(left[test], added[test])
+        strengths.append(found.scaled(found.values))
+    return gain, np.mean(strengths, axis=0)
 
 
 def _key(term: Term, parameter: str) -> tuple:

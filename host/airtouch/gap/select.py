@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, COMPANIONS, GATED, MEAN, SPECTRUM, Term, every, twins_of
+from airtouch.gap.candidates import CLOCK, COMPANIONS, GATED, MEAN, SPECTRUM, Term, every, telling, twins_of
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
 from airtouch.gap.fit import Fit, fit, judge, left_over, strength_variance
@@ -20,7 +20,7 @@ from airtouch.gap.gates import gated
 from airtouch.gap.generic import generic_gain
 from airtouch.gap.nominal_scatter import Apparent
 from airtouch.gap.problem import Part, whole_of
-from airtouch.gap.screen import Screen, first_order
+from airtouch.gap.screen import Screen, first_order, random_look
 from airtouch.gap.spectra import AIR, REST
 from airtouch.gap.twin import COMMAND_ONLY
 
@@ -68,6 +68,7 @@ class Judged:
     variance: np.ndarray = field(default_factory=lambda: np.zeros(0))
     evidence: float = 0.0
     named: bool = True
+    share: float = np.inf  #: where several effects are named: gain over the hypothesis of the others alone
 
 
 @dataclass(frozen=True)
@@ -96,9 +97,9 @@ class Selection:
 
     @property
     def named(self) -> tuple[Judged, ...]:
-        """The steps whose effects are named, as found; what the log has done to itself comes after the vehicle's."""
+        """The steps whose effects are named, what adds most to the others first; what the log has done to itself is last."""
         of_the_log = lambda s: any(t.name == s.name and t.kind == CLOCK for t in s.terms)
-        return tuple(sorted((s for s in self.steps if s.named), key=of_the_log))
+        return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (of_the_log(s), -s.share)))
 
     @property
     def chosen(self) -> Judged | None:
@@ -150,16 +151,34 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = ()) -> Selection:
     """Judge every candidate, then add effects one by one while held-out data ask for them.
 
-    Effects that come and go are tried first (gap.gates), but those of `without`.
+    Effects that come and go are tried first (gap.gates), but those of `without`. One that adds no more to the effects
+    found after it than it does in nominal flights is taken back.
     """
     parts = halves(data)
     base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]  # none, as sure of the commands' floor
     screen = Screen(data)
-    singles = _round(data, parts, base, screen, candidates, None, progress)
+    alone = _round(data, parts, base, screen, candidates, None, progress)
+    need = {name: needed(data, j.terms) for name, j in alone.items()}
+    passing = _passing(data, parts, base, alone, need, without)
+    singles, least, steps = _steps(data, parts, base, screen, candidates, alone, need, passing, progress)
+    steps = _with_shares(data, parts, base, steps)
+    if passing is not None and any(s.named and s.name == passing.name and s.share < least[s.name] for s in steps):
+        singles, least, steps = _steps(data, parts, base, screen, candidates, alone, need, None, progress)
+        steps = _with_shares(data, parts, base, steps)
+    before = _nameless(data, parts, None)
+    after = _nameless(data, parts, steps[-1]) if steps else before
+    last = steps[-1].terms if steps else ()
+    return Selection(singles, tuple(steps), before, after, parts, least, data.study.nominal, _assumes(data, last),
+                     _usual(data))
+
+
+def _steps(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], screen: Screen,
+           candidates: Mapping[str, Sequence[Hypothesis]], singles: Mapping[str, Judged], least: Mapping[str, float],
+           passing: Judged | None, progress: Callable[[str], None],
+           ) -> tuple[Mapping[str, Judged], Mapping[str, float], list[Judged]]:
+    """Effects added one by one, after one that comes and goes where there is such: candidates, what each needs, steps."""
     steps: list[Judged] = []
-    least = {name: needed(data, j.terms) for name, j in singles.items()}
     tried, need = singles, least
-    passing = _passing(data, parts, base, singles, least, without)
     if passing is not None:
         steps, least = [passing], {**least, passing.name: data.study.scatter.passing(passing.name, _seconds(data), LEAST_GAIN)}
         singles = {**singles, passing.name: passing}
@@ -178,11 +197,36 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         if sum(s.named for s in steps) < MOST_EFFECTS:
             tried, need = _beside(data, parts, base, screen, candidates, steps,
                                   {n: replace(j, gain=j.gain - so_far) for n, j in tried.items()}, progress)
-    before = _nameless(data, parts, None)
-    after = _nameless(data, parts, steps[-1]) if steps else before
-    last = steps[-1].terms if steps else ()
-    return Selection(singles, tuple(steps), before, after, parts, least, data.study.nominal, _assumes(data, last),
-                     _usual(data))
+    return singles, least, steps
+
+
+def _with_shares(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], steps: list[Judged],
+                 ) -> list[Judged]:
+    """The steps, where several effects are named with what each adds to the others."""
+    if sum(s.named for s in steps) < 2:
+        return steps
+    return [replace(s, share=steps[-1].gain - _gain_without(data, parts, base, steps, s)) if s.named else s
+            for s in steps]
+
+
+def _gain_without(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], steps: Sequence[Judged],
+                  dropped: Judged) -> float:
+    """Gain of the last step's hypothesis without one of its effects, the others fitted anew."""
+    last, place = steps[-1], [s.name for s in steps].index(dropped.name)
+    own = lambda t: t.name == dropped.name or t.companion and t.name == COMPANIONS.get(dropped.name)
+    keep = [t for t in last.terms if not own(t)]
+    gain = sum(clock_gain(data, t)[1] for t in keep if t.kind == CLOCK)
+    others = [t for t in keep if t.kind != CLOCK]
+    if not others:
+        return gain
+    against = base[any(t.kind == SPECTRUM for t in others)]
+    for train, test in ((0, 1), (1, 0)):
+        known = [t for t in last.fits[train].terms if not own(t)]
+        start = [t.scaled(t.values) for t in known if t.kind == MEAN]
+        found = fit(data, parts[train], known, np.concatenate(start) if start else None)
+        gain += judge(data, parts[test], found.terms) - against[test]
+    choice = dropped.choice - (steps[place - 1].choice if place else 0.0)
+    return gain - _price(found.terms) - (last.choice - choice)
 
 
 def _passing(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]], singles: Mapping[str, Judged],
@@ -236,7 +280,7 @@ def apparent(data: Data) -> Apparent:
     """How strong every effect seems to be in flights that have none."""
     parts = halves(data)
     base = [[judge(data, p, (), wide) for p in parts] for wide in (False, True)]
-    singles = _round(data, parts, base, Screen(data), every(), None, lambda _: None)
+    singles = _round(data, parts, base, Screen(data), every(), None, lambda _: None, thorough=True)
     passing = gated(data)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
@@ -246,7 +290,7 @@ def apparent(data: Data) -> Apparent:
 
 def _error(data: Data, judged: Judged) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
-    term = judged.terms[0]
+    term = telling(judged.terms)
     if term.kind == CLOCK:
         return np.zeros(len(judged.strength))
     if term.kind != SPECTRUM:
@@ -304,8 +348,11 @@ def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
 
 def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], screen: Screen,
            candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
-           progress: Callable[[str], None]) -> dict[str, Judged]:
-    """Every candidate on top of what is chosen: a first look at all, the most promising in full."""
+           progress: Callable[[str], None], thorough: bool = False) -> dict[str, Judged]:
+    """Every candidate on top of what is chosen: a first look at all, the most promising in full.
+
+    thorough: random effects in full, however little they promise.
+    """
     before = chosen.gain if chosen else 0.0
     held = chosen.terms if chosen else ()
     have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
@@ -315,12 +362,13 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         problem, values, power = left_over(data, part, chosen.fits[1 - k].terms if chosen and chosen.fits else ())
         left.append(values)
         added.append(power - problem.power)
-    looked, sure, mixed = [], [], []
+    looked, sure, shaken = [], [], []
     for name, variants in candidates.items():
         progress(name)
-        hopeless = False
-        for terms in _middle_first(variants):
-            if hopeless or name in twins or any((t.name, t.values.get("rotor")) in have for t in terms):
+        if name in twins:
+            continue
+        for terms in variants:
+            if any((t.name, t.values.get("rotor")) in have for t in terms):
                 continue
             choice = np.log(sum(len(v) == len(terms) for v in variants))  # among so many; else many would beat one
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
@@ -333,15 +381,14 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
                                      strength=own.among_all(np.mean(fitted, axis=0)[:k]),
                                      variance=own.among_all(_of_mean(variances)[:k], np.inf)))
-            elif len(terms) > 1 and terms[0].kind == MEAN:
-                mixed.append((name, terms, choice))
+            elif any(t.kind == SPECTRUM for t in terms):
+                shaken.append((name, terms, choice))
             else:
                 sure.append(_crossed(data, parts, base, name, held, terms, chosen, choice))
-                hopeless = len(terms) == 1 and terms[0].kind == SPECTRUM and sure[-1].gain - before < HOPELESS
     looked = _best_variants(looked)
-    alone = {j.name: j.terms[-1] for j in looked if len(j.terms) == len(held) + 1}
-    sure += [_crossed(data, parts, base, name, held, terms, chosen, choice) for name, terms, choice in mixed
-             if _same(terms[0], alone[name])]  # with its random part the variant that is best without
+    tried = _shaken(data, parts, base, screen, left, added, held, chosen, shaken, looked, thorough)
+    sure += [j for j in tried if j.full]
+    looked += [j for j in tried if not j.full]
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
     fitted = [_crossed(data, parts, base, j.name, held, j.terms[len(held):], chosen, j.choice) for j in worth]
     best: dict[str, Judged] = {}
@@ -355,6 +402,39 @@ def _round(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], s
         if both and alone and len(both.terms) > len(held) + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))  # it is the companion that gains
     return _with_evidence(data, best, before)
+
+
+def _shaken(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]], screen: Screen,
+            left: Sequence[np.ndarray], added: Sequence[np.ndarray], held: Hypothesis, chosen: Judged | None,
+            hypotheses: Sequence[tuple[str, Hypothesis, float]], means: Sequence[Judged], thorough: bool,
+            ) -> list[Judged]:
+    """Hypotheses with a random effect: the variant of each that a first look finds best is judged in full.
+
+    hypotheses: name, terms, and what the choice of the variant costs. means: looks at mean effects, best first; the
+    random part of one of these goes with its best variant.
+    """
+    before = chosen.gain if chosen else 0.0
+    mean = {j.name: j for j in reversed(means) if len(j.terms) == len(held) + 1}
+    looks: dict[str, list[tuple[float, np.ndarray, Hypothesis, float]]] = {}
+    for name, terms, choice in hypotheses:
+        if name in mean and not _same(terms[0], mean[name].terms[-1]):
+            continue
+        if len(terms) == 1 or terms[0].kind == MEAN:
+            random = next(t for t in terms if t.kind == SPECTRUM)
+            gain, strength = random_look(screen, parts, left, added, random)
+            looks.setdefault(name, []).append((gain - choice, strength, terms, choice))
+    out = []
+    for name, tried in looks.items():
+        gain, strength, terms, choice = max(tried, key=lambda t: t[0])
+        promising = gain > HOPELESS or name in mean and mean[name].gain - before > HOPELESS
+        if not (promising or thorough):
+            if name not in mean:  # else the look at its mean part says what there is
+                out.append(Judged(name, (*held, *terms), before + min(gain, 0.0), full=False, choice=choice,
+                                  strength=telling(terms).among_all(strength)))
+            continue
+        longer = [(t, c) for n, t, c in hypotheses if n == name and len(t) > len(terms) and _same(t[0], terms[0])]
+        out += [_crossed(data, parts, base, name, held, t, chosen, c) for t, c in ((terms, choice), *longer)]
+    return out
 
 
 def _only_in_commands(data: Data, screen: Screen, terms: Hypothesis) -> bool:
@@ -390,13 +470,6 @@ def _price(terms: Sequence[Term]) -> float:
     return PRICE * sum(len(t.free) - 1 for t in terms if t.kind != CLOCK)
 
 
-def _middle_first(variants: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Variants with the middle one of a random effect's three first: where that is hopeless all are."""
-    if len(variants) > 2 and variants[1][0].kind == SPECTRUM:
-        return [variants[1], variants[0], *variants[2:]]
-    return list(variants)
-
-
 def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
     """The best of each candidate's variants of one length, best first."""
     kept: dict[tuple[str, int], Judged] = {}
@@ -428,7 +501,7 @@ def _crossed(data: Data, parts: Sequence[Part], base: Sequence[Sequence[float]],
         made, more = clock_gain(data, t)
         fitted.append(made)
         gain += more if t in timed else 0.0
-    strength, variance = _strength(terms[0], fitted, fits)
+    strength, variance = _strength(telling(terms), fitted, fits)
     return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, variance=variance)
 
 
@@ -439,8 +512,8 @@ def _strength(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[
     how far they lie from it.
     """
     every = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
-    same = [next(t for t in terms if t.name == term.name and t.values.get("rotor") == term.values.get("rotor"))
-            for terms in every]
+    own = lambda t: (t.name, t.kind, t.values.get("rotor"))
+    same = [next(t for t in terms if own(t) == own(term)) for terms in every]
     k = len(term.free)
     strength = term.among_all(np.mean([t.scaled(t.values)[:k] for t in same], axis=0))
     if term.kind != MEAN:

@@ -26,10 +26,10 @@ def starts(flight: Flight, regime: str) -> np.ndarray:
     """First samples of the blocks of a regime that hold usable samples only."""
     length = LENGTH[regime]
     good = flight.on_ground if regime == REST else (flight.phase != GROUND) & ~flight.on_ground
-    near = good & (flight.usable | flight.lost)
+    near = good & (flight.usable | flight.bridged)
     found, k = [], 0
     bad = np.cumsum(np.concatenate([[0], ~near]))
-    lost = np.cumsum(np.concatenate([[0], flight.lost]))
+    lost = np.cumsum(np.concatenate([[0], flight.bridged]))
     while k + length <= len(flight):
         if bad[k + length] == bad[k] and lost[k + length] - lost[k] <= MOST_LOST * length:
             found.append(k)

@@ -245,7 +245,7 @@ def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
 
 def steady(flight: Flight) -> np.ndarray:
     """Samples (n,) of level flight away from edges, take-off and landing."""
-    inside = np.isin(flight.phase, STEADY) & (flight.usable | flight.lost)
+    inside = np.isin(flight.phase, STEADY) & (flight.usable | flight.bridged)
     part = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
     moves = np.where(flight.phase == KINDS.index("hover"), 0, 1)
     for change, span in ((np.diff(part), EDGE_S), (np.diff(moves), START_S)):
