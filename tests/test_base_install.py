@@ -40,11 +40,12 @@ for words, folder in json.load(sys.stdin):
     print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 """
 WORKS = [("evaluate", "{flight}", "--speed", "0.3"), ("evaluate", "{flight}", "--speed", "0.3", "--detector", "paper"),
-         ("gap", "measure", "{flight}", "--report", "{out}/gap.html"), ("simulate", "hover", "--out", "{out}/flown", "--workers", "1"),
-         ("logs", "check", "{flight}"), ("--help",)]
+         ("gap", "measure", "{flight}", "--report", "{out}/gap.html"),
+         ("simulate", "hover", "--out", "{out}/flown", "--workers", "1"), ("logs", "check", "{flight}"), ("--help",)]
 TRAINS = [("demo", "--out", "{out}/demo"), ("train", "{flight}", "--out", "{out}/m.npz"),
           ("adapt", "{flight}", "--out", "{out}/m.npz"), ("twin", "{flight}", "--out", "{out}/twin")]
-DRAWS = {("map", "{flight}", "--truth", "--out", "{out}/m.geojson"): "map", ("gap", "blind", "run", "{out}/set", "-n", "1"): "plots"}
+DRAWS = {("map", "{flight}", "--truth", "--out", "{out}/m.geojson"): "map",
+         ("gap", "blind", "run", "{out}/set", "-n", "1"): "plots"}
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ def done(tmp_path_factory):
     for command, place in zip(commands, places, strict=True):
         place.mkdir()
         asked.append(([word.format(flight=flight, out=place) for word in command], str(place)))
-    ran = subprocess.run([sys.executable, "-c", BLOCK], input=json.dumps(asked), capture_output=True, text=True, timeout=HANG_S)
+    ran = subprocess.run([sys.executable, "-c", BLOCK], input=json.dumps(asked), capture_output=True, text=True,
+                         timeout=HANG_S)
     assert ran.returncode == 0, ran.stderr
     return {command: Done(int(code), place.with_name(place.name + ".err").read_text(), place)
             for command, place, code in zip(commands, places, ran.stdout.split(), strict=True)}
@@ -94,11 +96,13 @@ def test_a_report_without_matplotlib_says_which_extra_brings_pictures(done):
 @pytest.mark.parametrize("command", DRAWS)
 def test_plots_say_at_once_what_is_missing(done, command):
     said = done[command]
-    assert said.code == 2 and f"pip install 'airtouch[{DRAWS[command]}]'" in said.error and "Traceback" not in said.error
+    assert said.code == 2 and f"pip install 'airtouch[{DRAWS[command]}]'" in said.error
+    assert "Traceback" not in said.error
     assert not list(said.out.iterdir())
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch):
     monkeypatch.setitem(EXTRAS, "none", ("no_such_module_of_this_name",))
-    with pytest.raises(AirTouchError, match=r"flying needs no_such_module_of_this_name: pip install 'airtouch\[none\]'"):
+    with pytest.raises(AirTouchError,
+                       match=r"flying needs no_such_module_of_this_name: pip install 'airtouch\[none\]'"):
         need("none", "flying")

@@ -1,4 +1,5 @@
-"""The wheel: built from this tree it holds all that detecting, diagnosing and simulating read, and works away from the tree."""
+"""The wheel: built from this tree it holds all that detecting, diagnosing and simulating read, and works away from the
+tree."""
 
 import shutil
 import subprocess
@@ -13,8 +14,10 @@ from airtouch import logs
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "host" / "airtouch"
-DATA = ("py.typed", "vehicles/*.toml", "models/*", "report/*.html", "kernels/*.h", "logs/*.csv", "simulation/scenarios/*.toml",
-        "simulation/firmwares/*.toml", "crazyflie/missions/*.toml", "gap/*.toml", "simulation/effects/*.txt", "gap/example/*")
+DATA = ("py.typed", "vehicles/*.toml", "models/*", "report/*.html", "kernels/*.h", "logs/*.csv",
+        "simulation/scenarios/*.toml",
+        "simulation/firmwares/*.toml", "crazyflie/missions/*.toml", "gap/*.toml", "simulation/effects/*.txt",
+        "gap/example/*")
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +25,8 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     out = tmp_path_factory.mktemp("wheel")
-    subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", out, ROOT],
+    subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", out,
+                    ROOT],
                    check=True, timeout=600)
     (path,) = out.glob("airtouch-*.whl")
     return path
@@ -44,7 +48,8 @@ def unpacked(wheel, tmp_path_factory):
 
 
 def run(unpacked, cwd, *arguments):
-    start = (f"import sys; sys.path = [{str(unpacked)!r}, *(p for p in sys.path if {str(ROOT / 'host')!r} not in p)]; import airtouch; "
+    start = (f"import sys; sys.path = [{str(unpacked)!r}, *(p for p in sys.path if {str(ROOT / 'host')!r} not in p)]; "
+             "import airtouch; "
              f"assert airtouch.__file__.startswith({str(unpacked)!r}); from airtouch.cli import main; main()")
     return subprocess.run([sys.executable, "-c", start, *map(str, arguments)], cwd=cwd, capture_output=True, text=True,
                           timeout=600)
@@ -52,7 +57,8 @@ def run(unpacked, cwd, *arguments):
 
 def test_every_module_and_every_file_of_data_is_in_it(wheel):
     held = set(zipfile.ZipFile(wheel).namelist())
-    wanted = [f for pattern in ("**/*.py", *DATA) for f in PACKAGE.glob(pattern) if f.is_file() and "__pycache__" not in f.parts]
+    wanted = [f for pattern in ("**/*.py", *DATA)
+              for f in PACKAGE.glob(pattern) if f.is_file() and "__pycache__" not in f.parts]
     assert len(wanted) > 200 and all(any(PACKAGE.glob(pattern)) for pattern in DATA)
     assert not [f for f in wanted if str(f.relative_to(PACKAGE.parent)) not in held]
 
@@ -66,7 +72,8 @@ def test_the_kernels_are_compiled_and_no_test_is_in_it(wheel):
 
 def test_it_detects_and_simulates_away_from_the_tree(unpacked, tmp_path):
     logs.write(short_flights.fly(1)[0], tmp_path / "flight.csv.gz")
-    for command in (("evaluate", "flight.csv.gz", "--speed", "0.3"), ("simulate", "hover", "--out", "flown", "--workers", "1")):
+    for command in (("evaluate", "flight.csv.gz", "--speed", "0.3"),
+                    ("simulate", "hover", "--out", "flown", "--workers", "1")):
         done = run(unpacked, tmp_path, *command)
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "flown" / "hover_0_000000.csv.gz").is_file()

@@ -12,5 +12,5 @@ PLAIN = {"motor_noise": {"rms": 0.008, "time": 0.8, "fast": 0.006}, "gust": {"rm
 def made_course(number, clearance_m, speed_mps=0.3):
     """A course of its own; its samples are not known before it is flown."""
     rng = np.random.default_rng(number)
-    return Course(f"made {number}", 0.8, clearance_m, 0.8, clearance_m, 2.0, rng.uniform(5.0, 7.0), rng.uniform(2.0, 3.0),
-                  rng.uniform(1.8, 2.4), 2.0, 4.0, speed_mps, "stated", 0.0, 0, 0, 0, 0, 0, 0)
+    return Course(f"made {number}", 0.8, clearance_m, 0.8, clearance_m, 2.0, rng.uniform(5.0, 7.0),
+                  rng.uniform(2.0, 3.0), rng.uniform(1.8, 2.4), 2.0, 4.0, speed_mps, "stated", 0.0, 0, 0, 0, 0, 0, 0)

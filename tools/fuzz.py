@@ -37,8 +37,8 @@ SEEDS = FUZZ / "seeds"
 BUILD = ROOT / "build" / "fuzz"
 SANITIZERS = "address,undefined,float-cast-overflow,float-divide-by-zero"
 FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-fno-sanitize-recover=all"]
-INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link", "firmware/app/src",
-            "gap8/kernels", "gap8/model", "gap8/app/src"]
+INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link",
+            "firmware/app/src", "gap8/kernels", "gap8/model", "gap8/app/src"]
 XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
 #: A target's own flags, for its harness and the sources below gap8/, and whose source it is.
 VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
@@ -144,7 +144,10 @@ def _compile(made_by: Engine, source: Path, flags: tuple[str, ...]) -> Path:
 
 def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None = None, folder: Path | None = None,
           flags: tuple[str, ...] = (), only: list[Path] | None = None) -> dict[str, Path]:
-    """The programs of the named targets. replaced: other sources in the place of the product's; only: of these alone."""
+    """The programs of the named targets.
+
+    replaced: other sources in the place of the product's; only: of these alone.
+    """
     folder = folder or BUILD / "bin" / "".join((made_by.name, *flags))  # a test may build beside a long run
     folder.mkdir(parents=True, exist_ok=True)
     sources = [(replaced or {}).get(path, path) for path in only or product_sources()]
@@ -202,8 +205,8 @@ def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None 
         raise SystemExit(f"{name} failed without a finding; see {log}\n{text[-2000:]}")
     executed = re.findall(r"stat::number_of_executed_units:\s*(\d+)", text)
     reached = re.findall(r"cov: (\d+) ft: (\d+)", text) or [("0", "0")]
-    return Result(name, max(0, int(executed[-1]) - known) if executed else 0, int(reached[-1][0]), int(reached[-1][1]), cpu,
-                  new[0] if done.returncode else None, log)
+    return Result(name, max(0, int(executed[-1]) - known) if executed else 0, int(reached[-1][0]), int(reached[-1][1]),
+                  cpu, new[0] if done.returncode else None, log)
 
 
 def run_batches(name: str, program: Path, runs: int, seed: int, resume: bool, folder: Path | None = None) -> Result:
@@ -270,7 +273,8 @@ def cover(names: list[str]) -> None:
     programs = build(names, made_by, folder=folder, flags=("-fprofile-instr-generate", "-fcoverage-mapping"))
     for name, program in programs.items():
         subprocess.run([program, "-runs=0", f"-max_len={LONGEST}", f"-artifact_prefix={BUILD}/", corpus(name)],
-                       check=True, capture_output=True, env=os.environ | {"LLVM_PROFILE_FILE": str(folder / f"{name}.raw")})
+                       check=True, capture_output=True,
+                       env=os.environ | {"LLVM_PROFILE_FILE": str(folder / f"{name}.raw")})
     merged = folder / "all.profile"
     subprocess.run([tools[0], "merge", *folder.glob("*.raw"), "-o", merged], check=True)
     objects = [word for name in names for word in ("-object", programs[name])]
@@ -312,7 +316,8 @@ def main() -> None:
         verdict = "nothing found" if result.finding is None else (
             f"FOUND, see {result.log.relative_to(ROOT)}; replay: "
             f"python tools/fuzz.py {name} --replay {result.finding.relative_to(ROOT)}")
-        print(f"{name:16} {result.inputs:9} {result.edges:6} {result.features:8} {result.cpu:6.0f}  {verdict}", flush=True)
+        print(f"{name:16} {result.inputs:9} {result.edges:6} {result.features:8} {result.cpu:6.0f}  {verdict}",
+              flush=True)
     sys.exit(failed)
 
 

@@ -21,8 +21,8 @@ def run(*arguments: object):
 def test_a_channel_group_a_size_and_a_variant(generated, tmp_path, monkeypatch):
     pytest.importorskip("tensorflow")
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
-    arguments = [generated, "--out", tmp_path / "folds", "--json", tmp_path / "a.json", "--steps", SMALL.steps, "--epochs", 1,
-                 "--only", "f_w-only", "--only", "sparsity-85", "--only", "no-filter"]
+    arguments = [generated, "--out", tmp_path / "folds", "--json", tmp_path / "a.json", "--steps", SMALL.steps,
+                 "--epochs", 1, "--only", "f_w-only", "--only", "sparsity-85", "--only", "no-filter"]
     result = run(*arguments)
     assert result.exit_code == 0, result.output
     table = json.loads((tmp_path / "a.json").read_text())

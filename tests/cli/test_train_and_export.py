@@ -79,7 +79,8 @@ def train(*arguments: object):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("detector", "short"), [("best", ("--steps", SMALL.steps)), ("paper", ("--epochs", 1))])
-def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, monkeypatch, detector: str, short: tuple) -> None:
+def test_training_on_simulated_flights_says_what_they_were(tmp_path: Path, monkeypatch, detector: str,
+                                                           short: tuple) -> None:
     pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     out = tmp_path / "m.npz"

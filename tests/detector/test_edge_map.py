@@ -83,7 +83,7 @@ def test_geojson_can_be_read_back():
     features = json.loads(text)["features"]
     shapes = [shapely.geometry.shape(f["geometry"]) for f in features]
     assert all(shape.is_valid for shape in shapes)
-    outline = next(s for s, f in zip(shapes, features) if f["properties"]["role"] == "outline")
+    outline = next(s for s, f in zip(shapes, features, strict=True) if f["properties"]["role"] == "outline")
     assert overlap(outline, SHAPES["L"]) > 0.85
     assert {f["properties"]["role"] for f in features} >= {"edge", "outline", "rectangle", "near side"}
     assert isinstance(shapes[0], Point) and any(isinstance(s, LineString) for s in shapes)

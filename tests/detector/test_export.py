@@ -104,7 +104,8 @@ def test_the_generated_sources_build_and_give_the_golden_answers(tmp_path: Path,
     sources = [path for folder in (KERNELS, FIRMWARE, MODEL) for path in sorted(folder.glob("*.c"))]
     made, error = compiled(compiler, flags, sources)
     assert not error, error
-    subprocess.run([compiler, *flags, str(tmp_path / "main.c"), *made, "-lm", "-o", str(tmp_path / "golden")], check=True)
+    subprocess.run([compiler, *flags, str(tmp_path / "main.c"), *made, "-lm", "-o", str(tmp_path / "golden")],
+                   check=True)
     assert subprocess.run([str(tmp_path / "golden")]).returncode == 0
 
 

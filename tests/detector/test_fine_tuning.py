@@ -72,7 +72,8 @@ def test_free_air_is_drawn_and_has_no_goals():
     assert not calm.goals.any() and not len(calm.edges)
     _, y = batches.batch([flight], recipe, np.random.default_rng(0), [calm])
     without = [batches.batch([flight], recipe, np.random.default_rng(k))[1].any(axis=(1, 2)).mean() for k in range(20)]
-    mixed = [batches.batch([flight], recipe, np.random.default_rng(k), [calm])[1].any(axis=(1, 2)).mean() for k in range(20)]
+    mixed = [batches.batch([flight], recipe, np.random.default_rng(k), [calm])[1].any(axis=(1, 2)).mean()
+             for k in range(20)]
     assert np.mean(mixed) == pytest.approx(0.5 * np.mean(without), abs=0.12)
 
 

@@ -52,7 +52,8 @@ def test_a_detector_that_needs_all_sensors_refuses_a_log_without_one():
 
 def test_the_rates_alone_tell_flight_from_ground(flights):
     """Against the motors of recorded flights, a second before take-off and after it."""
-    paths = sorted((flights / "airtouch").glob("*_h8*.csv.gz")) + sorted((flights / "airtouch-november").glob("*.gz"))[::6]
+    paths = sorted((flights / "airtouch").glob("*_h8*.csv.gz"))
+    paths += sorted((flights / "airtouch-november").glob("*.gz"))[::6]
     for path in paths:
         log = logs.read(path)
         air = np.flatnonzero(logs.airborne(log))
@@ -112,7 +113,8 @@ def test_sample_by_sample_is_the_same_as_at_once(sensor):
 
 
 def test_a_model_may_decode_otherwise_without_a_sensor(small, tmp_path):
-    deaf = {**small.metadata["decoder"], "entry_score": 99.0, "exit_score": 99.0, "late_entry": 99.0, "late_exit": -99.0}
+    deaf = {**small.metadata["decoder"], "entry_score": 99.0, "exit_score": 99.0, "late_entry": 99.0,
+            "late_exit": -99.0}
     keen = {**deaf, "entry_score": -9.0, "exit_score": -9.0}
     model = replace(small, metadata={**small.metadata, "decoder": deaf, "decoder_without": {"motors": keen}})
     model.save(tmp_path / "m.npz")
@@ -141,7 +143,8 @@ def test_a_log_without_a_sensor_is_served_by_the_spare_and_scored_with_its_lag(s
 def test_the_note_has_the_measured_figures():
     whole, without = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
     text = sensor_note.note(("acceleration",))
-    assert text.index(f"{without['missed']:.1%} missed of {without['edges']}") < text.index(f"{whole['missed']:.1%} missed of")
+    assert text.index(f"{without['missed']:.1%} missed of {without['edges']}") < text.index(f"{whole['missed']:.1%} "
+                                                                                            "missed of")
     assert "\n" not in text
     assert not sensor_note.note(())
     assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}

@@ -29,7 +29,8 @@ class Rolling:
 
 
 def drawn(slope, blocks, seed=0):
-    """Exponential powers (blocks, bins, 2) whose mean goes with hardness to a slope in the first channel, 0 in the other."""
+    """Exponential powers (blocks, bins, 2) whose mean goes with hardness to a slope in the first channel, 0 in the
+    other."""
     rng = np.random.default_rng(seed)
     hardness = rng.uniform(0.0, 2.0, blocks)
     mean = np.exp(hardness[:, None, None] * np.array([slope, 0.0]) + np.array([3.0, -2.0]))
@@ -64,7 +65,8 @@ def test_level_divides_out_hardness_within_the_trusted_range_only():
 
 
 def test_a_flight_flown_unlike_its_baseline_is_said_so():
-    calm, hard, usual = ((name, Rolling(np.radians(swing))) for name, swing in (("calm", 1.0), ("hard", 30.0), ("usual", 10.0)))
+    calm, hard, usual = ((name, Rolling(np.radians(swing)))
+                         for name, swing in (("calm", 1.0), ("hard", 30.0), ("usual", 10.0)))
     slopes = Slopes(np.zeros((129, 13)), hardness_of(Rolling(np.radians(5.0)), FIRST, 256).min(),
                     1.5, hardness_of(Rolling(np.radians(15.0)), FIRST, 256).max())
     study = SimpleNamespace(floor=SimpleNamespace(slopes=slopes))

@@ -104,7 +104,8 @@ def test_without_baseline_the_floor_is_sensor_noise_and_spread():
 
 
 def test_no_gap_is_rarely_called_one():
-    quiet = lambda seed: flight(20.0, noise(20.0, 0.06, seed), noise(20.0, 0.006, seed + 100))
+    def quiet(seed):
+        return flight(20.0, noise(20.0, 0.06, seed), noise(20.0, 0.006, seed + 100))
     hits = [maps.significant(c) for s in range(8) for c in maps.gap_map(
         study(), [quiet(s)], [quiet(50 + s), quiet(70 + s)]).cells if c.regime == "all"]
     assert np.mean(hits) < 0.02

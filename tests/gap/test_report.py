@@ -1,4 +1,5 @@
-"""The gap report: self-contained, well formed, the answer first, every figure of the diagnosis in it and none of its own."""
+"""The gap report: self-contained, well formed, the answer first, every figure of the diagnosis in it and none of its
+own."""
 
 import html.parser
 import re
@@ -34,12 +35,13 @@ def flown():
 
 
 def cell(channel, phase, gap, floor=0.1, after=None, blocks=10, **more):
-    return Cell(channel, more.pop("band_hz", (0.0, 0.5)), phase, gap, floor, "m/s^2", 0.9 * gap, 1.1 * gap, blocks=blocks,
-                flights=1, after=after, floor_high=1.2 * floor, **more)
+    return Cell(channel, more.pop("band_hz", (0.0, 0.5)), phase, gap, floor, "m/s^2", 0.9 * gap, 1.1 * gap,
+                blocks=blocks, flights=1, after=after, floor_high=1.2 * floor, **more)
 
 
 def diagnosis(cells=(), verdict="effect", effects=(FOUND,), headline=None, **more):
-    rest = [Ranked(n, p, Quantity(0.0), "another fits better") for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
+    rest = [Ranked(n, p, Quantity(0.0), "another fits better")
+            for n, p in (("mass", 0.04), ("none", 0.02), ("unknown", 0.01))]
     answer = effects[0].name if effects else verdict
     ranking = [Ranked(answer, 0.93, Quantity(0.9, 0.8, 0.95)), *(r for r in rest if r.name != answer)]
     made = GapMap(tuple(cells), BASELINE, ("one.csv", "two.csv"))
@@ -100,10 +102,12 @@ def test_page_of_a_diagnosis(flown, tmp_path):
     assert found.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in said[0]
     assert "imu bias (probability 93%)" in said[1] and "takes away 90% (80% to 95%)" in said[2]
     assert [text.index(s) for s in said] == sorted(text.index(s) for s in said)
-    assert text.index(said[2]) < text.index("What to do next") < text.index("The largest cells") < text.index("still be the wrong one")
-    for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note", "no velocity",
-                 "wrong effect: wind", "imu_bias, vehicle as declared", "airtouch gap diagnose <x>", "another fits better",
-                 "airtouch collect --mission hover"):
+    order = [text.index(s) for s in (said[2], "What to do next", "The largest cells", "still be the wrong one")]
+    assert order == sorted(order)
+    for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note",
+                 "no velocity",
+                 "wrong effect: wind", "imu_bias, vehicle as declared", "airtouch gap diagnose <x>",
+                 "another fits better", "airtouch collect --mission hover"):
         assert part in text, part
     assert sum(v.startswith("data:") for v in checker.loaded) == 3
     with pytest.raises(AirTouchError, match="--force"):
@@ -122,8 +126,8 @@ def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(flown, tmp_p
 
 
 def test_phases_are_folded_by_importance(tmp_path):
-    cells = [cell("force_z", "take-off", 2.6, blocks=1), *(cell("force_y", p, 1.0, blocks=40) for p in ("hover", "cruise")),
-             cell("force_z", "landing", 0.05)]
+    cells = [cell("force_z", "take-off", 2.6, blocks=1),
+             *(cell("force_y", p, 1.0, blocks=40) for p in ("hover", "cruise")), cell("force_z", "landing", 0.05)]
     maps = gap_tables.maps(cells, summary.headline(cells))
     assert [m["name"] for m in maps] == ["In hover", "In cruise", "At take-off", "At landing"]
     assert [m["open"] for m in maps] == [True, False, False, False]
@@ -132,7 +136,8 @@ def test_phases_are_folded_by_importance(tmp_path):
 
 
 @pytest.mark.parametrize(("verdict", "words_there"), [
-    ("none", "No unmodelled effect stands out (probability 93%)"), ("unknown", "No known effect explains it (probability 93%)")])
+    ("none", "No unmodelled effect stands out (probability 93%)"),
+    ("unknown", "No known effect explains it (probability 93%)")])
 def test_pages_of_other_verdicts(flown, tmp_path, verdict, words_there):
     path = tmp_path / "gap.html"
     gap_report.write_diagnosis(path, of_flights(flown[:1], (), verdict=verdict), command="x")
@@ -141,14 +146,17 @@ def test_pages_of_other_verdicts(flown, tmp_path, verdict, words_there):
 
 
 def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects(tmp_path):
-    entry = {"channel": "force_y", "band_hz": [0.0, 0.5], "phase": "hover", "flight": "a/log.csv", "from_s": 34.0, "to_s": 42.0,
-             "over_floor": 6.1, "follows": ["height"], "nearest": [{"name": "wind", "fails": "gains 3 nats, 12 are needed"}]}
+    entry = {"channel": "force_y", "band_hz": [0.0, 0.5], "phase": "hover", "flight": "a/log.csv", "from_s": 34.0,
+             "to_s": 42.0,
+             "over_floor": 6.1, "follows": ["height"],
+             "nearest": [{"name": "wind", "fails": "gains 3 nats, 12 are needed"}]}
     found = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(entry,))
     steps = advice.steps("unknown", [], [], found.headline, [], True, VEHICLE.name)
     path = tmp_path / "gap.html"
     gap_report.write_diagnosis(path, replace(found, next=steps), command="x")
     text, _ = checked(path)
-    assert "sideways force, 0-0.5 Hz, hover: up to 6.1 times the floor from 34.0 to 42.0 s of log.csv; follows height" in text
+    assert ("sideways force, 0-0.5 Hz, hover: up to 6.1 times the floor from 34.0 to 42.0 s of log.csv; "
+            "follows height") in text
     assert "wind: gains 3 nats, 12 are needed" in text
     assert 'href="#add-an-effect"' in path.read_text() and "EFFECT = Effect(" in text  # the link leads to a whole file
 
@@ -166,7 +174,8 @@ def test_the_report_computes_nothing():
     for name in ("gap_report", "gap_tables", "gap_figures"):
         source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
         used = set(re.findall(r"from airtouch\.(?:gap|simulation)(?:\.(\w+))? import", source))
-        assert used <= {None, "", "advice", "channels", "gap_map", "measure", "pictures", "result", "words"}, (name, used)
+        assert used <= {None, "", "advice", "channels", "gap_map", "measure", "pictures", "result", "words"}, (name,
+                                                                                                               used)
         assert not re.search(r"\b(residual|calibrate|ready|shrink_of|gap_map)\(", source)
 
 
@@ -187,14 +196,16 @@ def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
     one = summary.headline(cells)
     assert (one.channel, one.phase) == ("force_y", "hover")
     said = words.sentences(diagnosis(cells, "unknown", ()))
-    assert said[0] == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the floor, and it "
+    assert said[0] == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the floor, "
+                       "and it "
                        "stands out in 4 of 5 phases in the air.")
     texts = [s.text for s in advice.steps("unknown", [], [], one, [], True, "v")]
     assert "more of hover" in texts[0] and not any("take-off" in t for t in texts)
 
 
 def test_a_cell_of_the_ground_or_of_one_regime_is_no_headline():
-    cells = [cell("force_z", "ground", 9.0), cell("force_z", "hover", 8.0, regime="height < 0.1 m"), cell("force_x", "hover", 0.5)]
+    cells = [cell("force_z", "ground", 9.0), cell("force_z", "hover", 8.0, regime="height < 0.1 m"),
+             cell("force_x", "hover", 0.5)]
     assert summary.headline(cells).channel == "force_x"
     assert summary.headline(cells[:2]) is None
 
@@ -203,7 +214,8 @@ def test_headline_of_named_effects_is_where_they_take_most():
     cells = [cell("torque_x", "hover", 16.0, 0.9, after=15.9), cell("force_z", "over platform", 0.43, 0.04, after=0.04)]
     found = diagnosis(cells, effects=(Found("ground_effect", {}),))
     assert found.headline is cells[1] and "lift" in words.sentences(found)[0]
-    assert "1 of 2 cells still stand out, the largest in hover in roll torque at 0-0.5 Hz (18 to 18 times the floor)" in words.answer(found)
+    assert ("1 of 2 cells still stand out, the largest in hover in roll torque at 0-0.5 Hz "
+            "(18 to 18 times the floor)") in words.answer(found)
 
 
 def test_an_effect_that_leaves_the_largest_cell_is_not_called_its_cause():
@@ -223,7 +235,8 @@ def test_what_got_worse_is_said():
     cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
              cell("force_y", "ground", 2.6, after=8.8)]
     said = words.sentences(diagnosis(cells))[2]
-    assert "2 of 3 cells still stand out, the largest on the ground in sideways force" in said and "(26 to 88 times the floor)" in said
+    assert "2 of 3 cells still stand out, the largest on the ground in sideways force" in said
+    assert "(26 to 88 times the floor)" in said
     assert said.endswith("and 2 got worse.")
     ground = next(p for p in summary.phases(cells) if p.name == "ground")
     assert (ground.over, ground.stay, ground.worse) == (2, 2, 2)
@@ -231,7 +244,8 @@ def test_what_got_worse_is_said():
 
 def test_headline_and_ranking_cannot_disagree():
     first, beside = Found("motor_noise", {}), Found("weak_motor", {})
-    said = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")], effects=(first, beside)))
+    said = words.sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")],
+                                     effects=(first, beside)))
     assert said[1] == "Its cause is motor noise (probability 93%), with weak motor beside it."
     good = diagnosis()
     for wrong in ({"effects": (beside, first)}, {"verdict": "none"}, {"verdict": "unknown"}, {"effects": ()},
@@ -244,14 +258,17 @@ def test_probabilities_agree_with_the_verdict():
     chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
     made = agreeing(chance, "unknown")
     assert made == {"wind": 0.2, "mass": 0.1, "none": 0.2, "unknown": 0.5} and agreeing(chance, "mass") == chance
-    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}  # one that was found in stretches of time alone
+    # one that was found in stretches of time alone
+    assert agreeing({"none": 1.0}, "gust") == {"none": 0.0, "gust": 1.0}
 
 
 def test_closing_figures_are_one(flown, tmp_path):
-    """Sentence, JSON and page have one share and one before and after; the calibrated arm, which is the same, is not told again."""
+    """Sentence, JSON and page have one share and one before and after;
+    the calibrated arm, which is the same, is not told again."""
     found = of_flights(flown)
     same = {"before": 4.0, "after": 1.3, "shrink": found.shrink.plain()}
-    found = replace(found, arms={"declared": {"before": 5.0, "after": 2.0, "shrink": Quantity(0.7).plain()}, "calibrated": same})
+    found = replace(found, arms={"declared": {"before": 5.0, "after": 2.0, "shrink": Quantity(0.7).plain()},
+                                 "calibrated": same})
     plain = found.plain()
     assert plain["shrink"] == plain["ranking"][0]["shrink"] and plain["gap"]["before"] == 4.0
     assert "from 4 to 1.3 times the floor" in words.sentences(found)[2]
@@ -270,7 +287,8 @@ def test_terminal_says_what_the_page_says(flown, capsys, monkeypatch):
     found = of_flights(flown)
     gap_show.diagnosis(scores.console(), found)
     out = " ".join(capsys.readouterr().out.split())
-    for part in (*words.sentences(found), "another fits better", "Weigh the <vehicle>.", "airtouch collect --mission hover"):
+    for part in (*words.sentences(found), "another fits better", "Weigh the <vehicle>.",
+                 "airtouch collect --mission hover"):
         assert part in out, part
 
 
@@ -279,8 +297,8 @@ def test_advised_commands_can_be_given():
     from airtouch.crazyflie import mission
 
     for name, effect in EFFECTS.items():
-        values = {p.name: Quantity(p.default * 1.23456789 if p.low <= p.default * 1.23456789 <= p.high and not p.integer else p.default,
-                                   unit=p.unit) for p in effect.parameters}
+        values = {p.name: Quantity(p.default * 1.23456789 if p.low <= p.default * 1.23456789 <= p.high
+                                   and not p.integer else p.default, unit=p.unit) for p in effect.parameters}
         line = advice.switched_on([Found(name, values)], VEHICLE.name)
         given = registry.parse(line.split("--effect ")[1].strip("'"))
         assert given[0] == name and given[1] == pytest.approx({k: q.value for k, q in values.items()}, rel=1e-3)

@@ -45,10 +45,12 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
     felt, logged = flights(rng, 1.0, 2.0)
     response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
     y, w = (x[0] for x in flights(rng, 1.0, 2.0, 1))
-    table = lambda torque: np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
-                                           np.zeros((*torque.shape[:2], COUNT - 6))], axis=2)
+    def table(torque):
+        return np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
+                                               np.zeros((*torque.shape[:2], COUNT - 6))], axis=2)
     nominal, weaker = table(y - w), table(y - 0.5 * w)
-    size = lambda x: np.mean(np.abs(x[:, FIRST_BIN:, TORQUE]) ** 2)
+    def size(x):
+        return np.mean(np.abs(x[:, FIRST_BIN:, TORQUE]) ** 2)
     quiet = response.quiet(w)
     assert quiet.all()
     assert size(weaker) < 0.6 * size(nominal)

@@ -53,8 +53,8 @@ def settings(plant, v):
     plant["height_gain"] *= v["factor"]
 
 
-EFFECT = Effect("stiff_climb", "gain of the height loop", (Parameter("factor", "1", 1.5, 0.2, 5.0, 1.0, "of the gain"),),
-                settings=settings)
+FACTOR = Parameter("factor", "1", 1.5, 0.2, 5.0, 1.0, "of the gain")
+EFFECT = Effect("stiff_climb", "gain of the height loop", (FACTOR,), settings=settings)
 '''
 
 

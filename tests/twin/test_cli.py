@@ -49,7 +49,8 @@ def test_files_are_those_that_simulate_takes(twin):
 def test_report_shows_all_of_it(twin):
     out, _ = twin
     page = (out / "report.html").read_text()
-    for text in ("Can a classifier tell?", "What stays different, largest first", "Around the edges, medians and quartiles",
+    for text in ("Can a classifier tell?", "What stays different, largest first",
+                 "Around the edges, medians and quartiles",
                  "Spectra in free air", "One flight and its twin", "ground_effect.strength"):
         assert text in page
     summary = json.loads((out / "twin.json").read_text())

@@ -42,7 +42,8 @@ def test_heights_and_times_are_those_of_the_mission(made):
 
 
 def test_speed_comes_from_the_log(made):
-    """From velocities to 0.06 m/s in the median (drag holds the drone back by up to 0.1 m/s), from accelerations to 0.08."""
+    """From velocities to 0.06 m/s in the median (drag holds the drone back by up to 0.1 m/s), from accelerations to
+    0.08."""
     apart = []
     for planned, log, _ in made:
         read = course(log)

@@ -36,8 +36,9 @@ def flown(vehicle):
 
 
 def test_height_of_the_platform_comes_back(flown):
-    """Within 8 mm and nearer than the steps of the down range alone; the error near the platform within 1.2 cm of its 1.7 to 2.9."""
-    found = near_range.measure(*zip(*flown))
+    """Within 8 mm and nearer than the steps of the down range alone;
+    the error near the platform within 1.2 cm of its 1.7 to 2.9."""
+    found = near_range.measure(*zip(*flown, strict=True))
     steps = np.array([c.before_m - c.entered_m for c, _ in flown])
     print(found, np.median(steps))
     assert found.top_m == pytest.approx(TOP, abs=0.008)
@@ -48,7 +49,7 @@ def test_height_of_the_platform_comes_back(flown):
 
 
 def test_two_platforms_or_too_few_flights_are_not_measured(flown):
-    courses, shapes = zip(*flown)
+    courses, shapes = zip(*flown, strict=True)
     assert near_range.measure(courses[:3], shapes[:3]) is None
     apart = [replace(c, before_m=c.before_m + 0.1 * (i % 2)) for i, c in enumerate(courses)]
     assert near_range.measure(apart, shapes) is None

@@ -19,7 +19,8 @@ LEAST_SHIFT = 0.9  #: posterior probability of an off-centre weight's side, for 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
     """Whether no flight has a gyro, and both nominal and other ones hover for long enough."""
-    hovers = lambda some: any(np.isfinite(pattern(f, vehicle)).all() for f in some)
+    def hovers(some):
+        return any(np.isfinite(pattern(f, vehicle)).all() for f in some)
     return all(f.rates is None for f in flights) and hovers(nominal) and hovers(flights)
 
 
@@ -85,10 +86,13 @@ def _ranking(names: Sequence[str], first: str, total: Mapping[str, float], famil
     weight = "com_offset" if first == "mass" else "mass"
     if first in ("mass", "com_offset") and weight in chance:
         chance[first], chance[weight] = chance[first] + chance[weight], 0.0
-    why = {weight: f"counted with {first}: a weight, whether its own mass shows or not"} if chance.get(weight) == 0.0 else {}
+    why = {}
+    if chance.get(weight) == 0.0:
+        why[weight] = f"counted with {first}: a weight, whether its own mass shows or not"
     best = max(chance.values())
     return sorted((Ranked(n, chance[n], share[n],
-                          "" if n == first else why.get(n, f"{best / max(chance[n], 1e-12):.3g} times less probable than {first}"))
+                          "" if n == first
+                          else why.get(n, f"{best / max(chance[n], 1e-12):.3g} times less probable than {first}"))
                    for n in names), key=lambda r: (r.name != first, -r.probability))
 
 
@@ -96,10 +100,12 @@ def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis,
             weight: np.ndarray) -> tuple[tuple[float, float], Quantity]:
     """Gap before and after in deviations of the floor, and the share of it that goes, with its interval."""
     apart, spread = (seen - base.mean)[:4], np.sqrt(base.variance[:4])
-    rms = lambda x: float(np.sqrt(np.mean((x / spread) ** 2)))
+    def rms(x):
+        return float(np.sqrt(np.mean((x / spread) ** 2)))
     before, after = rms(apart), rms(apart - weight @ h.change)
     each = np.sqrt((((apart - h.change) / spread) ** 2).mean(axis=1))
-    part = lambda a: float(np.clip((before - a) / max(before - 1.0, 1e-9), 0.0, 1.0)) if before > 1.0 else 0.0
+    def part(a):
+        return float(np.clip((before - a) / max(before - 1.0, 1e-9), 0.0, 1.0)) if before > 1.0 else 0.0
     low, high = _quantile(each, weight, 0.95), _quantile(each, weight, 0.05)
     return (before, after), Quantity(part(after), min(part(low), part(after)), max(part(high), part(after)))
 

@@ -71,8 +71,10 @@ KINDS: dict[str, Kind] = {
     "actuator_delay": Kind("actuator_delay", 0.02, _one("delay")),
     "time_jitter": Kind("time_jitter", 0.01, _one("rms")),
     "packet_loss": Kind("packet_loss", 0.1, _one("share")),
-    "range_step": Kind("range_step", 0.12, lambda s, rng: {"residual": s * float(rng.choice([-1.0, 1.0])), "kick": 0.0}),
+    "range_step": Kind("range_step", 0.12,
+                       lambda s, rng: {"residual": s * float(rng.choice([-1.0, 1.0])), "kick": 0.0}),
     "flow_scale": Kind("flow_scale", 0.3, _one("share")),
-    **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _times(loop)) for loop in ("rate", "attitude", "position",
+    **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _times(loop))
+       for loop in ("rate", "attitude", "position",
                                                                                           "height")},
 }

@@ -149,7 +149,8 @@ def parameters(single: Mapping[str, Any], plain: Mapping[str, Case], first: Mapp
         size = np.sqrt(sum((e["values"][k] - neutral[k]) ** 2 for k in known))
         if not known or size == 0.0:
             continue
-        errors[e["kind"]].append(float(np.sqrt(sum((q["value"] - e["values"][k]) ** 2 for k, q in known.items())) / size))
+        errors[e["kind"]].append(float(np.sqrt(sum((q["value"] - e["values"][k]) ** 2 for k, q in known.items()))
+                                       / size))
         held[e["kind"]] += [q["low"] <= e["values"][k] <= q["high"] for k, q in known.items()]
     every = np.array([x for v in errors.values() for x in v])
     return {"error": _median(every), "coverage": share(x for v in held.values() for x in v),

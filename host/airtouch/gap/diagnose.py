@@ -28,7 +28,8 @@ MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; mor
 AT_FLOOR = 1.0  #: gap that is at its floor
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
-NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as nobody "
+NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
+               "nobody "
                "knows how much of the commanded torque is aliases of a faster loop")
 WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
@@ -185,7 +186,8 @@ def _start(terms: Sequence[Term], chosen: Judged) -> np.ndarray | None:
     """Scaled parameters of mean effects as they were fitted."""
     if not chosen.fits:
         return None
-    return np.concatenate([np.zeros(0), *(t.scaled(t.values) for t in chosen.fits[0].terms if t.kind == candidates.MEAN)])
+    return np.concatenate([np.zeros(0),
+                           *(t.scaled(t.values) for t in chosen.fits[0].terms if t.kind == candidates.MEAN)])
 
 
 def _middle(chosen: Judged) -> np.ndarray | None:

@@ -17,7 +17,8 @@ STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not f
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: one slope each
 PRIOR = (1.0, 1.0)  #: mean and standard deviation of slopes before any flight: errors are a share of what is flown
 STEEPEST = 3.0
-CALMER, HARDER = 0.5, 1.5  #: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted
+#: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted
+CALMER, HARDER = 0.5, 1.5
 ROUNDS = 8
 
 
@@ -48,7 +49,8 @@ def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:
     return 0.5 * np.log1p(cut.var(axis=1).sum(axis=1) / STILL_RAD ** 2)
 
 
-def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray, flat: np.ndarray | bool = False) -> Slopes:
+def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray,
+              flat: np.ndarray | bool = False) -> Slopes:
     """From the power (blocks, bins, COUNT) of what nominal flights leave; NaN where it is not known.
 
     flat (bins, COUNT): where power does not go with hardness, whatever these flights say.

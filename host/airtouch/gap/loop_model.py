@@ -247,7 +247,8 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     k = c.gain * float(row["rate_gain"])
     tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])
     kick = np.ones_like(s)
-    if c.on_error:  # set-points of the outer loop and attitudes come as steps; the log takes the sample on which they do
+    # set-points of the outer loop and attitudes come as steps; the log takes the sample on which they do
+    if c.on_error:
         share = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
         kick = (1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * OUTER_S)) / c.period_s) / share
         tilt = tilt * share / (1.0 + c.integral / s)

@@ -114,8 +114,8 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     notes += [f"{h.parts[0].name}: {n}" for h in found for n in h.notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
-        vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap, maps[0].flights,
-        tuple(f.name for f in nominal), fitted.parameters if fitted else {},
+        vehicle.name, maps[0], tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(maps[0]))), gap,
+        maps[0].flights, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
         _spectra([h.power for h in found], [_command_power(f, vehicle) for f in nominal]),
         _rotors([h.speeds for h in found]), tuple(notes),
         cannot_of([h.cannot for h in found]), tuple(left_out))
@@ -172,7 +172,8 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
         if not slopes.calmest <= middle <= slopes.hardest:
             word, end = ("harder", slopes.hardest) if middle > slopes.hardest else ("calmer", slopes.calmest)
             own, theirs = (np.degrees(STILL_RAD * np.sqrt(np.expm1(2.0 * max(x, 0.0)))) for x in (middle, end))
-            notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, theirs by "
+            notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, "
+                         "theirs by "
                          f"{'at most' if word == 'harder' else 'at least'} {theirs:.1f}): the floor is extrapolated; "
                          "fly the baseline like the test")
     return notes

@@ -39,7 +39,8 @@ class Apparent:
     """One nominal flight held against others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
-    chance; rate: nats a second that a model without names gains; passing_rates: that each effect does that comes and goes.
+    chance; rate: nats a second that a model without names gains; passing_rates: that each effect does that comes and
+    goes.
     """
 
     strengths: Mapping[str, np.ndarray]
@@ -52,8 +53,8 @@ class Apparent:
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose flights a class of
-    the table was measured on.
+    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose flights a
+    class of the table was measured on.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -92,7 +93,8 @@ class Scatter:
 
 
 def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
-    """What the table knows of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
+    """What the table knows of the vehicle's class, or else of the one that the baseline flights fit best, updated by
+    them.
 
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
@@ -114,7 +116,8 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
         scale = math.sqrt(wide)
-        own_rms = [_median(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p, worth)
+        own_rms = [_median(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p,
+                           worth)
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
@@ -174,7 +177,8 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     classes = list(classes)
     names = {n for c in classes for n in c.rms}
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
-    highest = lambda rates: max(rates, key=lambda r: r[0] + r[1])
+    def highest(rates):
+        return max(rates, key=lambda r: r[0] + r[1])
     passing = {n: highest(c.passing_rates[n] for c in classes if n in c.passing_rates)
                for n in sorted({n for c in classes for n in c.passing_rates})}
     return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)

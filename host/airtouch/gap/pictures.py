@@ -63,8 +63,8 @@ class Pictures:
     commands: Mapping[str, Any] = field(default_factory=dict)  #: `measure.command_spectra`
 
 
-def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term], headline: Cell | None,
-       cells: Sequence[Cell]) -> Pictures:
+def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
+       headline: Cell | None, cells: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis: headline is the cell that its answer speaks of."""
     commands = measure.command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
@@ -93,9 +93,10 @@ def _signal(study: Study, flight: Flight, effects: Sequence[Term], cell: Cell) -
     band = BANDS_HZ.index(cell.band_hz) if cell.band_hz in BANDS_HZ else 0
     c = PLACE[cell.channel]
     measured = _measured(flight, c)
-    below = lambda values: None if values is None else _below(flight, values, band)
-    return Signal(flight.name, cell.channel, cell.band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S, flight.phase,
-                  below(measured), below(_left(study, flight)[:, c]),
+    def below(values):
+        return None if values is None else _below(flight, values, band)
+    return Signal(flight.name, cell.channel, cell.band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
+                  flight.phase, below(measured), below(_left(study, flight)[:, c]),
                   below(_left(study, flight, active)[:, c]) if active else None, cell.floor)
 
 

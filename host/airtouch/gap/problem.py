@@ -43,7 +43,8 @@ class Problem:
     """Blocks flattened to one array: rows are (block, bin, channel) values that count."""
 
     def __init__(self, data: Data, part: Part) -> None:
-        self.data, self.part = weakref.proxy(data), part  # the data keeps its problems: no cycle, no garbage to wait for
+        # the data keeps its problems: no cycle, no garbage to wait for
+        self.data, self.part = weakref.proxy(data), part
         self._constant: list[tuple[np.ndarray, float]] | None = None
         self.keep = {r: judged(r) for r in (AIR, REST)}
         for keep in self.keep.values():

@@ -86,7 +86,10 @@ class Response:
         return out
 
     def added(self, quiet: np.ndarray, sensed: bool) -> np.ndarray:
-        """Power (blocks, bins, 3) that a random torque of unit power adds; 1 in the means. sensed: on the gyro alone."""
+        """Power (blocks, bins, 3) that a random torque of unit power adds; 1 in the means.
+
+        sensed: on the gyro alone.
+        """
         made = [np.ones(self.usual.shape) if law is None else
                 law.weight ** 2 * (1.0 if sensed else np.abs(law.outside) ** 2) for law in (self.steady, self.stepped)]
         out = np.nan_to_num(np.where(quiet[:, None], *made), nan=1.0)  # no law: such blocks do not count

@@ -34,7 +34,8 @@ class Found:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate: its probability, the share of the gap that it takes away on held-out data, and why it is not the answer."""
+    """A candidate: its probability, the share of the gap that it takes away on held-out data, and why it is not the
+    answer."""
 
     name: str
     probability: float
@@ -84,7 +85,8 @@ class GapMap:
 
 @dataclass(frozen=True)
 class Step:
-    """What to do next: a sentence, the command that does it, the heading of a page that says how; "" where there is none."""
+    """What to do next: a sentence, the command that does it, the heading of a page that says how;
+    "" where there is none."""
 
     text: str
     command: str = ""
@@ -123,8 +125,10 @@ class Diagnosis:
     vehicle: str = ""
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
-    pictures: Any = field(default=None, repr=False, compare=False)  #: `gap.pictures.Pictures`, where they were asked for
-    held: Any = field(default=None, repr=False, compare=False)  #: study and calibration, to diagnose further flights alike
+    #: `gap.pictures.Pictures`, where they were asked for
+    pictures: Any = field(default=None, repr=False, compare=False)
+    #: study and calibration, to diagnose further flights alike
+    held: Any = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Verdict, effects and ranking say one thing: ValueError where they do not."""

@@ -48,7 +48,8 @@ def stands_out(cell: Cell) -> bool:
 
 
 def stays(cell: Cell) -> bool:
-    """Whether the cell stands out with the named effects in the model: its interval, moved with it, above the floor's."""
+    """Whether the cell stands out with the named effects in the model:
+    its interval, moved with it, above the floor's."""
     if cell.after is None:
         return stands_out(cell)
     low = cell.after * (1.0 if cell.low is None else cell.low / max(cell.gap, 1e-12))

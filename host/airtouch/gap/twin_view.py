@@ -113,7 +113,8 @@ class TwinView:
         return np.log(self.twin.ratio(after) / self.twin.ratio(before))
 
     def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood for k parameters, each of which lets the log power `rise`."""
+        """Gradient (k,) and information (k, k) of the likelihood for k parameters, each of which lets the log power
+        `rise`."""
         k = len(rise)
         gradient, information = np.zeros(k), np.zeros((k, k))
         if not rise.any():
@@ -141,7 +142,8 @@ class TwinView:
         return total
 
     def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Log of the floor's correction (bins, axes), its cost, weight of all blocks, covariance of the shapes' amounts."""
+        """Log of the floor's correction (bins, axes), its cost, weight of all blocks, covariance of the shapes'
+        amounts."""
         e0 = np.abs(s) ** 2 / (self.twin.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
         spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))

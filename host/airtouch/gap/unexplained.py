@@ -45,7 +45,8 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
         begin = starts(flight, AIR)
         out.append({"channel": cell.channel, "band_hz": list(cell.band_hz), "phase": cell.phase, "flight": flight.name,
                     "from_s": float(begin[first] * PERIOD_S), "to_s": float((begin[last] + LENGTH[AIR]) * PERIOD_S),
-                    "over_floor": float(ratio[first:last + 1].max()), "follows": _follows(study, over), "nearest": near})
+                    "over_floor": float(ratio[first:last + 1].max()), "follows": _follows(study, over),
+                    "nearest": near})
     return out
 
 
@@ -79,11 +80,13 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
         before = selection.steps[selection.steps.index(step) - 1].gain
         return f"named beside {first}: adds {step.gain - before:.0f} nats to it; the probability is that it acts alone"
     if name == "unknown":
-        return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} may be left"
+        return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} "
+                "may be left"
                 if selection.explained else "the gap as a whole is at its floor")
     if name == "none":
         return (f"{first} gains {selection.chosen.gain:.0f} nats over it" if selection.chosen else
-                f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be left")
+                f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
+                "left")
     return fails(selection, selection.singles[name])
 
 

@@ -26,7 +26,8 @@ def _where(diagnosis: Diagnosis) -> str:
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     spread = len({c.phase for c in summary.same_place(cells, one)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND})
-    return (f"The gap lies mostly in {CHANNEL_WORDS[one.channel]} at {band_in_words(one)}: {PHASE_WORDS[one.phase]} it is "
+    return (f"The gap lies mostly in {CHANNEL_WORDS[one.channel]} at {band_in_words(one)}: {PHASE_WORDS[one.phase]} it "
+            "is "
             f"{short(one.gap)} {one.unit}, {short(ratio(one))} times the floor"
             + (f", and it stands out in {spread} of {flown} phases in the air." if flown > 1 else "."))
 
@@ -40,7 +41,8 @@ def _which(diagnosis: Diagnosis) -> str:
         return (f"No known effect explains it (probability {chance})"
                 + (f"; the nearest is {plain(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
-    if diagnosis.headline is not None and diagnosis.headline.after is not None and not summary.closes(diagnosis.headline):
+    cell = diagnosis.headline
+    if cell is not None and cell.after is not None and not summary.closes(cell):
         said = f"The effect named, {first} (probability {chance}), does not close this cell"
         return said + (f", nor does {joined(others)} beside it." if others else ".")
     return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
@@ -69,7 +71,8 @@ def _how_far(diagnosis: Diagnosis) -> str:
         more = f"; {len(left)} of {over} cells still stand out, the largest {_after_in_words(left[0])}"
     if bad:
         more += f", and {len(bad)} got worse"
-    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the floor on data "
+    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
+            "floor on data "
             f"held out, from {short(before)} to {short(after)} times the floor{more}.")
 
 
@@ -109,7 +112,8 @@ def open_in_words(entry: Mapping[str, Any]) -> str:
     """`lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv; follows height`."""
     low, high = entry["band_hz"]
     follows = f"; follows {joined(list(entry['follows']))}" if entry["follows"] else ""
-    return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to {entry['over_floor']:.1f} times the "
+    return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to "
+            f"{entry['over_floor']:.1f} times the "
             f"floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of {Path(entry['flight']).name}{follows}")
 
 

@@ -38,7 +38,8 @@ class Course:
     before_s: to the entry; over_s: to the exit; stop_s: to the end of the forward flight; after_s: from the exit to
     the landing. speed_mps: of the velocity step; speed_from: "stated",
     "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated. pulse_s: period of
-    velocity pulses in the hover, 0: none. top_m: height of the platform where other flights tell it (`near_range`), 0: not known.
+    velocity pulses in the hover, 0: none. top_m: height of the platform where other flights tell it (`near_range`), 0:
+    not known.
     """
 
     source: str
@@ -118,8 +119,8 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     over = (leave.sample - entry.sample) / RATE_HZ
     clearance = float(np.median(down[entry.sample + min(20, int(30 * over)):leave.sample - 3]))
     before = float(np.median(down[max(entry.sample - 30, level):entry.sample - 4]))
-    return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ, (step - level) / RATE_HZ,
-                  (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
+    return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ,
+                  (step - level) / RATE_HZ, (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
                   (landing - leave.sample) / RATE_HZ, speed,
                   "stated" if speed_mps is not None else how, angle_deg or 0.0, start, level, step,
                   entry.sample, leave.sample, landing, pulses.period(log, level, step))

@@ -29,8 +29,8 @@ def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: fl
     """The values (KEYS) with which the simulator flies a course: m, s, m/s, degrees.
 
     The edges are put where the recorded flight, at its speed and with the same rise, crossed them. The
-    platform's height is the course's own where it is known; else it follows from the readings on both sides of the entry,
-    less the error that `effects` give the down range. height_m: added to the set height, for a simulator that
+    platform's height is the course's own where it is known; else it follows from the readings on both sides of the
+    entry, less the error that `effects` give the down range. height_m: added to the set height, for a simulator that
     flies higher than it is told. pulse_mps: of the pulses in the hover, where the course has some.
     """
     clearance = max(course.before_m - course.top_m if course.top_m else
@@ -64,7 +64,10 @@ def true_distance(reading_m: float, bias: Mapping[str, Any]) -> float:
 
 def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME,
           **mission: float) -> dict[str, Any]:
-    """A scenario's table: each flight draws one of the courses and flies it with these effects. mission: as of `drawn`."""
+    """A scenario's table: each flight draws one of the courses and flies it with these effects.
+
+    mission: as of `drawn`.
+    """
     return {
         "name": name,
         "summary": f"{len(courses)} recorded courses, flown again.",

@@ -1,8 +1,8 @@
 """How high the platform is, and what the down range reads close to it: from dead-reckoned height around the edges.
 
-A reading close to a surface is too small, so that the step of the down range at an edge alone gives neither. Before an entry and
-behind an exit the floor is below and the reading is right; from there on the vertical acceleration, integrated
-twice, carries the height over the floor on for some tenths of a second.
+A reading close to a surface is too small, so that the step of the down range at an edge alone gives neither. Before an
+entry and behind an exit the floor is below and the reading is right; from there on the vertical acceleration,
+integrated twice, carries the height over the floor on for some tenths of a second.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,10 @@ FEWEST = 4  #: flights
 
 @dataclass(frozen=True)
 class NearRange:
-    """top_m: height of the platform over the floor. A reading at the distance d is d + near exp(-d / fade), delay s late."""
+    """top_m: height of the platform over the floor.
+
+    A reading at the distance d is d + near exp(-d / fade), delay s late.
+    """
 
     top_m: float
     near: float
@@ -39,8 +42,9 @@ class NearRange:
 def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRange | None:
     """The platform of these flights, None where their steps are of more than one platform or they are too few.
 
-    channels: (n, 12) of each flight, as `channels.channels`. Nonlinear least squares over all flights with one platform,
-    one bias curve and one delay. On simulated flights the height comes out up to 8 mm too large, the error too small.
+    channels: (n, 12) of each flight, as `channels.channels`. Nonlinear least squares over all flights with one
+    platform, one bias curve and one delay. On simulated flights the height comes out up to 8 mm too large, the error
+    too small.
     """
     steps = np.array([c.before_m - c.entered_m for c in courses])
     if len(courses) < FEWEST or np.ptp(np.percentile(steps, (10, 90))) > ALIKE_M:
@@ -48,7 +52,7 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
     parts = [part for c, x in zip(courses, channels, strict=True) for part in _around(c, x)]
     if not parts:
         return None
-    height, climb, reading, std = map(np.concatenate, zip(*parts))
+    height, climb, reading, std = map(np.concatenate, zip(*parts, strict=True))
 
     def residual(p: np.ndarray) -> np.ndarray:
         true = np.maximum(height - p[3] * climb - p[0], 0.0)
@@ -62,8 +66,8 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
 
 
 def _around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
-    """For each edge: (m,) height over the floor in m, its slope in m/s, down range in m, and the scatter of their difference,
-    as if each edge were one measurement."""
+    """For each edge: (m,) height over the floor in m, its slope in m/s, down range in m, and the scatter of their
+    difference, as if each edge were one measurement."""
     down, dt = 0.01 * x[:, ch.DOWN], 1.0 / RATE_HZ
     gained = np.cumsum(np.cumsum(x[:, ch.AZ] - np.median(x[course.free, ch.AZ]))) * dt * dt
     t = np.arange(len(x)) * dt

@@ -1,7 +1,7 @@
 """Short velocity set-points that a script sends at regular times while the drone hovers, read off the motors.
 
-The authors' pilot program sent one of about 20 ms each 0.52 s in hover: a jump of the motors' pitch command and 20 deg/s
-of pitch rate. Without them a simulated hover is calmer than the recorded one just where a platform's edge shows.
+The authors' pilot program sent one of about 20 ms each 0.52 s in hover: a jump of the motors' pitch command and 20
+deg/s of pitch rate. Without them a simulated hover is calmer than the recorded one just where a platform's edge shows.
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ from airtouch.reference.finite import hold_finite
 PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: motors 1 to 4
 PERIODS_S = np.arange(0.30, 1.0, 0.002)
 LEAST_PULSES = 4
-#: standard errors of the mean jump; of the authors' flights (folds 0 to 2) those with pulses have 7.5 or more, all at 0.52 s,
-#: the others 6.5 or less
+#: standard errors of the mean jump; of the authors' flights (folds 0 to 2) those with pulses have 7.5 or more, all at
+#: 0.52 s, the others 6.5 or less
 CLEAR = 7.0
 CLIP = 10.0  #: robust standard deviations: larger jumps (kicks of a set-point step) count as that
 RATE_HZ = 100.0

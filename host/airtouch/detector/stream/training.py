@@ -70,7 +70,7 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
             _keep(kept, state, rng, step + 1)
         if (step + 1) % 50 == 0:
             progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
-    for variable, mask in zip(model.trainable_variables, masks):
+    for variable, mask in zip(model.trainable_variables, masks, strict=True):
         variable.assign(variable * mask)
     if kept:
         kept.unlink(missing_ok=True)
@@ -88,7 +88,8 @@ def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
     return model, optimizer, masks, learn
 
 
-@lru_cache(maxsize=4)  # all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
+# all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
+@lru_cache(maxsize=4)
 def _compiled(recipe: Recipe) -> tuple:
     """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning.
 
@@ -113,8 +114,8 @@ def _compiled(recipe: Recipe) -> tuple:
             loss = tf.nn.sigmoid_cross_entropy_with_logits(y, model(x, training=True))[:, scored:]
             loss = tf.reduce_mean(tf.reduce_sum(loss * weight, -1))
         gradient = tape.gradient(loss, model.trainable_variables)
-        optimizer.apply_gradients(zip(gradient, model.trainable_variables))
-        for variable, mask in zip(model.trainable_variables, masks):
+        optimizer.apply_gradients(zip(gradient, model.trainable_variables, strict=True))
+        for variable, mask in zip(model.trainable_variables, masks, strict=True):
             variable.assign(variable * mask)
         return loss
 
