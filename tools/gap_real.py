@@ -158,8 +158,9 @@ def show(cases: list[dict]) -> None:
     table = defaultdict(lambda: defaultdict(int))
     for c in cases:
         kind = f"{c['row']}, {c['condition']}" if c["row"] == "swarm" else c["row"]
-        table[kind, "any effect" if c["row"] == "peers" else c["truth"]]["right" if c["row"] == "peers"
-                                                                        and answer(c) == c["truth"] else answer(c)] += 1
+        peers = c["row"] == "peers"
+        said = "right" if peers and answer(c) == c["truth"] else answer(c)
+        table[kind, "any effect" if peers else c["truth"]][said] += 1
     print("| flights | truth | right | every answer |\n|---|---|---|---|")
     for (row, truth), answers in sorted(table.items()):
         n, hits = sum(answers.values()), answers["right" if row == "peers" else truth]

@@ -42,8 +42,8 @@ def groups(folder: Path) -> Iterator[tuple[str, str, str, Vehicle, list[Log]]]:
     made = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in ("0", "1", "2"):
-            made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(_read(folder / "airtouch"
-                                                                                        / r["file"]))
+            log = _read(folder / "airtouch" / r["file"])
+            made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(log)
     flown = vehicles.load("crazyflie-2.1-flow")
     for key, files in made.items():
         yield "crazyflie, flow deck, radio log", "the authors'", " ".join(key), flown, files
@@ -58,9 +58,8 @@ def groups(folder: Path) -> Iterator[tuple[str, str, str, Vehicle, list[Log]]]:
     flown = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
         logs = blind.nominal(flown, blind.CAL_FIRST, blind.CAL, seed)
-        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, [(f"simulated {seed} {i}",
-                                                                                  lambda log=log: log)
-                                                   for i, log in enumerate(logs)]
+        named = [(f"simulated {seed} {i}", lambda log=log: log) for i, log in enumerate(logs)]
+        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, named
 
 
 def _read(path: Path) -> Log:

@@ -143,8 +143,8 @@ def test_a_log_without_a_sensor_is_served_by_the_spare_and_scored_with_its_lag(s
 def test_the_note_has_the_measured_figures():
     whole, without = sensor_note.figures()["all"], sensor_note.figures()["acceleration"]
     text = sensor_note.note(("acceleration",))
-    assert text.index(f"{without['missed']:.1%} missed of {without['edges']}") < text.index(f"{whole['missed']:.1%} "
-                                                                                            "missed of")
+    first = text.index(f"{without['missed']:.1%} missed of {without['edges']}")
+    assert first < text.index(f"{whole['missed']:.1%} missed of")
     assert "\n" not in text
     assert not sensor_note.note(())
     assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}

@@ -64,8 +64,8 @@ def test_what_only_xpulp_has(call, machine):
     assert call("largest", 0x80_7F_FF_01, 0x7F_80_00_02).values[0] == 0x7F_7F_00_02
     assert call("pack", 0x11, 0x22, 0xFFFFFF33, 0x44).values[0] == 0x44_33_22_11
     assert [signed(call("half", value).values[0]) for value in (3, -3, -2, 0)] == [2, -1, -1, 0]
-    assert [signed(call("rounded", value, -1 if value < 0 else 0, 2).values[0]) for value in (6, 5, -6, -7)] == [2, 1,
-                                                                                                                 -2, -2]
+    rounded = [signed(call("rounded", value, -1 if value < 0 else 0, 2).values[0]) for value in (6, 5, -6, -7)]
+    assert rounded == [2, 1, -2, -2]
     assert [signed(call("clamp", value, -5, 9).values[0]) for value in (-70, 3, 70)] == [-5, 3, 9]
 
 

@@ -62,8 +62,8 @@ def mission(case: Case) -> Scenario:
 def kept(one: Flown) -> tuple[float, float]:
     """Least and greatest true height over the floor between take-off and landing, m."""
     t = one.table[:, 0]
-    cruise = one.table[(t >= SETTLED_S) & (t < t[-1] - LAND_S), 3] if one.ending == "ok" else one.table[t >= SETTLED_S,
-                                                                                                        3]
+    landing = t[-1] - LAND_S if one.ending == "ok" else np.inf
+    cruise = one.table[(t >= SETTLED_S) & (t < landing), 3]
     return (float(cruise.min()), float(cruise.max())) if len(cruise) else (np.nan, np.nan)
 
 

@@ -34,8 +34,8 @@ COMMANDS = {
 class Suggesting(click.Group):
     """A group that names the nearest commands of a name that it does not know."""
 
-    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None,
-                                                                            list[str]]:
+    def resolve_command(self, ctx: click.Context,
+                        args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
             ctx.fail(f"No such command {args[0]!r}{nearest(args[0], self.list_commands(ctx))}.")
         return super().resolve_command(ctx, args)

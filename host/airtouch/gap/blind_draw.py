@@ -75,6 +75,5 @@ KINDS: dict[str, Kind] = {
                        lambda s, rng: {"residual": s * float(rng.choice([-1.0, 1.0])), "kick": 0.0}),
     "flow_scale": Kind("flow_scale", 0.3, _one("share")),
     **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _times(loop))
-       for loop in ("rate", "attitude", "position",
-                                                                                          "height")},
+       for loop in ("rate", "attitude", "position", "height")},
 }

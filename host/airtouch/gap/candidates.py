@@ -24,7 +24,8 @@ _FREE = {
     "imu_bias": ("acc_x", "acc_y", "acc_z", "gyro_x", "gyro_y", "gyro_z"), "imu_noise": ("factor",),
     "vibration": ("amplitude",), "sensor_latency": ("delay",), "actuator_delay": ("delay",),
     "time_jitter": ("rms",), "packet_loss": ("share",), "range_step": ("residual", "kick"),
-    "flow_scale": ("share", "transient"), "downwash": ("strength",), "controller_gain": ("rate", "attitude", "position", "height"),
+    "flow_scale": ("share", "transient"), "downwash": ("strength",),
+    "controller_gain": ("rate", "attitude", "position", "height"),
 }
 _KIND = {"gust": SPECTRUM, "motor_noise": SPECTRUM, "imu_noise": SPECTRUM, "vibration": SPECTRUM,
          "time_jitter": CLOCK, "packet_loss": CLOCK}
@@ -204,7 +205,10 @@ def _unsteady(name: str) -> Term:
 
 
 def telling(terms: Sequence[Term]) -> Term:
-    """The term of an effect whose strength says how much of it there is: its random part, where it is only tried with that."""
+    """The term of an effect whose strength says how much of it there is.
+
+    It is the random part, where the effect is only tried with that.
+    """
     return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 

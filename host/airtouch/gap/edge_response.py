@@ -167,8 +167,8 @@ def _place(flight: Flight) -> tuple[float, float, float, float]:
         speed = float(np.hypot(*v.mean(axis=0)))
     seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else 2.5
     speed = float(np.clip(speed, 0.1, 0.9))
-    return round(high, 1), round(max(low, 0.01), 2), round(speed, 1), round(float(np.clip(seconds * speed, 0.4, 2.0)),
-                                                                            1)
+    length = float(np.clip(seconds * speed, 0.4, 2.0))
+    return round(high, 1), round(max(low, 0.01), 2), round(speed, 1), round(length, 1)
 
 
 def calm(vehicle: Vehicle) -> Vehicle:

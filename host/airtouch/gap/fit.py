@@ -155,10 +155,9 @@ class Slopes:
         self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
 
     def take(self, x: np.ndarray, anew: bool = False) -> None:
-        """Take them at scaled parameters x (k,): all of them where x lies far from where they were taken, or as told; always
+        """Take them at scaled parameters x (k,).
 
-        those that bend.
-        """
+        All of them where x lies far from where they were taken, or as told; always those that bend."""
         anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
         moved = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
         if not len(moved):
@@ -178,7 +177,7 @@ class Slopes:
 
     def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
                  ) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood by what the parameters x (k,) do to the expected power.
+        """Gradient (k,) and information (k, k) of the likelihood, by the change of the expected power with x (k,).
 
         values, added: what is left, and the power over the floor, flattened.
         """
@@ -207,7 +206,8 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     close = np.array([t.name in LOOP for t in mean for _ in t.free], bool)
     spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
     prior = np.concatenate([spread, [p for _, p in constants]])
-    push = lambda o: sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
+    def push(o):
+        return sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
         return x, offsets, covariance, problem.base

@@ -98,7 +98,8 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     if not log.has("zrange_m"):
         cannot.append("no down range: range steps and flow scale cannot be seen; the floor is taken as flat, and the "
                       "height over it comes from z_m" if log.has("z_m") else
-                      "no down range: ground effect, range steps and flow scale cannot be seen (z_m would do for the first)")
+                      "no down range: ground effect, range steps and flow scale cannot be seen (z_m would do for the "
+                      "first)")
     elif not true_edges(log, PLATFORM_STEP_M):
         cannot.append("no edge crossed: range steps and flow scale cannot be seen")
     if not log.has("vx_mps", "vy_mps"):

@@ -44,7 +44,8 @@ def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
     step = unit.values[term.free[0]] - neutral
     scale = growth(term, (term.values[term.free[0]] - neutral) / step)
     if term.gate:
-        return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()} for i, f in enumerate(cache[key])]
+        return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()}
+                for i, f in enumerate(cache[key])]
     return [{r: scale * v for r, v in f.items()} for f in cache[key]]
 
 
@@ -132,7 +133,8 @@ def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndar
     out = {}
     for r in shape:
         f = frequencies(r)
-        density = lambda g: 4.0 * tau / (1.0 + (2.0 * np.pi * tau * g) ** 2)
+        def density(g):
+            return 4.0 * tau / (1.0 + (2.0 * np.pi * tau * g) ** 2)
         aliases = (f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f)
         folded = np.repeat(sum(density(g) for g in aliases)[:, None], 4, axis=1)
         folded[:, 1:] = sum(density(g) * np.sinc(g * PERIOD_S) ** 2 for g in aliases)[:, None]  # the gyro's differences

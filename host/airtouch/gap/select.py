@@ -38,7 +38,8 @@ UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectr
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
-WORTH_AGAIN = 0.25  #: of what the first effect must gain, below which a candidate is not judged again beside a deviation
+#: of what the first effect must gain, below which a candidate is not judged again beside a deviation
+WORTH_AGAIN = 0.25
 STRETCHED = 0.999  #: of a parameter's bound, from which it is at it
 HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
 FULL = 5  #: candidates that are fitted in full, after a first look at all
@@ -97,8 +98,12 @@ class Selection:
 
     @property
     def named(self) -> tuple[Judged, ...]:
-        """The steps whose effects are named, what adds most to the others first; what the log has done to itself is last."""
-        of_the_log = lambda s: any(t.name == s.name and t.kind == CLOCK for t in s.terms)
+        """The steps whose effects are named, what adds most to the others first.
+
+        What the log has done to itself is last.
+        """
+        def of_the_log(s):
+            return any(t.name == s.name and t.kind == CLOCK for t in s.terms)
         return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (of_the_log(s), -s.share)))
 
     @property
@@ -108,7 +113,8 @@ class Selection:
         if not names:
             return None
         names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
-        own = lambda terms: tuple(t for t in terms if t.name in names)
+        def own(terms):
+            return tuple(t for t in terms if t.name in names)
         return replace(self.whole, terms=own(self.whole.terms),
                        fits=tuple(replace(f, terms=own(f.terms)) for f in self.whole.fits))
 
@@ -176,11 +182,12 @@ def _steps(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[float]]
            candidates: Mapping[str, Sequence[Hypothesis]], singles: Mapping[str, Judged], least: Mapping[str, float],
            passing: Judged | None, progress: Callable[[str], None],
            ) -> tuple[Mapping[str, Judged], Mapping[str, float], list[Judged]]:
-    """Effects added one by one, after one that comes and goes where there is such: candidates, what each needs, steps."""
+    """Candidates, what each needs, and steps: effects added one by one, after one that comes and goes, if any."""
     steps: list[Judged] = []
     tried, need = singles, least
     if passing is not None:
-        steps, least = [passing], {**least, passing.name: data.study.scatter.passing(passing.name, _seconds(data), LEAST_GAIN)}
+        needed = data.study.scatter.passing(passing.name, _seconds(data), LEAST_GAIN)
+        steps, least = [passing], {**least, passing.name: needed}
         singles = {**singles, passing.name: passing}
         tried, need = _beside(data, parts, base, screen, candidates, steps, singles, progress)
     while sum(s.named for s in steps) < MOST_EFFECTS:
@@ -213,7 +220,8 @@ def _gain_without(data: Data, parts: tuple[Part, Part], base: Sequence[Sequence[
                   dropped: Judged) -> float:
     """Gain of the last step's hypothesis without one of its effects, the others fitted anew."""
     last, place = steps[-1], [s.name for s in steps].index(dropped.name)
-    own = lambda t: t.name == dropped.name or t.companion and t.name == COMPANIONS.get(dropped.name)
+    def own(t):
+        return t.name == dropped.name or t.companion and t.name == COMPANIONS.get(dropped.name)
     keep = [t for t in last.terms if not own(t)]
     gain = sum(clock_gain(data, t)[1] for t in keep if t.kind == CLOCK)
     others = [t for t in keep if t.kind != CLOCK]
@@ -333,7 +341,10 @@ def needed(data: Data, terms: Sequence[Term]) -> float:
 
 
 def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
-    """Held-out log likelihood that a further effect must gain: more beside one that gains much, no model being exact."""
+    """Held-out log likelihood that a further effect must gain.
+
+    It is more beside one that gains much, as no model is exact.
+    """
     names = {t.name for t in held.terms}
     new = [t for t in more.terms if t.name not in names]
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
@@ -512,7 +523,8 @@ def _strength(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[
     how far they lie from it.
     """
     every = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
-    own = lambda t: (t.name, t.kind, t.values.get("rotor"))
+    def own(t):
+        return (t.name, t.kind, t.values.get("rotor"))
     same = [next(t for t in terms if own(t) == own(term)) for terms in every]
     k = len(term.free)
     strength = term.among_all(np.mean([t.scaled(t.values)[:k] for t in same], axis=0))

@@ -104,8 +104,8 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
     """The floor of flights declared nominal, from what the calibrated model leaves of them.
 
     residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first samples and the spectra;
-    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of its
-    difference), below which the floor never goes.
+    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of
+    its difference), below which the floor never goes.
     """
     power, count, slopes = {}, {}, None
     for regime in (AIR, REST):
@@ -115,7 +115,8 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
         if len(every) >= 4:
             each = np.abs(every) ** 2
             if regime == AIR:
-                hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR]) for f, s in zip(flights, first, strict=True)])
+                hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR])
+                                           for f, s in zip(flights, first, strict=True)])
                 trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= 3)
                 slopes = slopes_of(each, hardness, frequencies(AIR), trim)
                 each = each / slopes.level(hardness)

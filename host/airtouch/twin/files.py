@@ -34,8 +34,8 @@ def scenario_text(courses: Sequence[Course], effects: Mapping[str, Any], name: s
 
 
 def write(out: Path, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, courses: Sequence[Course],
-          fixed: Mapping[str, Any] | None = None, *, name: str = missions.NAME, force: bool = False) -> tuple[Path,
-                                                                                                              Path]:
+          fixed: Mapping[str, Any] | None = None, *, name: str = missions.NAME,
+          force: bool = False) -> tuple[Path, Path]:
     """Write both files into a folder; each is read back as a check. Raises AirTouchError where one exists."""
     craft = replace(lever_set.craft(vehicle, levers, values), name=name)
     texts = {VEHICLE: vehicle_text(craft),
