@@ -23,10 +23,10 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap import blind, calibrate, measure, nominal_scatter
+from airtouch.gap.apparent import apparent
 from airtouch.gap.data import Data
 from airtouch.gap.flight import Flight
 from airtouch.gap.nominal_scatter import Apparent, Scatter, measured
-from airtouch.gap.select import apparent
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle

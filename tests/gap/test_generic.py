@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap import candidates, clock, fit, generic
 from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
-from airtouch.gap.select import halves
+from airtouch.gap.judging import halves
 from airtouch.simulation import effects
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench

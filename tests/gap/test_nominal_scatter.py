@@ -12,7 +12,8 @@ from airtouch.simulation.effects import EFFECTS
 
 def drawn(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[Apparent]:
     return [Apparent({k: rng.normal(size=len(v)) * v for k, v in rms.items()},
-                     {k: 1e-6 + 0.0 * v for k, v in rms.items()}, float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
+                     {k: 1e-6 + 0.0 * v for k, v in rms.items()},
+                     float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
 
 
 SHARED = {n for group, _ in TWINS for n in group}  #: names of one thing, which have one scatter
@@ -55,8 +56,8 @@ def test_recorded_flights_of_a_vehicle_in_the_table_are_of_its_class():
     odd = drawn(rng, {k: v for k, v in other.rms.items() if v.min() > 0.05}, 2)  # they look like the other vehicle's
     assert scatter_of(odd, True, "ns-34g").freedom == scatter_of(odd, True, "of nobody").freedom
     beyond = set(one.rms) - set(odd[0].strengths) - SHARED
-    assert all(np.array_equal(scatter_of(odd, True, "ns-34g").rms[k], np.maximum(one.rms[k], LEAST_RECORDED))
-               for k in beyond)
+    own = scatter_of(odd, True, "ns-34g").rms
+    assert all(np.array_equal(own[k], np.maximum(one.rms[k], LEAST_RECORDED)) for k in beyond)
     assert any(not np.array_equal(scatter_of(odd, True).rms[k], np.maximum(one.rms[k], LEAST_RECORDED)) for k in beyond)
 
 
@@ -69,8 +70,8 @@ def test_names_of_one_thing_scatter_alike():
 def test_a_baseline_without_a_loss_says_little_of_other_days():
     none = Apparent({"packet_loss": np.zeros(1)}, {"packet_loss": np.zeros(1)}, 0.0)
     of_class = next(c for c in table().values() if c.vehicle == "ns-34g").rms["packet_loss"]
-    lost = scatter_of([none] * 3, True, "ns-34g").rms["packet_loss"]
-    assert lost == pytest.approx(np.maximum(of_class, LEAST_RECORDED))
+    got = scatter_of([none] * 3, True, "ns-34g").rms["packet_loss"]
+    assert got == pytest.approx(np.maximum(of_class, LEAST_RECORDED))
 
 
 def test_many_baseline_flights_outweigh_the_table():
@@ -122,8 +123,8 @@ def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():
 
 def test_a_parameter_of_which_no_flight_tells_scatters_as_the_effect_s_others():
     rng = np.random.default_rng(7)
-    flights = [Apparent({"wind": np.array([rng.normal(), 0.0])}, {"wind": np.array([0.01, 1e6])}, 1.0)
-               for _ in range(60)]
+    error = {"wind": np.array([0.01, 1e6])}
+    flights = [Apparent({"wind": np.array([rng.normal(), 0.0])}, error, 1.0) for _ in range(60)]
     known, unknown = measured(flights).rms["wind"]
     assert known == pytest.approx(1.0, rel=0.25)
     assert 0.3 < unknown < 3.0

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, edge_response, fit, flight, loop_model, select, twin
+from airtouch.gap import calibrate, edge_response, fit, flight, judging, loop_model, twin
 from airtouch.gap.candidates import terms
 from airtouch.gap.data import Data
 from airtouch.simulation import scenario
@@ -39,7 +39,7 @@ def study():
 def found(study, flights, name):
     """Held-out gain and the mean of the two halves' fitted values, of the effect's best variant."""
     data = Data(study, flights)
-    halves = select.halves(data)
+    halves = judging.halves(data)
     best = (-np.inf, {})
     for term in terms(name):
         gain, values = 0.0, []
@@ -113,7 +113,7 @@ def test_flow_scale_is_found_at_edges(study):
 @pytest.mark.parametrize("name", ["sensor_latency", "controller_gain", "range_step", "flow_scale"])
 def test_nominal_flights_give_nothing(study, name):
     for k in range(3):
-        assert found(study, flown("paper-mixed", 1, seed=20 + k), name)[0] < select.FIRST_GAIN
+        assert found(study, flown("paper-mixed", 1, seed=20 + k), name)[0] < judging.FIRST_GAIN
 
 
 def test_without_edges_range_step_changes_nothing(study):

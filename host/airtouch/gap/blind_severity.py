@@ -17,10 +17,10 @@ from scipy.stats import norm
 from airtouch.gap import candidates, measure
 from airtouch.gap.blind_draw import KINDS, Kind
 from airtouch.gap.candidates import CLOCK, Term
+from airtouch.gap.clock import clock_gain
 from airtouch.gap.data import Data, Study
 from airtouch.gap.fit import judge
 from airtouch.gap.problem import whole_of
-from airtouch.gap.select import clock_gain
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
 from airtouch.simulation.effects import Active

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.gap import twin
+from airtouch.gap.apparent import apparent
 from airtouch.gap.candidates import Term, terms
 from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.data import Data, Study
@@ -24,7 +25,6 @@ from airtouch.gap.nominal_scatter import scatter_of
 from airtouch.gap.problem import whole_of
 from airtouch.gap.response import Response, response_of
 from airtouch.gap.result import Quantity
-from airtouch.gap.select import apparent
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare

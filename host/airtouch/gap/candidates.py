@@ -205,10 +205,7 @@ def _unsteady(name: str) -> Term:
 
 
 def telling(terms: Sequence[Term]) -> Term:
-    """The term of an effect whose strength says how much of it there is.
-
-    It is the random part, where the effect is only tried with that.
-    """
+    """The term of an effect whose strength says how much of it there is: its random part where it shakes."""
     return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 

@@ -105,8 +105,8 @@ def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray
                                                       for pair in zip(data.flights, data.first, strict=True)])
 
 
-def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray],
-            active: Sequence[Active]) -> dict[str, np.ndarray]:
+def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], active: Sequence[Active],
+            ) -> dict[str, np.ndarray]:
     rest = residual(flight, data.study.vehicle, (*data.study.calibration, *active))
     rest = held(np.where(flight.bridged[:, None], np.nan, rest))
     return {r: blocks(rest, first[r], r) for r in first}

@@ -14,9 +14,11 @@ from airtouch.gap.data import Data, Study
 from airtouch.gap.fit import fit, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
+from airtouch.gap.judging import FIRST_GAIN, halves
 from airtouch.gap.problem import whole_of
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
-from airtouch.gap.select import FIRST_GAIN, Judged, Selection, halves, probabilities, select
+from airtouch.gap.select import select
+from airtouch.gap.selection import Judged, Selection, probabilities
 from airtouch.gap.shrink import Shrink, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.gap.twin import Twin

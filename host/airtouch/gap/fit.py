@@ -155,9 +155,7 @@ class Slopes:
         self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
 
     def take(self, x: np.ndarray, anew: bool = False) -> None:
-        """Take them at scaled parameters x (k,).
-
-        All of them where x lies far from where they were taken, or as told; always those that bend."""
+        """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or when told."""
         anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
         moved = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
         if not len(moved):
@@ -177,7 +175,7 @@ class Slopes:
 
     def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
                  ) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood, by the change of the expected power with x (k,).
+        """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
         values, added: what is left, and the power over the floor, flattened.
         """
@@ -206,8 +204,11 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     close = np.array([t.name in LOOP for t in mean for _ in t.free], bool)
     spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
     prior = np.concatenate([spread, [p for _, p in constants]])
-    def push(o):
-        return sum((a * c for a, (c, _) in zip(o, constants, strict=True)), np.zeros(len(problem.base)))
+
+    def push(offsets: np.ndarray) -> np.ndarray:
+        """What offsets add to the spectra."""
+        return sum((a * c for a, (c, _) in zip(offsets, constants, strict=True)), np.zeros(len(problem.base)))
+
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
         return x, offsets, covariance, problem.base

@@ -44,10 +44,7 @@ class Gated:
 
 
 def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
-    """Effects that may come and go, each in the stretches in which it explains most.
-
-    Those that never act are left out.
-    """
+    """Effects that may come and go, each in the stretches in which it explains most; not those that never act."""
     whole = whole_of(data)
     nothing = _each(data, whole, ())
     if len(nothing) < LEAST_BLOCKS:
@@ -101,7 +98,7 @@ def _by_blocks(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term]) 
 
 
 def _bursts(data: Data) -> tuple[Gate, float]:
-    """The stretches in which the force along the thrust is far livelier than elsewhere in the flight, and their price.
+    """Stretches in which the force along the thrust is far more lively than in the rest of the flight, and their price.
 
     A wake that is flown through lasts shorter than a block. A piece of PIECE_S counts the log likelihood of a power
     that is LIVELY times the flight's median over that of the median (chi-square of DEGREES), as if it were no more.
@@ -134,8 +131,10 @@ def _highpassed(values: np.ndarray) -> np.ndarray:
 
 def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:
     """The gate with each end moved by less and less, as long as the likelihood grows."""
-    def level(tried):
+
+    def level(tried: Gate) -> float:
         return judge(data, whole, [replace(t, gate=tried) for t in terms])
+
     best = level(gate)
     for step in STEPS_S:
         for i in range(len(gate)):

@@ -133,11 +133,10 @@ def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndar
     out = {}
     for r in shape:
         f = frequencies(r)
-        def density(g):
-            return 4.0 * tau / (1.0 + (2.0 * np.pi * tau * g) ** 2)
-        aliases = (f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f)
-        folded = np.repeat(sum(density(g) for g in aliases)[:, None], 4, axis=1)
-        folded[:, 1:] = sum(density(g) * np.sinc(g * PERIOD_S) ** 2 for g in aliases)[:, None]  # the gyro's differences
+        aliases = np.array([f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f])
+        density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
+        folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
+        folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
         made = np.zeros(shape[r])
         for b, first in enumerate(data.first[i][r]):
             size = (thrust[first:first + 256] ** 2).mean(axis=0)

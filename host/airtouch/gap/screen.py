@@ -45,7 +45,7 @@ class Screen:
         return np.where(problem.known, problem._with_twin(gathered), 0.0)
 
     def shows(self, term: Term) -> bool:
-        """Whether a term changes what is expected of the logged commands; ask `column` for all its parameters first.
+        """Whether a term changes what the logged commands lead to expect, once `column` was asked for its parameters.
 
         An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
         """

@@ -13,7 +13,7 @@ from airtouch.gap.data import Data
 from airtouch.gap.fit import left_over
 from airtouch.gap.problem import Part
 from airtouch.gap.result import Quantity
-from airtouch.gap.select import Judged
+from airtouch.gap.selection import Judged
 
 SURE = 4.0  #: standard errors by which a cell must stand over the floor
 FEWEST = 12  #: values in a cell

@@ -88,7 +88,7 @@ class Twin:
     edges: EdgeFloor | None = None
 
     def spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
-        """First samples and spectra (blocks, bins, AXES) of a flight's commands, scaled to nominal hardness."""
+        """First samples and spectra (blocks, bins, AXES) of a flight's commands as if flown as hard as nominal ones."""
         first, every = block_spectra(flight, self.vehicle)
         return first, every / np.sqrt(self.slopes.level(hardness_of(flight, first, LENGTH)))
 

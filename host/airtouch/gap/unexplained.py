@@ -12,7 +12,7 @@ from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.motion import held
 from airtouch.gap.result import Cell
-from airtouch.gap.select import Judged, Selection
+from airtouch.gap.selection import Judged, Selection
 from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.simulation import signals as at
 

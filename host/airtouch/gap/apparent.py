@@ -1,0 +1,40 @@
+"""How strong every effect seems to be in flights that have none."""
+
+import numpy as np
+
+from airtouch.gap.candidates import CLOCK, GATED, SPECTRUM, every, telling
+from airtouch.gap.data import Data
+from airtouch.gap.fit import strength_variance
+from airtouch.gap.gates import gated
+from airtouch.gap.judging import at_bound, round_of, trial_of
+from airtouch.gap.nominal_scatter import Apparent
+from airtouch.gap.problem import whole_of
+from airtouch.gap.select import nameless, seconds
+from airtouch.gap.selection import Judged
+
+NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
+
+
+def apparent(data: Data) -> Apparent:
+    """How strong every effect seems to be in flights that have none."""
+    on = trial_of(data)
+    singles = round_of(on, every(), None, thorough=True)
+    passing = gated(data)
+    known = {n: j for n, j in singles.items() if len(j.strength)}
+    return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
+                    nameless(on, None) / seconds(data),
+                    {n: max(passing[n].gain, 0.0) / seconds(data) if n in passing else 0.0 for n in GATED})
+
+
+def _error(data: Data, judged: Judged) -> np.ndarray:
+    """Standard deviation (k,) by chance of a candidate's strength."""
+    term = telling(judged.terms)
+    if term.kind == CLOCK:
+        return np.zeros(len(judged.strength))
+    if term.kind != SPECTRUM:
+        return np.where(at_bound(term, judged.strength), NOBODY_KNOWS,
+                        np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
+    fitted = judged.fits[0].terms
+    same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
+    variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
+    return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))
