@@ -1,6 +1,7 @@
 """Pages agree with one another and link to what is there."""
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -57,3 +58,13 @@ def test_lines_are_no_longer_than_they_may():
         long = [line for line in (DOCS / f"{name}.md").read_text("utf-8").splitlines() if len(line) > 170
                 and not line.startswith("|")]
         assert not long, (name, long)
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda p: p.name)
+def test_tables_and_lists_stand_apart_for_the_site(page):
+    """Python-Markdown joins a table or a list to the lines right above it, where GitHub does not."""
+    lines = re.sub(r"^```.*?^```", "```", page.read_text("utf-8"), flags=re.S | re.M).splitlines()
+    for above, line in pairwise(lines):
+        if above.strip() and not above.startswith(("#", "<!--")):
+            assert not line.startswith("|") or above.startswith("|"), line
+            assert not re.match(r"(- |1\. )", line) or re.match(r"(- |\d+\. |  )", above), line

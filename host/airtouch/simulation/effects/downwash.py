@@ -46,7 +46,7 @@ EFFECT = Effect(
                "Crazyflies 0.15 to 0.3 m under another: 0.15 to 0.42"),
      Parameter("x", "m", 0.0, -1000.0, 1000.0, None, "the wake's axis in the world"),
      Parameter("y", "m", 0.0, -1000.0, 1000.0, None, "the wake's axis in the world"),
-     Parameter("width", "m", 0.1, 0.0, 100.0, None, 
+     Parameter("width", "m", 0.1, 0.0, 100.0, None,
                "distance at which the push is 1/e of that on the axis; 0: everywhere",
                "Crazyflies: 3 % of the weight 0.15 to 0.25 m aside"),
      Parameter("turbulence", "1", 0.3, 0.0, 5.0, 0.0, "rms of a rotor's push over its mean"),
