@@ -24,7 +24,8 @@ pytestmark = needs("tensorflow")
 @pytest.fixture
 def quick(monkeypatch):
     """Stages of a few seconds."""
-    for name, value in (("SIMULATED", 4), ("TWIN_STEPS", {"shipped": 5, "scratch": 5}), ("TUNE_STEPS", 5), ("MIXED", 2)):
+    for name, value in (("SIMULATED", 4), ("TWIN_STEPS", {"shipped": 5, "scratch": 5}), ("TUNE_STEPS", 5), ("MIXED", 2),
+                        ("FOLDS", 2)):
         monkeypatch.setattr(adapt, name, value)
 
 

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from airtouch import logs, vehicle
 from airtouch.cli import airtouch
 from airtouch.logs.flight_log import FlightLog
+from airtouch.report import twin_report
 from airtouch.simulation import batch, scenario
 from airtouch.twin.course import course
 from skips import needs
@@ -59,14 +60,16 @@ def test_report_shows_all_of_it(twin):
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_it_does_not_overwrite_and_it_goes_on(twin, folder, tmp_path):
+def test_it_does_not_overwrite_and_it_goes_on(twin, folder, tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(twin_report, "write_report", lambda path, *_, **__: written.append(path))  # drawn for `twin`
     out = tmp_path / "mine"
     shutil.copytree(twin[0], out)
     again = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40)
     assert again.exit_code != 0 and "--resume" in str(again.exception)
     result = run("twin", folder, "--out", out, "--rounds", 2, "--batch", 40, "--resume", "--workers", 1)
     assert result.exit_code == 0, result.output + str(result.exception)
-    assert len(json.loads((out / "twin.json").read_text())["history"]) == 2
+    assert len(json.loads((out / "twin.json").read_text())["history"]) == 2 and written == [out / "report.html"]
 
 
 def test_bad_input_is_one_line_with_what_to_fly(made, folder, tmp_path):
