@@ -13,14 +13,18 @@ from airtouch.twin.features import features, names
 from twin_courses import made_course
 
 FIXED = {"gust": {"rms": 0.1}, "rotor_drag": {}}
-#: lever -> the value that the "recorded" flights are flown with
-TRUTH = {"motor_lag.factor": 1.3, "vehicle.gyro_noise_ratio.0": 0.9, "ground_effect.strength": 1.0,
+#: lever -> the value that the "recorded" flights are flown with; the set height as `flown_height` says
+TRUTH = {"mission.height_m": 0.0, "motor_lag.factor": 1.3, "vehicle.gyro_noise_ratio.0": 0.9, "ground_effect.strength": 1.0,
          "trim.roll": 0.02, "motor_noise.rms": 0.011}
 
 
 @pytest.fixture(scope="module")
 def chosen(vehicle):
-    """Started up to four steps from the truth, the lift three."""
+    """Started up to four steps from the truth, the lift three.
+
+    Without the set height the lift has no unique value: the simulator hovers 2.5 cm higher than it is told, and over a platform that
+    is 2.5 cm further away the same lift needs a strength of 1.45.
+    """
     return tuple(replace(lever, start=1.45) if lever.name == "ground_effect.strength" else lever
                  for lever in levers.default(vehicle) if lever.name in TRUTH)
 
@@ -44,24 +48,23 @@ def aim(vehicle, chosen):
 
 
 @pytest.fixture(scope="module")
+def truth(aim):
+    """What a fit should find: a course is flown at the height that was logged, not the one that was set (0.8 m)."""
+    return TRUTH | {"mission.height_m": float(np.median([0.8 - c.cruise_m for c in aim.courses]))}
+
+
+@pytest.fixture(scope="module")
 def fitted(aim, vehicle, chosen):
     return fit.fit(aim, vehicle, chosen, rounds=7, flights=120, fixed=FIXED, seed=5)
 
 
-def test_withheld_levers_are_recovered(fitted, chosen):
-    """Within 1.5 of a lever's step (a tenth of the lag, ...), from up to four steps off; the lift has a test of its own."""
+def test_withheld_levers_are_recovered(fitted, chosen, truth):
+    """Within 1.5 of a lever's step (a tenth of the lag, ...), from up to four steps off."""
     for lever, value in zip(chosen, fitted.values, strict=True):
-        off = (value - TRUTH[lever.name]) / lever.step
-        print(f"{lever.name}: start {lever.start:.4g}, truth {TRUTH[lever.name]:.4g}, fitted {value:.4g} "
+        off = (value - truth[lever.name]) / lever.step
+        print(f"{lever.name}: start {lever.start:.4g}, truth {truth[lever.name]:.4g}, fitted {value:.4g} "
               f"({off:+.2f} steps)")
-        assert abs(off) < 1.5 or lever.of == "ground_effect", lever.name
-
-
-@pytest.mark.xfail(reason="stays too strong where it starts three steps of 0.15 too strong; to take off the lift that the drone has "
-                          "had before its range is read did not mend it", strict=False)
-def test_withheld_lift_is_recovered(fitted, chosen):
-    strength = next(v for lever, v in zip(chosen, fitted.values, strict=True) if lever.of == "ground_effect")
-    assert strength == pytest.approx(TRUTH["ground_effect.strength"], abs=0.25)
+        assert abs(off) < 1.5, lever.name
 
 
 def test_the_best_round_is_the_one_with_the_least_misfit(fitted):
