@@ -1,17 +1,18 @@
 """What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
-    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled [--labelled 2 --labelled
-    5]
-        [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
+    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled [--twin FOLDER]
+        [--labelled 2 --labelled 5] [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
 Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
 that saw none of it: --start as it is, --start gone on with K flights drawn from the other groups, and a network trained
 on the same K alone (--alone-steps; 0 leaves that row out). Each draw takes other flights, each seed another order of
 learning.
 --start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the
-second the other: a twin's detector, whose twin was fitted to the other half. What is in --out already is not done
-again, so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over
-the flights scored, each with all its draws.
+second the other: a twin's detector, whose twin was fitted to the other half. With --twin, as often as --start, training
+does not go on from --start: a new network learns the K flights together with edges of that twin, laid over the free air
+of all flights of the other groups, as `airtouch adapt --from scratch` does. What is in --out already is not done again,
+so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the
+flights scored, each with all its draws.
 """
 
 import argparse
@@ -23,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import vehicle
 from airtouch.detector import best, crossval, dataset, evaluate, training_set
 from airtouch.detector.dataset import FlightFile
 from airtouch.detector.score import FlightScore
@@ -31,7 +33,10 @@ from airtouch.detector.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import scenario
+from airtouch.twin import adapt, files
 
+COMMAND = "tools/labelled_flights.py"
 FIRST_HALF = 3  #: folds below this one are one half, the others the other
 
 
@@ -43,7 +48,7 @@ def group_of(file: FlightFile, by: str) -> str:
     return str(known) if by == "day" else "folds 0 to 2" if int(known) < FIRST_HALF else "folds 3 and up"
 
 
-def drawn(pool: Sequence[FlightLog], count: int, draw: int) -> list[FlightLog]:
+def drawn(pool: Sequence[adapt.Flight], count: int, draw: int) -> list[adapt.Flight]:
     """`count` flights of the pool; a draw's smaller sets lie within its larger ones."""
     if count > len(pool):
         raise AirTouchError(f"{count} labelled flights wanted, {len(pool)} are not held out; ask for fewer")
@@ -70,22 +75,33 @@ def scored(model: StreamModel, held: Sequence[FlightFile], readable: dict[Path, 
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
+def simulated(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.Flown:
+    """Edges of the twin in this folder, laid over the free air of these flights."""
+    craft = vehicle.load(str(folder / files.VEHICLE))
+    return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
+
+
 def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
-         pool: Sequence[FlightLog], readable: dict[Path, FlightLog], start: StreamModel | None,
-         options: argparse.Namespace) -> list[FlightScore]:
+         pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: StreamModel | None,
+         flown: adapt.Flown | None, options: argparse.Namespace) -> list[FlightScore]:
     """One training and its scores, or what an earlier run found."""
     steps = {"start": 0, "labelled": options.steps, "alone": options.alone_steps}[row]
     asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
-             [f.path.name for f in held], [log.source for log in pool]]
+             [f.path.name for f in held], [f.log.source for f in pool]]
+    if flown and row == "labelled":
+        asked += [adapt.TWIN_STEPS, repr(adapt.MIXED_DECODER), [training_set.flight_hash(log) for log in flown.logs]]
     key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
     kept = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{key}.json"
     if kept.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(kept.read_text())]
+    some = drawn(pool, count, draw)
     if row == "start":
         model = start
+    elif flown and row == "labelled":
+        model = adapt.together(None, start, some, flown, seed, None, COMMAND)
     else:
-        model = best.fit(drawn(pool, count, draw), seed=seed, start=start if row == "labelled" else None, steps=steps,
-                         command="tools/labelled_flights.py")
+        model = best.fit([f.log for f in some], seed=seed, start=start if row == "labelled" else None, steps=steps,
+                         command=COMMAND)
     scores = scored(model, held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), kept, force=True)
     return scores
@@ -114,6 +130,9 @@ def main() -> None:
     parser.add_argument("--start", type=Path, action="append", default=[],
                         help="model to go on from, one for all groups or one for each in their order; the rows without "
                              "it if left out")
+    parser.add_argument("--twin", type=Path, action="append", default=[],
+                        help="folder of `airtouch twin` whose edges are learnt with the labelled flights; as many as "
+                             "--start")
     parser.add_argument("--by", choices=("halves", "day"), default="halves")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"))
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
@@ -124,24 +143,30 @@ def main() -> None:
     parser.add_argument("--speed", type=float, help="m/s, for flights whose manifest does not say")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    files = dataset.collect(options.folders, options.speed)
-    readable, left_out = crossval.readable_flights(files, best.SPARE_SENSORS)
+    listed = dataset.collect(options.folders, options.speed)
+    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
-    groups = sorted({group_of(file, options.by) for file in files})
+    groups = sorted({group_of(file, options.by) for file in listed})
     if len(options.start) not in (0, 1, len(groups)):
         raise SystemExit(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one for "
                          "each")
+    if len(options.twin) not in (0, len(options.start)):
+        raise SystemExit(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for each, "
+                         "or none")
     models = [best.load(path) for path in options.start]
-    starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=True))
+    starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=False))
+    twins = dict(zip(groups, options.twin if len(options.twin) > 1 else options.twin * len(groups), strict=False))
+    pools = {g: [adapt.Flight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g] for g in groups}
+    flown = {g: simulated(twins[g], pools[g]) for g in twins}
 
     def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
         scores: list[FlightScore] = []
         for draw, seed in draws:
             for group in groups:
-                held = [f for f in files if group_of(f, options.by) == group]
-                pool = [readable[f.path] for f in files if group_of(f, options.by) != group]
-                scores += cell(kind, count, draw, seed, group, held, pool, readable, starts.get(group), options)
+                held = [f for f in listed if group_of(f, options.by) == group]
+                scores += cell(kind, count, draw, seed, group, held, pools[group], readable, starts.get(group),
+                               flown.get(group), options)
         print(line(title, scores, len(draws)), flush=True)
 
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute "

@@ -60,6 +60,13 @@ def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):
         run(monkeypatch, house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out")
 
 
+def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
+    best.fit([made_flight(9)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    with pytest.raises(SystemExit, match="2 twins for 1 models"):
+        run(monkeypatch, house, "--start", tmp_path / "start.npz", "--twin", "a", "--twin", "b", "--by", "day",
+            "--out", tmp_path / "out")
+
+
 def test_draws_of_a_flight_add_up():
     edge = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03)
     one = FlightScore("a", Condition(), (edge,), (5,), 2, 30.0, (1, 2, 3, 4))

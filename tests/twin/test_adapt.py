@@ -92,17 +92,32 @@ def adapt_vehicle():
 def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypatch):
     """Each held-out flight is scored once, by a model whose training flights lack it."""
     scored = []
-    monkeypatch.setattr(adapt, "tune", lambda twin, flights, *_: frozenset(str(f.file.path) for f in flights))
+    monkeypatch.setattr(adapt, "together", lambda start, twin, flights, *_: frozenset(str(f.file.path) for f in flights))
     monkeypatch.setattr(adapt, "_model", lambda path, make: make())
     monkeypatch.setattr(adapt, "_scores", lambda path, flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
     flights = flights_of(made, 8)
-    held, half = adapt._hold_out(flights, flights, [], None, tmp_path, "key", 0, None, "")
+    held, half = adapt._hold_out(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
     assert sorted(held) == sorted(half) == sorted(str(f.file.path) for f in flights)
     for test, train in scored:
         assert not test & train and train
     sizes = [len(train) for _, train in scored]
     assert max(sizes[1::2]) <= min(sizes[0::2]) // 2 + 1
+
+
+def test_labelled_flights_are_half_of_what_is_learnt(made, monkeypatch):
+    """From `start`, with the twin's flights beside them; flights without labels go on from the twin's detector."""
+    asked = {}
+    monkeypatch.setattr(best, "fit", lambda flights, seed, **o: asked.update(o, flights=flights))
+    monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
+    simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
+    labelled, start, twin = flights_of(made, 2), object(), object()
+    adapt.together(start, twin, labelled, simulated, 0, None, "")
+    assert asked["start"] is start and len(asked["flights"]) == 7 and asked["pseudo_labels"][:2] == [None, None]
+    assert sum(asked["emphasis"][:2]) == pytest.approx(sum(asked["emphasis"][2:]))
+    adapt.together(None, twin, flights_of(made, 2, down=False), simulated, 0, None, "")
+    assert asked["start"] is twin and asked["pseudo_labels"][:2] == [[], []] and set(asked["emphasis"]) == {1.0}
+    assert adapt.together(start, twin, [], simulated, 0, None, "") is twin
 
 
 def score(error_m):

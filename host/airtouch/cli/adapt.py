@@ -80,7 +80,7 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
     """(scenario, vehicle, in words) of a twin: its folder's, one fitted now, or the simulator as it is."""
     from airtouch import vehicle as vehicles
     from airtouch.simulation import scenario
-    from airtouch.twin import files, fit, levers
+    from airtouch.twin import edge_fit, files, fit, levers
     from airtouch.twin import flights as recordings
 
     if folder is not None:
@@ -91,12 +91,15 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
                 f"no twin: it needs {recordings.FEWEST} flights over a platform with down range; simulator as it is")
     recorded = recordings.recorded(paths, speed_mps=speed)
     kept.mkdir(parents=True, exist_ok=True)
-    listed = levers.default(craft)
+    listed = levers.default(craft, recorded.near)
+    aim = fit.target(recorded.courses, recorded.features)
     with Bar("fitting a twin") as bar:
-        state = fit.fit(fit.target(recorded.courses, recorded.features), craft, listed, rounds=ROUNDS, flights=BATCH,
-                        seed=seed, fixed=levers.FIXED, kept=kept / "fit.json",
-                        progress=lambda done, total, _: bar(done, total))
-    made = files.write(kept, craft, listed, fit.best(state), recorded.courses, levers.FIXED, force=True)
+        state = fit.fit(aim, craft, listed, rounds=ROUNDS, flights=BATCH, seed=seed, fixed=levers.FIXED,
+                        kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
+    with Bar("edges") as bar:
+        values = edge_fit.refine(aim, craft, listed, fit.best(state), flights=edge_fit.share(BATCH), seed=seed,
+                                 fixed=levers.FIXED, progress=bar).values
+    made = files.write(kept, craft, listed, values, recorded.courses, levers.FIXED, force=True)
     return scenario.load(made[1]), vehicles.load(made[0]), f"twin fitted to {len(recorded.courses)} of them"
 
 

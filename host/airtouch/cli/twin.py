@@ -57,7 +57,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     from airtouch import vehicle as vehicles
     from airtouch.report import twin_report
     from airtouch.simulation.batch import available_cores
-    from airtouch.twin import compare, files, fit, levers
+    from airtouch.twin import compare, edge_fit, files, fit, levers
     from airtouch.twin import flights as recordings
 
     _check_free(out, resume, force)
@@ -74,7 +74,9 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
         state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers,
                         fixed=levers.FIXED,
                         kept=out / FIT, progress=lambda done, total, now: bar(done, total, _misfit(now)))
-    values = fit.best(state)
+    with Bar("edges") as bar:
+        values = edge_fit.refine(aim, craft, listed, fit.best(state), flights=edge_fit.share(batch), seed=seed,
+                                 workers=workers, fixed=levers.FIXED, progress=bar).values
     files.write(out, craft, listed, values, recorded.courses, levers.FIXED, force=True)
     with Bar("flying the twin") as bar:
         flown, lost = compare.flown(recorded.courses, craft, listed, values, seed, levers.FIXED, progress=bar)

@@ -101,15 +101,17 @@ def flight_events(log: FlightLog, model: StreamModel) -> StreamEvents:
 
 def fit(
     flights: Sequence[FlightLog], seed: int = 0, *, start: StreamModel | None = None,
-    pseudo_labels: Sequence[Sequence[logs.Edge] | None] | None = None, free_air: Sequence[FlightLog] = (),
+    pseudo_labels: Sequence[Sequence[logs.Edge] | None] | None = None, emphasis: Sequence[float] | None = None,
+    free_air: Sequence[FlightLog] = (),
     recipe: Recipe | None = None, decoder: DecoderConfig | None = None, most_flights: int | None = None,
     progress: Progress | None = None, command: str = "airtouch.detector.best.fit", work: Path | None = None, **changes: Any
 ) -> StreamModel:
     """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
 
     flights: 100 Hz logs, labelled by their own down range. pseudo_labels: one entry a flight, its edges, or None where
-    the down range labels it (`pseudo_labels` below makes them). start: a model to go on from: same network, its zeros
-    stay, FINE_TUNING in place of a full training. free_air: flights without edges (`free_air.read`).
+    the down range labels it (`pseudo_labels` below makes them). emphasis: one entry a flight, how often it is drawn
+    against the others; all alike where left out. start: a model to go on from: same network, its zeros stay,
+    FINE_TUNING in place of a full training. free_air: flights without edges (`free_air.read`).
     recipe: shape and training, changed by `changes` (fields of `Recipe`: steps, peak_rate, ...). decoder: its settings;
     `start`'s, else DECODER. most_flights: train on so many at most, drawn by seed. A sensor that no flight has is
     silent for good. work: a folder in which the training is kept, so that the same call goes on after a stop.
@@ -130,6 +132,7 @@ def fit(
     if most_flights is not None and most_flights < len(flights):
         drawn = sorted(np.random.default_rng(seed).permutation(len(flights))[:most_flights])
         flights, labels = [flights[i] for i in drawn], [labels[i] for i in drawn]
+        emphasis = emphasis if emphasis is None else [emphasis[i] for i in drawn]
     recipe = replace(recipe, muted=tuple(sorted({*recipe.muted, *sensors.silent_in_all(flights)})))
     if start is not None and start.recipe.weight_shapes() != recipe.weight_shapes():
         raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations alone")
@@ -137,11 +140,14 @@ def fit(
     for i, (log, edges) in enumerate(zip(flights, labels)):
         prepared.append(flight_of(log, recipe, edges))
         told("features", i + 1, len(flights), os.path.basename(log.source))
+    if emphasis is not None:
+        prepared = [replace(f, weight=f.weight * share) for f, share in zip(prepared, emphasis, strict=True)]
     if not sum(len(f.edges) for f in prepared):
         raise AirTouchError("training: the flights hold no edges; give flights over a platform, with down range")
     weights = training.fit(prepared, recipe, seed, lambda done, total, note: told("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in free_air],
-                           start=start.weights if start else None, kept=_kept(work, flights, free_air, labels, recipe, seed, start))
+                           start=start.weights if start else None,
+                           kept=_kept(work, flights, free_air, [labels, emphasis], recipe, seed, start))
     int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in prepared], recipe))
     settings = _decoders(decoder, start)
     model = StreamModel(recipe, weights, int8, tflite, {

@@ -113,7 +113,7 @@ def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever],
     jacobian, gap, variance = regression(np.vstack(state.drawn), np.vstack(state.apart), state.values, steps, len(values))
     before = misfit(gap)
     recorded = np.maximum(np.isfinite(aim.features).sum(axis=0), 1)
-    step = _step(jacobian, gap, variance + 1.0 / recorded, levers, state.values, steps) * (1.0 if number < rounds - 3 else 0.5)
+    step = least_squares_step(jacobian, gap, variance + 1.0 / recorded, levers, state.values, steps) * (1.0 if number < rounds - 3 else 0.5)
     state.history.append({"values": state.values.tolist(), "misfit": before, "lost": lost,
                           "cpu_s": round(time.process_time() - began, 1)})
     state.values = lever_set.clipped(levers, state.values + steps * step)
@@ -162,7 +162,7 @@ def misfit(gap: np.ndarray) -> dict[str, float]:
             for name in GROUPS if np.isfinite(gap[group == name]).any()}
 
 
-def _step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarray, levers: Sequence[Lever],
+def least_squares_step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarray, levers: Sequence[Lever],
           values: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Steps of the levers, in `Lever.step`, that make the weighted sum of squared gaps least."""
     listed: tuple[Feature, ...] = names()

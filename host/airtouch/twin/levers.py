@@ -101,6 +101,7 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
         Lever("range_bias", "reach", 0.02, 0.0, 0.1, 0.006, "m", 0.01),
         Lever("range_bias", "delay", near.delay, 0.0, 0.15, 0.008, "s", 0.012),
         Lever("range_step", "residual", 0.0, -0.1, 0.1, 0.008, "m", 0.012),
+        Lever("range_step", "kick", 0.0, -0.1, 0.1, 0.006, "m"),
     )
 
 
