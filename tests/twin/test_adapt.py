@@ -73,7 +73,8 @@ def test_command_trains_says_and_goes_on(made, quick, tmp_path, monkeypatch):
 def test_flights_without_down_range_are_used_by_pseudo_labels(made, quick, tmp_path, monkeypatch):
     seen = []
     fit = best.fit
-    monkeypatch.setattr(best, "fit", lambda flights, seed, **o: seen.append(o.get("pseudo_labels")) or fit(flights, seed, **o))
+    monkeypatch.setattr(best, "fit",
+                        lambda flights, seed, **o: seen.append(o.get("pseudo_labels")) or fit(flights, seed, **o))
     flights = [*flights_of(made, 2), *flights_of(made, 5, down=False)[2:]]
     scene = scenario.load("paper-low")
     found = adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None))
@@ -92,7 +93,8 @@ def adapt_vehicle():
 def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypatch):
     """Each held-out flight is scored once, by a model whose training flights lack it."""
     scored = []
-    monkeypatch.setattr(adapt, "together", lambda start, twin, flights, *_: frozenset(str(f.file.path) for f in flights))
+    monkeypatch.setattr(adapt, "together",
+                        lambda start, twin, flights, *_: frozenset(str(f.file.path) for f in flights))
     monkeypatch.setattr(adapt, "_model", lambda path, make: make())
     monkeypatch.setattr(adapt, "_scores", lambda path, flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
@@ -141,4 +143,5 @@ def test_readable_takes_the_speed_from_the_log(made, tmp_path):
     logs.write(replace(log, columns={k: v[:50] for k, v in log.columns.items()}), tmp_path / "short.csv.gz")
     usable, left_out = adapt.readable([FlightFile(tmp_path / n, Condition()) for n in ("good.csv.gz", "short.csv.gz")])
     assert len(usable) == 1 and len(left_out) == 1
-    assert usable[0].file.condition.speed_mps == pytest.approx(np.hypot(log["vx_mps"], log["vy_mps"])[-800:].max(), abs=0.3)
+    assert usable[0].file.condition.speed_mps == pytest.approx(np.hypot(log["vx_mps"], log["vy_mps"])[-800:].max(),
+                                                               abs=0.3)

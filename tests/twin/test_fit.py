@@ -14,16 +14,16 @@ from twin_courses import made_course
 
 FIXED = {"gust": {"rms": 0.1}, "rotor_drag": {}}
 #: lever -> the value that the "recorded" flights are flown with; the set height as `flown_height` says
-TRUTH = {"mission.height_m": 0.0, "motor_lag.factor": 1.3, "vehicle.gyro_noise_ratio.0": 0.9, "ground_effect.strength": 1.0,
-         "trim.roll": 0.02, "motor_noise.rms": 0.011}
+TRUTH = {"mission.height_m": 0.0, "motor_lag.factor": 1.3, "vehicle.gyro_noise_ratio.0": 0.9,
+         "ground_effect.strength": 1.0, "trim.roll": 0.02, "motor_noise.rms": 0.011}
 
 
 @pytest.fixture(scope="module")
 def chosen(vehicle):
     """Started up to four steps from the truth, the lift three.
 
-    Without the set height the lift has no unique value: the simulator hovers 2.5 cm higher than it is told, and over a platform that
-    is 2.5 cm further away the same lift needs a strength of 1.45.
+    Without the set height the lift has no unique value: the simulator hovers 2.5 cm higher than it is told, and over a
+    platform that is 2.5 cm further away the same lift needs a strength of 1.45.
     """
     return tuple(replace(lever, start=1.45) if lever.name == "ground_effect.strength" else lever
                  for lever in levers.default(vehicle) if lever.name in TRUTH)

@@ -104,7 +104,8 @@ def fit(
     pseudo_labels: Sequence[Sequence[logs.Edge] | None] | None = None, emphasis: Sequence[float] | None = None,
     free_air: Sequence[FlightLog] = (),
     recipe: Recipe | None = None, decoder: DecoderConfig | None = None, most_flights: int | None = None,
-    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", work: Path | None = None, **changes: Any
+    progress: Progress | None = None, command: str = "airtouch.detector.best.fit", work: Path | None = None,
+    **changes: Any
 ) -> StreamModel:
     """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
 
@@ -135,9 +136,10 @@ def fit(
         emphasis = emphasis if emphasis is None else [emphasis[i] for i in drawn]
     recipe = replace(recipe, muted=tuple(sorted({*recipe.muted, *sensors.silent_in_all(flights)})))
     if start is not None and start.recipe.weight_shapes() != recipe.weight_shapes():
-        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations alone")
+        raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
+                            "alone")
     prepared = []
-    for i, (log, edges) in enumerate(zip(flights, labels)):
+    for i, (log, edges) in enumerate(zip(flights, labels, strict=True)):
         prepared.append(flight_of(log, recipe, edges))
         told("features", i + 1, len(flights), os.path.basename(log.source))
     if emphasis is not None:
@@ -155,7 +157,7 @@ def fit(
         "sigma_s": TIMING_SIGMA_S, **settings, **training_set.of(flights, start),
         "free_air": len(free_air)})
     found = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
-             for log, edges in zip(flights, labels)]
+             for log, edges in zip(flights, labels, strict=True)]
     return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(found)})
 
 
@@ -170,8 +172,8 @@ def pseudo_labels(flights: Sequence[FlightLog], model: StreamModel) -> list[list
             for log in flights]
 
 
-def _kept(work: Path | None, flights: Sequence[FlightLog], free_air: Sequence[FlightLog], labels: Sequence[Any], recipe: Recipe,
-          seed: int, start: StreamModel | None) -> Path | None:
+def _kept(work: Path | None, flights: Sequence[FlightLog], free_air: Sequence[FlightLog], labels: Sequence[Any],
+          recipe: Recipe, seed: int, start: StreamModel | None) -> Path | None:
     """The file of a training with these arguments, None without a folder."""
     if work is None:
         return None

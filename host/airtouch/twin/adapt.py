@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,12 @@ MIXED = 12  #: simulated flights beside the recorded ones in that, at least
 FOLDS = 4
 FEWEST = 4  #: labelled flights for a hold-out
 #: Decoder of a detector that has been trained on the twin alone: its logits are lower over recorded edges than over
-#: simulated ones, and recorded free air leaves room below. Chosen on folds 0 to 2 with two trainings out of nine (host/docs/looks.md).
+#: simulated ones, and recorded free air leaves room below. Chosen on folds 0 to 2 with two trainings out of nine
+#: (host/docs/looks.md).
 DECODER = replace(best.DECODER, over_share=0.5, entry_score=1.5, exit_score=0.5, late_entry=1.0, late_exit=-1.5)
 #: Decoder of one trained on labelled flights and a twin. Chosen on folds 0 to 2 out of 600, with four detectors of ten
-#: flights of folds 3 and 4 (host/docs/looks.md), and rounded; each flight with the settings best on the others: 0.031 m,
-#: 5.2 %, 0.33 a minute.
+#: flights of folds 3 and 4 (host/docs/looks.md), and rounded; each flight with the settings best on the others: 0.031
+#: m, 5.2 %, 0.33 a minute.
 MIXED_DECODER = replace(best.DECODER, over_share=0.5, entry_score=1.2, exit_score=0.0, late_entry=2.9, late_exit=-2.9)
 #: progress(stage, done, total, note)
 Progress = Callable[[str, int, int, str], None]
@@ -80,8 +82,8 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     """A detector from flights and their twin. Same arguments, same bits.
 
     start: weights to go on from, None for none. work: a folder in which each finished stage is kept, so that the
-    same call goes on after a stop. withhold: the last stage takes all flights as if they had no down range, to measure what
-    unlabelled ones bring. twin_only: all labelled flights scored by the detector that has seen the twin only.
+    same call goes on after a stop. withhold: the last stage takes all flights as if they had no down range, to measure
+    what unlabelled ones bring. twin_only: all labelled flights scored by the detector that has seen the twin only.
     Raises AirTouchError where nothing crosses an edge.
     """
     work.mkdir(parents=True, exist_ok=True)
@@ -156,8 +158,8 @@ def _hold_out(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flow
             some = train[:max(len(train) // share, 1)]
             path = work / f"fold{k}_{share}_{key}"
             name = f"hold-out {k + 1}/{folds}" + (" (half)" if share == 2 else "")
-            model = _model(path.with_suffix(".npz"),
-                           lambda: together(start, twin, [*some, *others], flown, seed, _named(progress, name), command))
+            learn = partial(together, start, twin, [*some, *others], flown, seed, _named(progress, name), command)
+            model = _model(path.with_suffix(".npz"), learn)
             into += _scores(path.with_suffix(".json"), test, model)
     return held, half
 

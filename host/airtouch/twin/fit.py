@@ -110,10 +110,12 @@ def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever],
         raise AirTouchError(f"{lost} of {flights} simulated flights did not end well; give a vehicle file nearer "
                             "to this drone with --vehicle")
     state.drawn, state.apart = [*state.drawn[-MEMORY_ROUNDS + 1:], values], [*state.apart[-MEMORY_ROUNDS + 1:], apart]
-    jacobian, gap, variance = regression(np.vstack(state.drawn), np.vstack(state.apart), state.values, steps, len(values))
+    jacobian, gap, variance = regression(np.vstack(state.drawn), np.vstack(state.apart), state.values, steps,
+                                         len(values))
     before = misfit(gap)
     recorded = np.maximum(np.isfinite(aim.features).sum(axis=0), 1)
-    step = least_squares_step(jacobian, gap, variance + 1.0 / recorded, levers, state.values, steps) * (1.0 if number < rounds - 3 else 0.5)
+    step = least_squares_step(jacobian, gap, variance + 1.0 / recorded, levers, state.values, steps)
+    step *= 1.0 if number < rounds - 3 else 0.5
     state.history.append({"values": state.values.tolist(), "misfit": before, "lost": lost,
                           "cpu_s": round(time.process_time() - began, 1)})
     state.values = lever_set.clipped(levers, state.values + steps * step)
@@ -185,7 +187,8 @@ def _save(path: Path, state: State, levers: Sequence[Lever], seed: int, flights:
         "levers": [lever.name for lever in levers], "seed": seed, "flights": flights,
         "values": state.values.tolist(), "history": state.history,
         "drawn": [d.tolist() for d in state.drawn],
-        "apart": [[[v if np.isfinite(v) else None for v in row] for row in a.tolist()] for a in state.apart]}).encode(), path, force=True)
+        "apart": [[[v if np.isfinite(v) else None for v in row] for row in a.tolist()] for a in state.apart]}).encode(),
+        path, force=True)
 
 
 def _load(path: Path | None, levers: Sequence[Lever], seed: int, flights: int) -> State | None:

@@ -43,7 +43,10 @@ class Lever:
 
 
 def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...]:
-    """The levers of a fit, started from a vehicle and plain effects. near: what recorded flights say of the down range."""
+    """The levers of a fit, started from a vehicle and plain effects.
+
+    near: what recorded flights say of the down range.
+    """
     near = near or NearRange(0.0, -0.045, 0.03, 0.035)
     gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
     yaw = vehicle.yaw_torque_over_thrust_m
@@ -132,7 +135,7 @@ def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float]) ->
 
 
 def mission(levers: Sequence[Lever], values: Sequence[float]) -> dict[str, float]:
-    """What `missions.drawn` takes: what the set height is raised by (height_m), speed of pulses in hover (pulse_mps)."""
+    """What `missions.drawn` takes: height_m added to the set height, pulse_mps of the pulses in hover."""
     return {lever.key: float(v) for lever, v in zip(levers, values, strict=True) if lever.of == MISSION}
 
 
