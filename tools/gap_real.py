@@ -24,6 +24,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import gap_crazypad
+import gap_lift
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.gap.blind import alike
@@ -153,8 +154,8 @@ def answer(case: dict) -> str:
     return first["name"]
 
 
-def show(cases: list[dict]) -> None:
-    """One line for each row and truth: hits, their share with its 95 % interval, and every answer."""
+def show(cases: list[dict], folder: Path) -> None:
+    """One line for each row and truth: hits, their share with its 95 % interval, every answer. folder: the flights."""
     table = defaultdict(lambda: defaultdict(int))
     for c in cases:
         kind = f"{c['row']}, {c['condition']}" if c["row"] == "swarm" else c["row"]
@@ -167,6 +168,12 @@ def show(cases: list[dict]) -> None:
         share = wilson(hits, n)
         told = ", ".join(f"{name} {k}" for name, k in sorted(answers.items(), key=lambda x: -x[1]) if k)
         print(f"| {row} | {truth} | {hits} of {n} [{share['low']:.0%}, {share['high']:.0%}] | {told} |")
+    near = [gap_lift.close(c, folder / "neuralswarm") for c in cases
+            if (c["row"], c["truth"]) == ("swarm", "ground_effect")]
+    if near:
+        share = wilson(sum(near), len(near))
+        print(f"neural-swarm, lift within {gap_lift.CLOSE:.0%} of the measured at 2 and 4 cm: "
+              f"{sum(near)} of {len(near)} [{share['low']:.0%}, {share['high']:.0%}]")
     pads = [{**c, "drone": c["flight"].split("_")[-2]} for c in cases if c["row"] == "crazypad"]
     if pads:
         figures = {"family, balanced": gap_crazypad.balanced, "only damaged rotors named": gap_crazypad.some_named,
@@ -213,7 +220,7 @@ def main(arguments: list[str] | None = None) -> int:
                     out.write(json.dumps(case) + "\n")
             print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
     told = [done[Path(c.flight).name] for c in cases]
-    show(told)
+    show(told, args.flights)
     wrong = [c["flight"] for c in told if answer(c) != c["truth"]]
     if args.quick and len(wrong) > QUICK_WRONG:
         print(f"gap_real: {len(wrong)} of {len(told)} wrong, more than {QUICK_WRONG}: {', '.join(wrong)}",
