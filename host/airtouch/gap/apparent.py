@@ -1,5 +1,7 @@
 """How strong every effect seems to be in flights that have none."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from airtouch.gap.candidates import CLOCK, GATED, SPECTRUM, every, telling
@@ -15,11 +17,11 @@ from airtouch.gap.selection import Judged
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
 
 
-def apparent(data: Data) -> Apparent:
-    """How strong every effect seems to be in flights that have none."""
+def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
+    """How strong every effect but those of `without` seems to be in flights that have none."""
     on = trial_of(data)
-    singles = round_of(on, every(), None, thorough=True)
-    passing = gated(data)
+    singles = round_of(on, every(without), None, thorough=True)
+    passing = gated(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
                     nameless(on, None) / seconds(data),

@@ -58,10 +58,11 @@ def declared(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
     return _study(vehicle, (), flights)
 
 
-def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = True) -> tuple[Study, Calibration]:
+def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = True, without: Sequence[str] = (),
+               ) -> tuple[Study, Calibration]:
     """Fit the vehicle to nominal flights, then measure the floor that is left and, with `scatter`, how strong
 
-    every effect seems to be in them (seconds a flight; naming effects needs it, a map does not).
+    every effect but those of `without` seems to be in them (seconds a flight; naming effects needs it, a map does not).
 
     Flights that cannot be nominal like the others (a touch of the ground, a swapped
     propeller) are left out and named, as long as most agree.
@@ -76,7 +77,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
     study = replace(study, usual=usual_of(Data(study, flights)))
     if scatter:
-        study = replace(study, scatter=scatter_of([apparent(Data(study, [f])) for f in _some(flights)],
+        study = replace(study, scatter=scatter_of([apparent(Data(study, [f]), without) for f in _some(flights)],
                                                     any(_recorded(f) for f in flights), vehicle.name))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))

@@ -31,8 +31,7 @@ AT_FLOOR = 1.0  #: gap that is at its floor
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
-               "nobody "
-               "knows how much of the commanded torque is aliases of a faster loop")
+               "nobody knows how much of the commanded torque is aliases of a faster loop")
 WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 
@@ -45,10 +44,10 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     unmodelled effects, on which the vehicle is calibrated and the floor is measured; without
     them the floor is the sensors' declared noise and the twin view is left out. without:
     names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
-    diagnosis with the same vehicle and baseline, whose calibration is used again. Raises AirTouchError
-    when no flight can be used.
+    diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. Raises
+    AirTouchError when no flight can be used.
     """
-    say = progress or (lambda _: None)
+    say, without = progress or (lambda _: None), tuple(without)
     left_out: list[str] = []
     nominal = list(measure.usable(baseline, vehicle, left_out))
     seen = list(measure.usable(flights, vehicle, left_out))
@@ -60,10 +59,11 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if before is not None and before.held is not None:
         study, fitted = before.held
     else:
-        study, fitted = calibrate.calibrated(vehicle, nominal) if nominal else (calibrate.declared(vehicle, ()), None)
+        study, fitted = calibrate.calibrated(vehicle, nominal, without=without) if nominal \
+            else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = _data(study, some)
-    found = select(data, candidates.every(without), say, tuple(without))
+    found = select(data, candidates.every(without), say, without)
     say("how far")
     ranking, overall, verdict, effects = _ranking(data, found)
     named = [candidates.term_of(e) for e in effects]
