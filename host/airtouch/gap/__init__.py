@@ -2,6 +2,24 @@
 
 `airtouch.gap.diagnose(flights, vehicle, baseline)` and `airtouch.gap.measure(...)` take files, logs or tables, as
 `airtouch.api` says. Both are modules as well, whose functions take logs alone.
+
+Where each decision is made:
+
+- A log made ready: `flight`, `motion`; what is compared: `channels`, `spectra`, `data`.
+- Where the gap lies: `measure`, with `band_sums`, `cell_tables`, `gap_map`, `summary`.
+- What is normal: `calibrate` (the vehicle), `response` and `hardness` (the floor), `twin`, `twin_view`,
+  `loop_model` and `edge_response` (the closed loop), `nominal_scatter` and `apparent` (how strong effects seem to
+  be where there are none).
+- Which effect: `diagnose` calls `select`, which adds effects one by one. `candidates` says how each effect is
+  fitted, `screen` takes a first look, `judging` fits on one half and judges on the other by `fit`, `problem`,
+  `least_squares`, `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the
+  log's times show, `generic` with `basis` what has no name. `selection` holds what was found, with its
+  probabilities.
+- How far: `shrink`. What stays open: `unexplained`. What to fly next: `advice`.
+- Flights without a gyro: `hover_balance`, `balance_result`.
+- The answer: `result`, `words`, `pictures`.
+- Withheld effects: `blind`, with `blind_draw`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
+  `on_cluster`.
 """
 
 import importlib

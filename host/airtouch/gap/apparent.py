@@ -1,4 +1,4 @@
-"""How strong every effect seems to be in flights that have none."""
+"""How strong every effect seems to be in a nominal flight, held against others: what the yardstick is made of."""
 
 from collections.abc import Sequence
 
