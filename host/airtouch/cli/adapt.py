@@ -99,8 +99,8 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
     with Bar("edges") as bar:
         values = edge_fit.refine(aim, craft, listed, fit.best(state), flights=edge_fit.share(BATCH), seed=seed,
                                  fixed=levers.FIXED, progress=bar).values
-    made = files.write(kept, craft, listed, values, recorded.courses, levers.FIXED, force=True)
-    return scenario.load(made[1]), vehicles.load(made[0]), f"twin fitted to {len(recorded.courses)} of them"
+    vehicle_file, scenario_file = files.write(kept, craft, listed, values, recorded.courses, levers.FIXED, force=True)
+    return scenario.load(scenario_file), vehicles.load(vehicle_file), f"twin fitted to {len(recorded.courses)} of them"
 
 
 def _say(found: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:

@@ -184,8 +184,7 @@ def _report(outcome) -> None:
     edges = logs.true_edges(log)
     if outcome.use == "free-air":
         click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the "
-                   "mission sweep "
-                   "does over its own")
+                   "mission sweep does over its own")
     for edge in edges:
         click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: "
                    f"down range {edge.height_before_m:.2f} to {edge.height_after_m:.2f} m")

@@ -59,8 +59,7 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     trained_on = len(result["in_training"])
     if trained_on:
         screen.print(f"warning: the model was trained on {trained_on} of these {len(scores)} flights; how it does on "
-                     "others "
-                     "is what airtouch crossval says")
+                     "others is what airtouch crossval says")
     if json_path:
         show.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")

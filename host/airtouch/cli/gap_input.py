@@ -52,22 +52,22 @@ def files_of(names: Sequence[str]) -> list[Path]:
     for name in names:
         path = Path(name)
         if path.is_dir() and is_bag(path):
-            some = [path]
+            paths = [path]
         elif path.is_dir():
-            some = [p for p in sorted(path.iterdir())
+            paths = [p for p in sorted(path.iterdir())
                     if p.name.endswith(ENDINGS) and p.name != MANIFEST]
         elif path.exists():
             if path.name == MANIFEST:  # which a shell's *.csv names too
                 if len(names) == 1:
                     raise AirTouchError(f"{name}: a list of flights, not a flight; name its folder")
                 continue
-            some = [path]
+            paths = [path]
         else:
-            some = [Path(p)
+            paths = [Path(p)
                     for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file() and Path(p).name != MANIFEST]
-        if not some:
+        if not paths:
             raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
-        found.update(dict.fromkeys(some))
+        found.update(dict.fromkeys(paths))
     return list(found)
 
 

@@ -82,21 +82,21 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
         flown, lost = compare.flown(recorded.courses, craft, listed, values, seed, levers.FIXED, progress=bar)
     with Bar("telling apart") as bar:
         phases: list[str] = []
-        found = compare.compare(recorded, aim, flown, lost, seed,
-                                lambda name: (phases.append(name), bar(len(phases), 6, name)))
+        comparison = compare.compare(recorded, aim, flown, lost, seed,
+                                     lambda name: (phases.append(name), bar(len(phases), 6, name)))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     by_name = {lever.name: float(value) for lever, value in zip(listed, values, strict=True)}
-    write_bytes(json.dumps(_summary(found, by_name, state.history, recorded, typed), indent=1).encode(), out / SUMMARY,
-                force=True)
-    twin_report.write_report(out / REPORT, recorded, found, listed, values, state.history[0]["misfit"],
+    summary = _summary(comparison, by_name, state.history, recorded, typed)
+    write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
+    twin_report.write_report(out / REPORT, recorded, comparison, listed, values, state.history[0]["misfit"],
                              command=typed, force=True)
     click.echo(f"{len(recorded.courses)} flights; misfit in scatters: {_misfit(state.history[0]['misfit'])} "
-               f"-> {_misfit(found.misfit)}")
-    for a in found.auroc:
+               f"-> {_misfit(comparison.misfit)}")
+    for a in comparison.auroc:
         click.echo(f"{a.phase:7} AUROC {a.value:.3f} ({a.low:.3f} to {a.high:.3f}), {a.real_flights} flights, "
                    f"{a.windows} windows; tells: {a.telling[0]}")
     click.echo("largest differences:")
-    for gap in found.gaps[:5]:
+    for gap in comparison.gaps[:5]:
         where, what, difference, scatters, n = twin_report.gap_row(gap)
         click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
@@ -113,10 +113,11 @@ def _misfit(now: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.2f}" for name, value in now.items())
 
 
-def _summary(found: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
+def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
     """What the report shows, as plain values."""
-    return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": found.misfit,
-            "auroc": [asdict(a) for a in found.auroc], "lost": found.lost,
+    return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
+            "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.lost,
             "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,
-                      "difference": g.difference, "scatters": g.scatters, "flights": g.flights} for g in found.gaps],
+                      "difference": g.difference, "scatters": g.scatters, "flights": g.flights}
+                     for g in comparison.gaps],
             "levers": levers, "history": history}

@@ -132,11 +132,10 @@ def golden_stream(network: Int8Network, stride: int) -> tuple[np.ndarray, np.nda
 def _rolling_header(model: Model) -> str:
     network, step = model.int8, stride(model)
     size = rolling_size(network, step)
-    rows, columns, channels = network.input_shape
+    (rows, columns, channels), outputs = network.input_shape, network.outputs
     return f"""// The `paper-stream` detector: {parameter_bytes(network)} bytes of constants.
 // Input: {columns * channels} fused features a sample, on airtouchRollingScale (fixedScaleApply), then quantised:
-// networkInt8Quantise. rollingInt8Init at stride AIRTOUCH_ROLLING_STRIDE, then rollingInt8Step: {
-    network.outputs} logits
+// networkInt8Quantise. rollingInt8Init at stride AIRTOUCH_ROLLING_STRIDE, then rollingInt8Step: {outputs} logits
 // on every {step}th sample, {size.ahead} samples before the window is full. The same network runs over whole windows.
 #pragma once
 
@@ -146,7 +145,7 @@ def _rolling_header(model: Model) -> str:
 #define AIRTOUCH_ROLLING_SHA256 "{model.digest}"
 #define AIRTOUCH_ROLLING_ROWS {rows}
 #define AIRTOUCH_ROLLING_COLUMNS {columns * channels}
-#define AIRTOUCH_ROLLING_OUTPUTS {network.outputs}
+#define AIRTOUCH_ROLLING_OUTPUTS {outputs}
 #define AIRTOUCH_ROLLING_STRIDE {step}
 #define AIRTOUCH_ROLLING_ARENA_BYTES {size.arena_bytes}  // what rollingInt8ArenaBytes says
 

@@ -10,8 +10,7 @@ from airtouch.simulation.effects import EFFECTS
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"
-#: what separates pairs that logs like these confuse, and the mission that shows it, "" where none of the ready ones
-#: does
+#: what separates pairs that logs like these confuse, and the mission that shows it, "" where no ready one does
 SEPARATES = {
     frozenset({"motor_lag", "actuator_delay"}): ("command steps in hover at two step sizes, or log rpm: a lag "
                                                  "rounds the response, a delay shifts it", ""),
@@ -22,8 +21,7 @@ SEPARATES = {
     frozenset({"weak_motor", "com_offset"}): ("add yaw turns: a weak rotor leaves yaw torque, an offset does not", ""),
     frozenset({"rotor_drag", "blade_flapping"}): ("fly faster than 1 m/s: flapping tilts the vehicle as well", ""),
     frozenset({"sensor_latency", "controller_gain"}): ("log the attitude set-points, or fly steps of attitude: a sweep "
-                                                       "has "
-                                                       "them where it starts and stops", "there-and-back"),
+                                                       "has them where it starts and stops", "there-and-back"),
     frozenset({"battery_sag", "thrust_coefficient"}): ("log the battery voltage over a whole flight", "hover"),
 }
 #: mission with most of a phase; take-off and landing are in every one
@@ -49,8 +47,7 @@ def steps(verdict: str, effects: Sequence[Found], alike: Sequence[tuple[str, ...
         said.append(Step("Nothing to add; longer flights would lower the floor."))
     if not baseline:
         said.append(Step("Give flights that are known to be nominal with --baseline: they lower the floor and show "
-                         "delays "
-                         "and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
+                         "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
     if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
         said.append(Step("Log the gyro: it shows torque at every frequency."))
     return tuple(said)
@@ -91,8 +88,7 @@ def _apart(group: tuple[str, ...]) -> Step:
 
 
 def _open(headline: Cell | None, vehicle: str) -> list[Step]:
-    """What to do about a gap that no known effect explains:
-    more of the phase in which most of it is, and a suspicion."""
+    """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
     said = []
     if headline is not None and headline.phase in MISSIONS:
         said.append(Step(f"Repeat the flight with more of {headline.phase}, where most of the gap is.",

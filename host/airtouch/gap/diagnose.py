@@ -63,31 +63,31 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
             else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = _data(study, some)
-    found = select(data, candidates.every(without), say, without)
+    selection = select(data, candidates.every(without), say, without)
     say("how far")
-    ranking, overall, verdict, effects = _ranking(data, found)
+    ranking, overall, verdict, effects = _ranking(data, selection)
     named = [candidates.term_of(e) for e in effects]
     made = gap_map(study, seen, nominal, named)
     first = summary.headline(made.cells, bool(named))
     cells = tuple(dict.fromkeys([c for c in (first,) if c is not None] + where(made)))
-    alike = _alike(found)
+    alike = _alike(selection)
     notes = [n for f in seen for n in f.notes] + left_out
     notes += list(fitted.notes) if fitted else [NO_BASELINE]
     notes += measure.differences(study, nominal)
     notes += measure.flown_unlike(study, seen)
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
-    control = _control(data, found) if verdict == "effect" else {}
+    control = _control(data, selection) if verdict == "effect" else {}
     steps = advices.steps(verdict, effects, alike, first, seen, bool(nominal), vehicle.name)
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), alike, cells,
         {"before": overall.before, "after": overall.after if verdict == "effect" else overall.before,
          "floor": 1.0},
         overall.share if verdict == "effect" else None, control, advices.advice(steps),
-        _arms(vehicle, nominal, some, found, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
+        _arms(vehicle, nominal, some, selection, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
         measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen),
-        tuple(unexplained(study, some, found, cells)) if verdict == "unknown" else (), made, first, steps, vehicle.name,
-        tuple(f.name for f in nominal), fitted.parameters if fitted else {},
+        tuple(unexplained(study, some, selection, cells)) if verdict == "unknown" else (), made, first, steps,
+        vehicle.name, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
         picture.of(study, seen, nominal, named, first, cells) if pictures else None, (study, fitted))
 
 
@@ -97,13 +97,13 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    found = select(data, candidates.every(without), without=tuple(without))
-    ranking, overall, verdict, effects = _ranking(data, found)
+    selection = select(data, candidates.every(without), without=tuple(without))
+    ranking, overall, verdict, effects = _ranking(data, selection)
     named = verdict == "effect"
     return Diagnosis(
-        verdict, tuple(effects), tuple(ranking), _alike(found), (),
+        verdict, tuple(effects), tuple(ranking), _alike(selection), (),
         {"before": overall.before, "after": overall.after if named else overall.before, "floor": 1.0},
-        overall.share if named else None, _control(data, found) if named else {}, "",
+        overall.share if named else None, _control(data, selection) if named else {}, "",
         flights=tuple(f.name for f in flights))
 
 
@@ -123,28 +123,28 @@ def _some(flights: Sequence[Flight]) -> list[Flight]:
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 
 
-def _verdict(found: Selection, before: float) -> str:
+def _verdict(selection: Selection, before: float) -> str:
     """before: the gap over its floor; what does not stand over it is nothing, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
     in both halves of the data, in whose common part the gap is measured.
     """
-    apart = found.chosen is not None and all(t.kind == CLOCK or t.gate for t in found.chosen.terms)
+    apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
     if before <= AT_FLOOR and not apart:
         return "none"
-    if not found.explained:
+    if not selection.explained:
         return "unknown"
-    return "none" if found.chosen is None else "effect"
+    return "none" if selection.chosen is None else "effect"
 
 
-def _effects(data: Data, found: Selection) -> list[Found]:
+def _effects(data: Data, selection: Selection) -> list[Found]:
     """The effects chosen, fitted anew on all the data, with 90 % intervals."""
-    if found.chosen is None:
+    if selection.chosen is None:
         return []
-    others = [t for t in found.whole.terms if t.kind != CLOCK]
+    others = [t for t in selection.whole.terms if t.kind != CLOCK]
     whole = whole_of(data)
-    fitted = fit(data, whole, others, _middle(found.whole)) if others else None
-    chosen = {t.name for t in found.chosen.terms}
+    fitted = fit(data, whole, others, _middle(selection.whole)) if others else None
+    chosen = {t.name for t in selection.chosen.terms}
     out, place = [], 0
     for t in fitted.terms if fitted else ():
         part = slice(place, place + len(t.free)) if t.kind == candidates.MEAN else None
@@ -157,13 +157,13 @@ def _effects(data: Data, found: Selection) -> list[Found]:
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
         known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
-        spread = _spread(data.study.controller, found.whole, t, known)
+        spread = _spread(data.study.controller, selection.whole, t, known)
         out.append(Found(t.name, t.quantities(x, spread), t.gate))
-    for t in (t for t in found.chosen.terms if t.kind == CLOCK):
+    for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
         x = t.scaled(t.values)
         n = sum(len(f) for f in data.flights)
         out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
-    order = {s.name: i for i, s in reversed(list(enumerate(found.named)))}
+    order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
     return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
 
 
@@ -209,24 +209,24 @@ def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray
     return covariance + apart + doubt
 
 
-def _ranking(data: Data, found: Selection) -> tuple[list[Ranked], Shrink, str, list[Found]]:
+def _ranking(data: Data, selection: Selection) -> tuple[list[Ranked], Shrink, str, list[Found]]:
     """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
-    parts = found.parts
-    overall = shrink_of(data, parts, found.chosen)
-    verdict = _verdict(found, overall.before)
-    effects = _effects(data, found) if verdict == "effect" else []
+    parts = selection.parts
+    overall = shrink_of(data, parts, selection.chosen)
+    verdict = _verdict(selection, overall.before)
+    effects = _effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
-    chance = agreeing(probabilities(found, verdict == "none"), answer)
+    chance = agreeing(probabilities(selection, verdict == "none"), answer)
     out = []
     for name, p in chance.items():
-        one = found.singles.get(name)
+        one = selection.singles.get(name)
         share = Quantity(0.0)
-        if name == answer and found.chosen is not None and len(found.named) == 1:
+        if name == answer and selection.chosen is not None and len(selection.named) == 1:
             share = overall.share
         elif one is not None and one.full and one.gain > FIRST_GAIN:
             share = shrink_of(data, parts, one).share
-        out.append(Ranked(name, float(p), share, why_not(found, name, verdict)))
-    order = {n: j.gain for n, j in found.singles.items()}
+        out.append(Ranked(name, float(p), share, why_not(selection, name, verdict)))
+    order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out, overall, verdict, effects
 
@@ -242,44 +242,44 @@ def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
     return out
 
 
-def _alike(found: Selection) -> tuple[tuple[str, ...], ...]:
+def _alike(selection: Selection) -> tuple[tuple[str, ...], ...]:
     """Sets that these logs cannot tell apart: named twins, and candidates as good as the best."""
-    if not found.named:
+    if not selection.named:
         return ()
     groups = []
-    best = found.named[0]
-    same = [n for n, j in found.singles.items() if j.full and best.gain - j.gain < CLOSE]
+    best = selection.named[0]
+    same = [n for n, j in selection.singles.items() if j.full and best.gain - j.gain < CLOSE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
-    for step in found.named:
+    for step in selection.named:
         twins = candidates.twins_of(step.name)
         if twins and not any(step.name in g for g in groups):
             groups.append(tuple(sorted(twins[0])))
     return tuple(groups)
 
 
-def _control(data: Data, found: Selection) -> dict[str, object]:
+def _control(data: Data, selection: Selection) -> dict[str, object]:
     """The gap with a deliberately wrong effect in the model."""
-    taken = {n for g in _alike(found) for n in g} | {s.name for s in found.named}
+    taken = {n for g in _alike(selection) for n in g} | {s.name for s in selection.named}
     every = candidates.every()
     for name in WRONG:
         if name in every and name not in taken:
-            fits = tuple(fit(data, p, every[name][0]) for p in found.parts)
-            done = shrink_of(data, found.parts, Judged(name, fits[0].terms, 0.0, fits))
+            fits = tuple(fit(data, p, every[name][0]) for p in selection.parts)
+            done = shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits))
             return {"name": name, "before": done.before, "after": done.after, "shrink": done.share.plain()}
     return {}
 
 
-def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], found: Selection,
+def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], selection: Selection,
           overall: Shrink) -> dict[str, object]:
     """The shrink with the vehicle as calibrated (or declared, without baseline) and as its file declares it."""
-    if not nominal or found.chosen is None:
+    if not nominal or selection.chosen is None:
         return {"declared": _plain(overall)}
     data = Data(calibrate.declared(vehicle, nominal), some)
     parts = halves(data)
-    terms = tuple(t for t in found.chosen.terms if t.kind != CLOCK)
-    fits = tuple(fit(data, p, terms, _start(terms, found.chosen)) for p in parts)
-    one = shrink_of(data, parts, Judged(found.chosen.name, terms, 0.0, fits))
+    terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
+    fits = tuple(fit(data, p, terms, _start(terms, selection.chosen)) for p in parts)
+    one = shrink_of(data, parts, Judged(selection.chosen.name, terms, 0.0, fits))
     return {"declared": _plain(one), "calibrated": _plain(overall)}
 
 

@@ -77,7 +77,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
     twins = {n for t in held if not t.companion and (group := twins_of(t.name)) for n in group[0] if n != t.name}
     left, added = _left(on, chosen)
-    looked, sure, shaken = [], [], []
+    looked, sure, with_random = [], [], []
     for name, variants in candidates.items():
         progress(name)
         if name in twins:
@@ -97,11 +97,11 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
                                      strength=own.among_all(np.mean(fitted, axis=0)[:k]),
                                      variance=own.among_all(_of_mean(variances)[:k], np.inf)))
             elif any(t.kind == SPECTRUM for t in terms):
-                shaken.append((name, terms, choice))
+                with_random.append((name, terms, choice))
             else:
                 sure.append(crossed(on, name, terms, chosen, choice))
     looked = _best_variants(looked)
-    tried = _shaken(on, left, added, chosen, shaken, looked, thorough)
+    tried = _with_random_parts(on, left, added, chosen, with_random, looked, thorough)
     sure += [j for j in tried if j.full]
     looked += [j for j in tried if not j.full]
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
@@ -138,9 +138,9 @@ def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
     return best
 
 
-def _shaken(on: Trial, left: Sequence[np.ndarray], added: Sequence[np.ndarray], chosen: Judged | None,
-            hypotheses: Sequence[tuple[str, Hypothesis, float]], means: Sequence[Judged], thorough: bool,
-            ) -> list[Judged]:
+def _with_random_parts(on: Trial, left: Sequence[np.ndarray], added: Sequence[np.ndarray], chosen: Judged | None,
+                       hypotheses: Sequence[tuple[str, Hypothesis, float]], means: Sequence[Judged], thorough: bool,
+                       ) -> list[Judged]:
     """Hypotheses with a random effect: the variant of each that a first look finds best is judged in full.
 
     hypotheses: name, terms, and what the choice of the variant costs. means: looks at mean effects, best first; the
@@ -210,10 +210,10 @@ def price_of(terms: Sequence[Term]) -> float:
 
 def _best_variants(looked: Sequence[Judged]) -> list[Judged]:
     """The best of each candidate's variants of one length, best first."""
-    kept: dict[tuple[str, int], Judged] = {}
+    best: dict[tuple[str, int], Judged] = {}
     for j in sorted(looked, key=lambda j: -j.gain):
-        kept.setdefault((j.name, len(j.terms)), j)
-    return list(kept.values())
+        best.setdefault((j.name, len(j.terms)), j)
+    return list(best.values())
 
 
 def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
@@ -230,15 +230,15 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
         gain += sum(clock_gain(on.data, t)[1] for t in held if t.kind == CLOCK)
         for train, test in ROUND_TRIP:
             part = on.parts[train]
-            found = _refined(on.data, part, fit(on.data, part, others, _start(chosen, others, train)))
-            gain += gain_of(on, test, found.terms) if others else 0.0
-            fits.append(found)
-        gain -= price_of(found.terms if others else ()) + paid
+            refined = _refined(on.data, part, fit(on.data, part, others, _start(chosen, others, train)))
+            gain += gain_of(on, test, refined.terms) if others else 0.0
+            fits.append(refined)
+        gain -= price_of(refined.terms if others else ()) + paid
     fitted = list(fits[0].terms) if fits else []
     for t in (t for t in joint if t.kind == CLOCK):
-        made, more = clock_gain(on.data, t)
-        fitted.append(made)
-        gain += more if t in timed else 0.0
+        on_clock, clock_nats = clock_gain(on.data, t)
+        fitted.append(on_clock)
+        gain += clock_nats if t in timed else 0.0
     strength, variance = strength_of(telling(terms), fitted, fits)
     return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, variance=variance)
 
@@ -254,8 +254,8 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
     k: of all parameters that the effect may have free; those that this variant leaves alone are 0, and nobody knows
     how far they lie from it.
     """
-    every = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
-    same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in every]
+    hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
+    same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
     k = len(term.free)
     strength = term.among_all(np.mean([t.scaled(t.values)[:k] for t in same], axis=0))
     if term.kind != MEAN:
