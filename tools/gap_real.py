@@ -23,6 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np
+
 import gap_crazypad
 import gap_lift
 from airtouch import vehicle as vehicles
@@ -174,6 +176,10 @@ def show(cases: list[dict], folder: Path) -> None:
         share = wilson(sum(near), len(near))
         print(f"neural-swarm, lift within {gap_lift.CLOSE:.0%} of the measured at 2 and 4 cm: "
               f"{sum(near)} of {len(near)} [{share['low']:.0%}, {share['high']:.0%}]")
+    seconds = [c["seconds"] for c in cases if "seconds" in c]
+    if seconds:
+        middle, most = np.quantile(seconds, [0.5, 0.9])
+        print(f"{len(seconds)} diagnoses: {middle:.0f} s in the middle, {most:.0f} s at most in nine of ten")
     pads = [{**c, "drone": c["flight"].split("_")[-2]} for c in cases if c["row"] == "crazypad"]
     if pads:
         figures = {"family, balanced": gap_crazypad.balanced, "only damaged rotors named": gap_crazypad.some_named,
