@@ -1,0 +1,54 @@
+"""How much `best` hangs on which half of the samples it computes at: `python tools/half_of_best.py [FOLDER]`.
+
+`best` computes at every second sample. A log that begins one sample later makes it compute at the others, which is what
+parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2 of the manifest's clean flights.
+"""
+
+import csv
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector import best
+from airtouch.logs.flight_log import ACC_WORLD, FlightLog
+
+FOLDS = ("0", "1", "2")
+CLOSE = 10  #: samples of 100 Hz within which an edge counts as the same
+
+
+def later(log: FlightLog) -> FlightLog:
+    """The log without its first sample."""
+    return FlightLog({name: values[1:] for name, values in log.columns.items()}, log.meta)
+
+
+def turned(log: FlightLog) -> FlightLog:
+    """The same flight at a heading of 90 degrees more, as a log of world axes would show it."""
+    x, y, _ = ACC_WORLD
+    return FlightLog({**log.columns, x: -log[y], y: log[x]}, log.meta)
+
+
+def same(one: list, other: list, shift: int = 0) -> bool:
+    """Whether two lists of edges have the same kinds in the same order, each within CLOSE samples."""
+    return [e.kind for e in one] == [e.kind for e in other] and all(
+        abs(a.sample - b.sample - shift) <= CLOSE for a, b in zip(one, other, strict=True))
+
+
+def main(folder: Path) -> None:
+    """Read, detect twice, print."""
+    with open(folder / "manifest.csv") as file:
+        chosen = [row["file"] for row in csv.DictReader(file) if row["use"] == "clean" and row["fold"] in FOLDS]
+    halves, headings = [], []
+    for name in chosen:
+        log = logs.read(folder / name)
+        edges = best.run(log).edges
+        halves.append(same(edges, best.run(later(log)).edges, 1))
+        if log.has(*ACC_WORLD):
+            headings.append(same(edges, best.run(turned(log)).edges))
+    for what, found in (("a log one sample shorter at its start", halves), ("a heading of 90 degrees more", headings)):
+        print(f"{what}: the same edges within {CLOSE / 100:.1f} s in {np.sum(found)} of {len(found)} flights")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/flights/airtouch"))
