@@ -17,8 +17,9 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import AppCore
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
-from tools.emulate import build
+from tools.emulate import build, gap8
 from tools.emulate.board import REPLAY, Board
+from tools.emulate.deck import CLEAR, Deck, Faults, frame
 from tools.emulate.replay import FED, desktop_values, differs, replay, rows, sample
 
 ROOT = Path(__file__).parents[2]
@@ -118,6 +119,68 @@ def test_a_bit_more_is_a_difference():
     assert differs("fwz", off, values["fwz"]) and differs("steps", values["steps"] + 1, values["steps"])
     assert differs("health", int(values["health"]) ^ 1, values["health"]) and not differs("late", 7, 0)
     assert not differs("thresh", np.nan, np.nan) and differs("thresh", 1.0, np.nan) and differs("fwz", -0.0, 0.0)
+
+
+class Wire:
+    """A board that only notes what it is told."""
+
+    def __init__(self):
+        self.said, self.handlers = [], {}
+
+    def on(self, kind, handler):
+        self.handlers[kind] = handler
+
+    def say(self, kind, content=b""):
+        self.said.append(content)
+
+    def go(self):
+        pass
+
+
+def test_the_deck_frames_takes_turns_and_answers():
+    """CPX over UART: 0xff, length, route, data and the exclusive or of all; a frame only after the other's ff 00."""
+    core = AppCore({"detector": gap8.DETECTOR}, have_gap8=True)
+    core.step([0.0, 0.0, 9.8], [0.0, 0.0, 0.0], [40_000.0] * 4)
+    reset, = core.packets()
+    whole = bytes([0xFF, len(reset) + 2, 4 | 1 << 3 | 1 << 6, 5]) + reset
+    xor = 0
+    for byte in whole:
+        xor ^= byte
+    wire = Wire()
+    deck = Deck(wire)
+    deck.turn(0)
+    wire.handlers["U"](whole[:5])
+    assert wire.said == []
+    wire.handlers["U"](whole[5:] + bytes([xor]))
+    assert deck.sent == [reset] and wire.said == [CLEAR], "it may go on; the answer waits for its turn"
+    wire.handlers["U"](CLEAR)
+    reply, = deck.taken()
+    assert wire.said[-1] == frame(reply) and frame(reply)[2:4] == bytes([1 | 4 << 3 | 1 << 6, 5])
+    core.receive(reply)
+    core.step([0.0, 0.0, 9.8], [0.0, 0.0, 0.0], [40_000.0] * 4)
+    assert core.log.link == 1, "filling: the GAP8 has taken the reset"
+
+
+def test_a_deck_that_is_not_there_and_a_packet_for_the_wifi():
+    wire = Wire()
+    deck = Deck(wire, Faults(there=False))
+    wire.handlers["U"](CLEAR)
+    assert wire.said == []
+    deck = Deck(wire)
+    wire.handlers["U"](frame(b"name")[:2] + bytes([2 | 1 << 3 | 1 << 6, 4]) + b"name" + b"\0")
+    assert deck.sent == [] and wire.said == [CLEAR]
+
+
+@pytest.mark.slow
+def test_the_network_on_the_gap8_and_what_may_go_wrong(image, log):
+    build.compile_firmware(Path(os.environ["CRAZYFLIE_BASE"]), "app-config-gap8")
+    elf = build.link()
+    for faults, link in ((Faults(late=3, lost=0.1, damaged=0.1), "up"), (Faults(dead=(0, 1 << 30)), "starting"),
+                         (Faults(there=False), "starting")):
+        found = gap8.replay(elf, log, 400, faults)
+        assert (found.steps, found.different, found.other_packets, found.link) == (400, 0, 0, link), found.first
+    with pytest.raises(AirTouchError, match="cpx_uart_transport.c"):
+        gap8.replay(elf, log, 200, Faults(wrong_byte=50))
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
     python -m tools.emulate ~/crazyflie-firmware                    # two recorded flights through the log variables
     python -m tools.emulate ~/crazyflie-firmware flight.csv --steps 2400
     python -m tools.emulate ~/crazyflie-firmware --fly              # its stabilizer flies the simulator's drone
+    python -m tools.emulate ~/crazyflie-firmware --gap8             # with the network on the GAP8, and faults
     python -m tools.emulate ~/crazyflie-firmware --height           # with and without the height over a platform
 """
 
@@ -18,7 +19,7 @@ from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
-from tools.emulate import build, height
+from tools.emulate import build, gap8, height
 from tools.emulate.compare import report
 from tools.emulate.replay import Replay, replay
 
@@ -39,6 +40,11 @@ def recorded(count: int) -> list[FlightLog]:
     return [log] if isinstance(log, FlightLog) else []
 
 
+def later(log: FlightLog, begin: int) -> FlightLog:
+    """The log from this row on."""
+    return FlightLog({name: values[begin:] for name, values in log.columns.items()}, log.meta)
+
+
 def show(what: str, seconds: float, found: Replay) -> None:
     """A line of the table, and what differed."""
     task, words = found.least_left
@@ -57,25 +63,32 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
     parser.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
     parser.add_argument("--steps", type=int, default=2400, help="of each flight (2400)")
+    parser.add_argument("--begin", type=int, default=0, help="first row of each flight (0)")
     parser.add_argument("--built", action="store_true", help="take what `make firmware` built last")
     parser.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
     parser.add_argument("--height", action="store_true",
                         help="closed loop over edges of every kind: the height kept or not")
+    parser.add_argument("--gap8", action="store_true",
+                        help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
     given = parser.parse_args(arguments)
     build.tools()
     if not given.built:
-        build.compile_firmware(given.base.expanduser().resolve(), "app-config-height" if given.height else "app-config")
+        build.compile_firmware(given.base.expanduser().resolve(), given.height and "app-config-height" or
+                               given.gap8 and "app-config-gap8" or "app-config")
     elf = build.link()
     if given.fly:
         return 0 if report(elf) else 1
     if given.height:
         return 0 if height.report(elf) else 1
+    if given.gap8:
+        log = read(given.flights[0]) if given.flights else recorded(1)[0]
+        return 0 if gap8.report(elf, later(log, given.begin), given.steps) else 1
     logs = [read(path) for path in given.flights] or recorded(2)
     different = 0
     for i, log in enumerate(logs):
         changes = CHANGES if i == len(logs) - 1 else {}
         begun = time.monotonic()
-        found = replay(elf, log, given.steps, changes)
+        found = replay(elf, later(log, given.begin), given.steps, changes)
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
         show(name, time.monotonic() - begun, found)

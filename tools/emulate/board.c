@@ -257,7 +257,15 @@ int __wrap_uart2GetData(size_t size, uint8_t *buffer) {
   return __wrap_uart2GetDataWithTimeout(size, buffer, portMAX_DELAY);
 }
 
-void __wrap_uart2SendData(uint32_t size, uint8_t *data) { say('U', data, (uint16_t)size); }
+static void listenAlone(void);
+
+/** What the deck says to that is here before the next byte goes out. */
+void __wrap_uart2SendData(uint32_t size, uint8_t *data) {
+  say('U', data, (uint16_t)size);
+  if (deckThere) {
+    listenAlone();
+  }
+}
 
 // ---- what the desktop has to say
 
@@ -333,6 +341,14 @@ static void listen(void) {
         stop(6);
     }
   }
+}
+
+/** The same, with nobody else at the pipe meanwhile. */
+static void listenAlone(void) {
+  const uint32_t state = __get_PRIMASK();
+  __disable_irq();
+  listen();
+  __set_PRIMASK(state);
 }
 
 /** The firmware's tables are there: what is to be reported and fed can be said. */
@@ -579,7 +595,12 @@ void __wrap_vTaskDelayUntil(TickType_t *due, const TickType_t period) {
   }
   __real_vTaskDelayUntil(due, period);
   if (step && mode != FLYING) {
-    listen();
+    if (deckThere) {
+      say('A', NULL, 0);  // its turn, and not the deck's
+      listenAlone();
+    } else {
+      listen();
+    }
   }
   if (ending) {
     stacks();

@@ -112,16 +112,21 @@ def replay(elf: Path, log: FlightLog, steps: int | None = None,
             values = board.values(board.hear("S"))
             if kind != EDGES[0]:
                 found.edges.append((step, kind))
-            _compare(found, step, values, desktop_values(core))
+            compare(found, step, values, desktop_values(core))
         found.late, found.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
         left = board.end()
         found.console = board.console
-    found.stack_bytes = 4 * (APP_STACK_WORDS - left["APP"])
-    found.least_left = min(left.items(), key=lambda item: item[1])
+    found.stack_bytes, found.least_left = stack(left)
     return found
 
 
-def _compare(found: Replay, step: int, board: Mapping[str, float], desktop: Mapping[str, float]) -> None:
+def stack(left: Mapping[str, int]) -> tuple[int, tuple[str, int]]:
+    """Bytes of the app's stack in use, and the task with the fewest unused words, of what a board's end gives."""
+    return 4 * (APP_STACK_WORDS - left["APP"]), min(left.items(), key=lambda item: item[1])
+
+
+def compare(found: Replay, step: int, board: Mapping[str, float], desktop: Mapping[str, float]) -> None:
+    """Count a step and what differs in it: log variables of the board (with their group) and of the desktop."""
     other = [name for name in LOGS if name != "prob" and differs(name, board[f"airtouch.{name}"], desktop[name])]
     one, two = float(board["airtouch.prob"]), float(desktop["prob"])
     if np.isnan(one) != np.isnan(two):

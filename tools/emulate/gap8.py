@@ -1,0 +1,132 @@
+"""The image with the AI-deck's driver: a flight whose network runs on the GAP8, with what may go wrong on the way.
+
+Each step of the app is compared with the desktop's core that gets the same samples and packets, and each packet that
+came over the UART with what that core sends.
+"""
+
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
+from airtouch.kernels.app_core import DETECTORS, EDGES, HEALTH, LINK, AppCore
+from airtouch.logs.flight_log import FlightLog
+from airtouch.sitl.app import LOGS
+from tools.emulate.board import REPLAY, Board
+from tools.emulate.deck import Deck, Faults
+from tools.emulate.replay import FED, VEHICLE, Replay, compare, desktop_values, rows, sample, stack
+
+DETECTOR = DETECTORS.index("best-gap8")
+NONCE = slice(8, 12)  #: of the first packet, a RESET (edge_link.h)
+CASES = {
+    "a GAP8 that answers": Faults(),
+    "answers 8 steps late": Faults(late=8),
+    "a tenth of the packets lost": Faults(lost=0.1),
+    "a tenth of the packets damaged": Faults(damaged=0.1),
+    "a GAP8 without power from step 500 to 800": Faults(dead=(500, 800), reset=799),
+    "a GAP8 that never answers": Faults(dead=(0, 1 << 30)),
+    "an AI-deck that never answers": Faults(there=False),
+}
+
+WRONG_BYTE = Faults(wrong_byte=100)
+COUNTERS = ("answers", "lag", "lost", "dropped", "timeouts", "resets")
+
+
+@dataclass
+class Linked(Replay):
+    """A replay, with the packets that came over the UART, those that were other than the desktop's and those
+    that were taken and had not come out at the end, and what the log says of the link."""
+
+    packets: int = 0
+    other_packets: int = 0
+    kept_packets: int = 0
+    link: str = ""
+    health: tuple[str, ...] = ()
+    counters: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass
+class _Step:
+    """What the board had in a step: its row, its log after it, and the packets that it was given."""
+
+    row: np.ndarray
+    values: dict[str, float]
+    packets: list[bytes]
+
+
+def replay(elf: Path, log: FlightLog, steps: int, faults: Faults) -> Linked:
+    """Fly a recorded flight through the emulated firmware with the network on the GAP8."""
+    table, made, found = rows(log)[:steps], [], Linked()
+    board = Board(elf, REPLAY, [f"airtouch.{name}" for name in LOGS], ai_deck=True)
+    deck = Deck(board, faults)
+    with board:
+        board.ask("W", FED)
+        board.parameter("airtouch.detector", DETECTOR)
+        board.go()
+        for step, row in enumerate(table):
+            board.hear("A")
+            deck.turn(step)
+            board.say("V", row.tobytes())
+            board.go()
+            values = board.values(board.hear("S"))
+            made.append(_Step(row, values, deck.taken()))
+        board.hear("A")
+        left = board.end()
+    _follow(found, made, deck.sent)
+    found.late, found.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
+    found.console, (found.stack_bytes, found.least_left) = board.console, stack(left)
+    found.link = LINK[int(values["airtouch.link"])]
+    found.health = tuple(name for name, bit in HEALTH.items() if int(values["airtouch.health"]) & bit)
+    found.counters = {name: int(values[f"airtouch.{name}"]) for name in COUNTERS}
+    return found
+
+
+def _follow(found: Linked, made: list[_Step], sent: list[bytes]) -> None:
+    """Make the same steps on the desktop, and compare them and the packets.
+
+    The board's nonce is in its first packet; that CPX's queue took no packet shows in the next step's `dropped`.
+    """
+    nonce = struct.unpack("<I", sent[0][NONCE])[0] if sent else 1
+    core, wanted = AppCore(have_gap8=True, nonce=nonce, vehicle=vehicles.load(VEHICLE)), []
+    core.set_params(detector=DETECTOR)
+    for i, step in enumerate(made):
+        for packet in step.packets:
+            core.receive(packet)
+        acc, gyro, pwm, volts, attitude = sample(step.row)
+        kind = core.step(acc, gyro, pwm, vbat_v=volts, attitude=attitude)
+        if kind != EDGES[0]:
+            found.edges.append((i, kind))
+        compare(found, i, step.values, desktop_values(core))
+        after = made[min(i + 1, len(made) - 1)].values
+        wanted += core.packets(taken=after["airtouch.dropped"] == step.values["airtouch.dropped"])
+    found.packets = len(sent)
+    found.other_packets = sum(one != other for one, other in zip(sent, wanted, strict=False))
+    found.kept_packets = len(wanted) - len(sent)
+
+
+def report(elf: Path, log: FlightLog, steps: int) -> bool:
+    """Fly every case, print; whether no step and no packet differed, and the wrong byte was told."""
+    well = True
+    for what, faults in CASES.items():
+        found = replay(elf, log, steps, faults)
+        well = well and not found.different and not found.other_packets
+        task, words = found.least_left
+        print(f"{what}: {found.steps} steps, {found.different} differ, {found.packets} packets, {found.other_packets} "
+              f"differ, {found.kept_packets} still in queues; edges "
+              f"{' '.join(f'{kind}@{step}' for step, kind in found.edges) or 'none'}\n  link {found.link}, health: "
+              f"{', '.join(found.health) or 'good'}; " + ", ".join(f"{k} {v}" for k, v in found.counters.items())
+              + f"\n  late {found.late}, longest step {found.longest_us} us; app's stack {found.stack_bytes} of 1600 "
+              f"bytes, least left of any task {4 * words} ({task})", flush=True)
+        if found.first:
+            print(f"  first difference: {found.first}")
+    try:
+        replay(elf, log, steps, WRONG_BYTE)
+    except AirTouchError as error:
+        print(f"a byte of the UART that CPX's own checksum refuses: {error}")
+    else:
+        print("a byte of the UART that CPX's own checksum refuses: nothing happened")
+        well = False
+    return well
