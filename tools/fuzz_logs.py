@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
 
-from log_fuzzing import hostile, mutations, sound, usd_mutations, walk
+from log_fuzzing import hostile, mutations, sound, usd_mutations, usd_old_mutations, walk
 
 MOST_S, MOST_S_PER_MB = 1.0, 10.0  #: processor time for one input
 MOST_MB, MOST_MB_PER_MB = 96.0, 400.0  #: memory above what the process held before
@@ -47,6 +47,8 @@ def mutated(name: str, seed: int, number: int) -> tuple[bytes, Random]:
     """One input, and the generator for what the walk chooses."""
     r = Random(f"{seed} {name} {number}")
     base = r.choice(files_of(name))
+    if name == "usd-0":
+        return usd_old_mutations.usd_old(base, r), r
     if name.startswith("usd"):
         return usd_mutations.usd(base, r), r
     if name == "parquet":

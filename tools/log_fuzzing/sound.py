@@ -148,6 +148,42 @@ def packed(version: int, events: list, records: list) -> bytes:
     return data + struct.pack("<I", zlib.crc32(data))
 
 
+def usd_old(flight: Motion) -> bytes:
+    """A uSD log of firmware before March 2021, with the attitude swinging in pitch and no gyro but the estimator's."""
+    swing = 0.3 * np.sin(4.0 * flight.time_s)
+    table = {"tick": np.round(1e3 * flight.time_s)}
+    table |= {name: v for name, v in _variables(flight).items() if not name.startswith("gyro")}
+    table |= {"stateEstimate.qy": np.sin(0.5 * swing), "stateEstimate.qw": np.cos(0.5 * swing)}
+    rates = {"Roll": 0.0 * swing, "Pitch": 1.2 * np.cos(4.0 * flight.time_s), "Yaw": 0.0 * swing}
+    table |= {f"stateEstimateZ.rate{axis}": np.round(1e3 * rate) for axis, rate in rates.items()}
+    kinds = ["I" if name == "tick" or name.endswith("quat") else "h" if ".rate" in name else
+             "H" if name.startswith(("motor", "range", "pm")) else "f" for name in table]
+    packer = struct.Struct("<" + "".join(kinds))
+    rows = [packer.pack(*(v if kind == "f" else int(v) for v, kind in zip(row, kinds, strict=True)))
+            for row in np.column_stack(list(table.values())).tolist()]
+    return packed_old([(name.encode(), kind) for name, kind in zip(table, kinds, strict=True)], rows, 7)
+
+
+def packed_old(variables: list, rows: list[bytes], a_block: int,
+               other: Callable[[int, bytes], tuple[int, bytes]] = lambda count, checksum: (count, checksum)) -> bytes:
+    """The bytes of an old uSD log: variables (name, type), packed rows, so many a block.
+
+    other: row count and checksum of a block in place of the right ones.
+    """
+    head = bytes([len(variables) % 256]) + b"".join(b"%s(%s)," % (name, kind.encode()) for name, kind in variables)
+    out = [head, _uninverted(head)]
+    for k in range(0, len(rows), a_block):
+        block = rows[k:k + a_block]
+        count, checksum = other(len(block), _uninverted(bytes([len(block)]) + b"".join(block)))
+        out += [bytes([count]), *block, checksum]
+    return b"".join(out)
+
+
+def _uninverted(data: bytes) -> bytes:
+    """The CRC-32 of data without its final inversion."""
+    return struct.pack("<I", zlib.crc32(data) ^ 0xFFFFFFFF)
+
+
 def parquet(flight: Motion) -> bytes:
     """AirTouch's Parquet."""
     import pyarrow
@@ -164,7 +200,8 @@ FORMATS: dict[str, Callable[[Motion], bytes]] = {
     **{f"authors-{n}": lambda flight, n=n: authors(flight, n) for n in AUTHORS},
     "crazypad": crazypad, "imrclab": imrclab, "thrust-stand": thrust_stand, "canonical": canonical,
     "canonical-gz": lambda flight: gzip.compress(canonical(flight), 1, mtime=0),
-    "usd-1": lambda flight: usd(flight, 1), "usd-2": lambda flight: usd(flight, 2), "parquet": parquet,
+    "usd-0": usd_old, "usd-1": lambda flight: usd(flight, 1), "usd-2": lambda flight: usd(flight, 2),
+    "parquet": parquet,
 }
 SIZES = ((1, 0.01), (4, 0.01), (40, 0.002), (70, 0.01), (70, 0.001), (160, 0.01))  #: rows, seconds between them
 
