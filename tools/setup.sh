@@ -19,4 +19,4 @@ if ! "$python" -m venv .venv 2>/dev/null; then
 fi
 echo "Installing pinned packages into .venv (about 2 GB, a minute or two); pip says what it fetches..."
 .venv/bin/python -m pip install --quiet --disable-pip-version-check -c tools/constraints.txt "setuptools>=80,<83" wheel
-.venv/bin/python -m pip install --progress-bar on --disable-pip-version-check -c tools/constraints.txt --no-build-isolation --editable ".[plots,parquet,pandas,ulog,ros,train,dataset,map,test,bench,scale,fly,flash]"
+.venv/bin/python -m pip install --progress-bar on --disable-pip-version-check -c tools/constraints.txt --no-build-isolation --editable ".[plots,parquet,pandas,ulog,ros,train,dataset,map,vision,test,bench,scale,fly,flash]"

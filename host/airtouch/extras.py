@@ -6,7 +6,8 @@ from airtouch.errors import AirTouchError
 
 #: extra of `pip install 'airtouch[EXTRA]'` -> modules that it brings
 EXTRAS = {"plots": ("matplotlib",), "train": ("tensorflow", "keras", "sklearn", "matplotlib"), "fly": ("cflib",),
-          "map": ("shapely", "matplotlib"), "scale": ("distributed",), "parquet": ("pyarrow",),
+          "map": ("shapely", "matplotlib"), "vision": ("cv2", "matplotlib"), "scale": ("distributed",),
+          "parquet": ("pyarrow",),
           "ulog": ("pyulog",), "ros": ("rosbags",), "rerun": ("rerun",), "pandas": ("pandas",)}
 
 

@@ -11,13 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import ina219
-import power
 from airtouch.errors import AirTouchError
+from airtouch.power import ina219, stages
 
 ROOT = Path(__file__).parents[2]
 
-KNOWN = tuple(power.PAPER_MW)
+KNOWN = tuple(stages.PAPER_MW)
 
 
 def text(times_ms, volts, milliamperes, stage=None, header="time_ms,bus_V,current_mA,stage"):
@@ -131,11 +130,11 @@ LEVELS = {"baseline": 78.0, "fc-fe": 84.0, "CCS_FF": 86.0, "Filter": 88.0, "netw
 def test_each_stage_is_what_it_adds(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(measured(LEVELS))
-    stages = ina219.by_stage(ina219.parse(path.read_text(), "run.csv"), KNOWN)
-    assert list(stages) == list(KNOWN)
-    for name, (mw, half) in ina219.added(stages).items():
-        assert mw == pytest.approx(power.PAPER_MW[name], abs=2 * half + 0.1) and 0.0 < half < 1.0
-    shown = power.table(stages)
+    found = ina219.by_stage(ina219.parse(path.read_text(), "run.csv"), KNOWN)
+    assert list(found) == list(KNOWN)
+    for name, (mw, half) in ina219.added(found).items():
+        assert mw == pytest.approx(stages.PAPER_MW[name], abs=2 * half + 0.1) and 0.0 < half < 1.0
+    shown = stages.table(found)
     assert re.search(r"Physical Knowledge-aided Network\s+3[23]\.\d \[.*\]\s+3[23]\d\s+33\s", shown)
     assert re.search(r"Total\s+12[01]\.\d \[.*\]\s+121", shown)
 
@@ -157,8 +156,8 @@ def test_the_script_reads_one_file_a_stage_and_refuses_what_it_cannot(tmp_path):
 
 
 def test_the_estimate_follows_from_its_counts_and_says_that_it_is_one():
-    budget, gap8 = (power.counts(ROOT / "tests" / "emulation" / f"{name}.toml") for name in ("budget", "gap8_budget"))
-    found = power.estimate(budget, gap8)
+    budget, gap8 = (stages.counts(ROOT / "tests" / "emulation" / f"{name}.toml") for name in ("budget", "gap8_budget"))
+    found = stages.estimate(budget, gap8)
     one = budget["cortex-m4"]["band_power"]["instructions_mean"] * 100 / 168e6  # share of the core at a cycle each
     assert found["FC-FE"].low_mw == pytest.approx(one * 20 * 3.7)
     assert found["FC-FE"].high_mw == pytest.approx(one * 2 * 40 * 3.7)
@@ -166,17 +165,17 @@ def test_the_estimate_follows_from_its_counts_and_says_that_it_is_one():
     assert window.high_mw == pytest.approx(gap8["paper"]["window_instructions"] * 100 * 64 / 800e6)
     assert window.low_mw == pytest.approx(8 * gap8["paper"]["cycles_8"] * 100 * 64 / 800e6)
     assert found["network, best on the GAP8"].low_mw == found["network, best on the GAP8"].high_mw
-    assert power.estimate_table(found).count("ESTIMATE") == 2
+    assert stages.estimate_table(found).count("ESTIMATE") == 2
     assert all(math.isfinite(e.high_mw) and e.low_mw <= e.high_mw for e in found.values())
 
 
 def test_budgets_that_lack_something_are_refused():
     with pytest.raises(AirTouchError, match="no instructions_mean for cortex-m4.band_power"):
-        power.estimate({}, {})
+        stages.estimate({}, {})
     with pytest.raises(AirTouchError, match="GAP8's budget"):
-        power.gap8_mw({"window_instructions": 5})
+        stages.gap8_mw({"window_instructions": 5})
     with pytest.raises(AirTouchError, match="cannot be read as a budget"):
-        power.counts(ROOT / "none.toml")
+        stages.counts(ROOT / "none.toml")
 
 
 def test_the_sketch_writes_what_is_read():

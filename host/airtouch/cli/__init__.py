@@ -16,6 +16,7 @@ COMMANDS = {
     "evaluate": ("evaluate", "Score a detector on flights with known edges."),
     "crossval": ("crossval", "Cross-validate a detector by flight."),
     "ablate": ("ablate", "Find what each part of the detectors is worth."),
+    "paper": ("paper", "Make the paper's tables and figures again, beside its own."),
     "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
     "simulate": ("simulate", "Fly a scenario in the simulator and write flight logs."),
     "collect": ("collect", "Fly a mission with a Crazyflie and log it."),

@@ -93,12 +93,12 @@ def ablate(
                          "by_height": summary.by_height(scores), "folds": folds,
                          "seconds": sum(f["seconds"] for f in folds), "left_out": len(left_out)}
         if ablation.group == "size":
-            results[name]["float"] = summary.summarise(_in_float(detector, files, folds, out))
+            results[name]["float"] = summary.summarise(in_float(detector, files, folds, out))
     return results
 
 
-def _in_float(detector: Detector, files: Sequence[FlightFile], folds: list[dict], out: Path) -> list[FlightScore]:
-    """The same folds and models, with the float network as trained."""
+def in_float(detector: Detector, files: Sequence[FlightFile], folds: list[dict], out: Path) -> list[FlightScore]:
+    """Scores of the same folds and models, with the float network as trained; files are the flights of these folds."""
     models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
     view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
     readable, _ = crossval.readable_flights(files)

@@ -1,0 +1,68 @@
+"""`airtouch paper`: the paper's evaluation, made again by one command."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from airtouch.cli.flights import find_flights
+from airtouch.errors import AirTouchError
+from airtouch.extras import need
+
+WHAT = """\b
+Figures, by the paper's labels:
+  fig8a  errors over platforms          fig8b  errors over materials (simulator)
+  fig8c  against the baseline           fig8d  by height
+  fig8e  by approach angle              fig8f  by pair of materials (simulator)
+  fig8g  the disturbance-force loss     fig8h  time resolution
+  fig8i  input size of the network      sizes  bytes, speed, accuracy after pruning and int8
+  table1 power                          wind   steady wind (simulator)
+  table2 resources                      range  larger drones (curves)
+  fig11b errors against light, with a rendered camera
+  fig11c errors against the size of the network
+  fusion camera and AirTouch together
+"""
+
+
+@click.command(name="paper", epilog=WHAT)
+@click.option("--only", multiple=True, metavar="FIGURE", help="Make this one; may be given several times. All if left "
+                                                              "out.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("paper"), show_default=True,
+              help="Folder for index.html, and PNG, SVG and CSV of each figure. A second run makes what is missing.")
+@click.option("--flights", type=click.Path(path_type=Path, file_okay=False),
+              help="Recorded flights, a folder with a manifest.csv; AIRTOUCH_FLIGHTS or ../shared/flights if left out.")
+@click.option("--power-log", type=click.Path(path_type=Path, dir_okay=False),
+              help="An INA219's log with a column of stages, for table1; an estimate if left out.")
+@click.option("--quick", is_flag=True, help="Fewer flights, one fold, short trainings: under three minutes.")
+@click.option("--force", is_flag=True, help="Make figures again that are there, and replace those of other settings.")
+def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: Path | None, quick: bool,
+            force: bool) -> None:
+    """Make every table and figure of the paper's evaluation again, with the paper's method and with `best`.
+
+    Recorded flights where they exist, the simulator where they do not; each caption says which. The page sets the
+    paper's numbers beside ours and gives a verdict on each claim: reproduced, not reproduced, cannot be tested here.
+
+    \b
+    airtouch paper --quick                       # a first look
+    airtouch paper                               # all of it, under half an hour on two cores; goes on after a stop
+    airtouch paper --only fig8d --only fig11b    # two figures
+
+    Without recorded flights the figures that need them say so; the others are made. Exit code 2 where one was not made.
+    """
+    from airtouch.paper_figures import run
+    from airtouch.paper_figures.figure import Job
+
+    chosen = run.names(only)
+    need("plots", "the pictures of airtouch paper")
+    for path in (flights, power_log):
+        if path is not None and not path.exists():
+            raise AirTouchError(f"{path}: no such file or folder")
+    job = Job(flights or find_flights(), out / "work", quick, power_log, lambda line: click.echo(line, err=True))
+    shown = " ".join(["airtouch paper", *(f"--only {name}" for name in only), *(["--quick"] if quick else [])])
+    records = run.run(chosen, out, job, force=force, command=shown)
+    for name in chosen:
+        for claim in records[name]["claims"].values():
+            click.echo(f"{name:7} {claim['verdict']:22} {claim['said']}\n        {claim['found']}")
+    click.echo(f"written: {out / 'index.html'} (open it in a browser)")
+    if any("missing" in records[name] for name in chosen):
+        sys.exit(2)

@@ -1,0 +1,1 @@
+"""Every table and figure of the paper's evaluation (section 7), made again: `airtouch paper`."""

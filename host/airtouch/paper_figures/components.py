@@ -1,0 +1,132 @@
+"""What the paper's choices are worth: its loss, its time resolution, its input size (Performance:1g, 1h and 1i)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector import summary
+from airtouch.detector.score import FlightScore
+from airtouch.detector.variants import Variant
+from airtouch.logs.flight_log import FlightLog
+from airtouch.paper_figures import pictures, recorded, words
+from airtouch.paper_figures.claims import SAID
+from airtouch.paper_figures.conditions import worse
+from airtouch.paper_figures.figure import Figure, Job
+from airtouch.paper_figures.overall import errors_m
+
+FEW = 10  #: training flights where the paper says that its loss helps most
+EPOCHS, QUICK_EPOCHS = 6, 2
+
+
+@dataclass(frozen=True)
+class Few(Variant):
+    """A variant that is trained on the first FEW of its training flights, drawn by seed."""
+
+    def fit(self, flights: Sequence[FlightLog], seed: int = 0, **options: Any) -> Any:
+        """As `Variant.fit`."""
+        drawn = np.random.default_rng(seed).permutation(len(flights))[:FEW]
+        return super().fit([flights[i] for i in sorted(drawn)], seed=seed, **options)
+
+
+UNFILTERED = Variant(physical_filter=False)
+#: name -> variant; names are those of `airtouch ablate` where it has them
+LOSSES = {"with the loss": ("paper", Variant()), "without": ("no-df-loss", Variant(df_lambda=0.0)),
+          f"with, {FEW} flights": (f"few-{FEW}", Few()), f"without, {FEW} flights": (f"few-{FEW}-no-df-loss",
+                                                                                    Few(df_lambda=0.0))}
+RESOLUTIONS = {200: ("no-filter", UNFILTERED), 100: ("stft-100", replace(UNFILTERED, band_window=100)),
+               50: ("stft-50", replace(UNFILTERED, band_window=50))}
+SIZES = {50: ("input-50", replace(UNFILTERED, rows=50)), 100: ("no-filter", UNFILTERED),
+         170: ("input-170", replace(UNFILTERED, rows=170)), 250: ("input-250", replace(UNFILTERED, rows=250))}
+
+
+def scores(job: Job, name: str, variant: Variant) -> tuple[list[FlightScore], list[dict[str, Any]]]:
+    """(scores, folds) of a variant."""
+    return recorded.varied(job, name, variant, {"epochs": QUICK_EPOCHS if job.quick else EPOCHS})
+
+
+def df_loss(job: Job) -> Figure:
+    """Performance:1g: trained with and without the disturbance-force loss, on all training flights and on ten."""
+    recorded.files(job)
+    found = {what: scores(job, *variant) for what, variant in LOSSES.items()}
+    rows = {what: summary.summarise(some) for what, (some, _) in found.items()}
+    epochs = {what: float(np.mean([f["parameters"]["converged_after_epochs"] for f in folds]))
+              for what, (_, folds) in found.items()}
+    table = [words.table_row(what, r, epochs_to_converge=epochs[what]) for what, r in rows.items()]
+    pairs = list(zip(*[iter(LOSSES)] * 2, strict=True))
+    gains = {pair[0]: 1.0 - (rows[pair[0]]["mean_abs_error_m"] or np.nan)
+             / (rows[pair[1]]["mean_abs_error_m"] or np.nan)
+             for pair in pairs}
+    text = "; ".join(f"{what} {words.metres(r)}, {words.missed(r)}" for what, r in rows.items())
+    helps = any(worse(rows[w], rows[wo]) and gains[w] >= 0.5 * SAID["df-loss"].values[2] for w, wo in pairs)
+    sooner = [1.0 - epochs[w] / epochs[wo] for w, wo in pairs]
+    verdicts = {
+        "df-loss": words.judged(helps, f"{text}; error less by "
+                                + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
+        "df-epochs": words.judged(max(sooner) >= 0.5 * SAID["df-epochs"].values[2],
+                                  "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
+                                  + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
+    return Figure("The disturbance-force loss", table, _caption(job, rows) + " Lambda is 0.1; the paper does not say "
+                                                                             "its "
+                  f"own. The lower half is trained on {FEW} flights, where the paper expects most of it.", verdicts,
+                  lambda canvas: pictures.found_within(canvas.subplots(), {
+                      what: (errors_m(some), rows[what]["edges"]) for what, (some, _) in found.items()},
+                      {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
+                                                        else "paper"], "ls": "--" if "flights" in what else "-"}
+                       for what in found}))
+
+
+def time_resolution(job: Job) -> Figure:
+    """Performance:1h: windows of the band power of 200, 100 and 50 samples."""
+    recorded.files(job)
+    rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in RESOLUTIONS.items()}
+    text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
+    better = worse(rows[200], rows[50]) or worse(rows[50], rows[200])
+    verdict = words.judged(better and (rows[50]["mean_abs_error_m"] or 9) < (rows[200]["mean_abs_error_m"] or 9), text)
+    return Figure("Time resolution of FC-FE", [words.table_row(f"{s} samples", r, window=s) for s, r in rows.items()],
+                  _caption(job, rows) + " A shorter window resolves time better and frequency worse; the hop is one "
+                                        "sample. "
+                  "The paper does not say which windows it compared. Physical filter off.", {"resolution": verdict},
+                  lambda canvas: _curves(canvas, rows, "window of the band power, samples"))
+
+
+def input_size(job: Job) -> Figure:
+    """Performance:1i: network inputs of 50, 100, 170 and 250 samples."""
+    recorded.files(job)
+    rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in SIZES.items()}
+    text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
+    inner = {size: _cost(r) for size, r in rows.items()}
+    best = min(inner, key=inner.__getitem__)
+    low, high = SAID["input-size"].values
+    verdict = words.judged(low <= best <= high, f"{text}; most edges within 0.25 m with {best}: "
+                           + ", ".join(f"{s} {words.percent(r['hit']['0.25'], r['intervals']['hit']['0.25'])}"
+                                       for s, r in rows.items()))
+    return Figure("Input size of the network", [words.table_row(f"{s} samples", r, rows=s) for s, r in rows.items()],
+                  _caption(job, rows) + " Physical filter off. The best size is the one with most edges within 0.25 m.",
+                  {"input-size": verdict}, lambda canvas: _curves(canvas, rows, "network input, samples"))
+
+
+def _cost(row: dict[str, Any]) -> float:
+    return -row["hit"]["0.25"]
+
+
+def _curves(canvas: Any, rows: dict[int, dict[str, Any]], label: str) -> None:
+    left, right = canvas.subplots(1, 2)
+    for axes, key, factor, name in ((left, "mean_abs_error_m", 1.0, "mean error of edges found, m"),
+                                    (right, "missed", 100.0, "missed edges, %")):
+        sizes = [s for s, r in rows.items() if r[key] is not None]
+        axes.plot(sizes, [factor * rows[s][key] for s in sizes], "o-", color=pictures.COLOURS["paper"], ms=4)
+        for s in sizes:
+            if rows[s]["intervals"][key]:
+                axes.plot([s, s], [factor * b for b in rows[s]["intervals"][key]], color=pictures.COLOURS["paper"],
+                          lw=0.8)
+        axes.set(xlabel=label, ylabel=name, ylim=(0, None))
+
+
+def _caption(job: Job, rows: dict[Any, dict[str, Any]]) -> str:
+    row = next(iter(rows.values()))
+    epochs = QUICK_EPOCHS if job.quick else EPOCHS
+    return (f"Recorded flights, {row['flights']} held out by flight ({row['edges']} edges), float networks without "
+            f"pruning, "
+            f"{epochs} epochs of one cycle.")

@@ -1,0 +1,55 @@
+"""Overall errors over platforms, and the method against the paper's baseline (labels Performance:1a and 1c)."""
+
+from airtouch.detector import summary
+from airtouch.detector.score import FlightScore
+from airtouch.paper_figures import pictures, recorded, words
+from airtouch.paper_figures.claims import SAID
+from airtouch.paper_figures.figure import Figure, Job
+
+
+def errors_m(scores: list[FlightScore]) -> list[float]:
+    """Errors of the edges that were found, m, positive early, in the order of the flights."""
+    return [e.error_m for s in scores for e in s.edges if e.error_m is not None]
+
+
+def heights(job: Job) -> Figure:
+    """Performance:1a: the errors over platforms, edge by edge."""
+    said = SAID["height-error"]
+    found = {name: recorded.scores(job, name)[0] for name in ("best", "paper")}
+    rows = {name: summary.summarise(some) for name, some in found.items()}
+    verdict = words.judged(
+        words.reaches(rows["paper"], said.values[0]),
+        f"paper's method {words.score(rows['paper'])}; best {words.score(rows['best'])}"
+        + ("; best reaches the claim" if words.reaches(rows["best"], said.values[0]) else ""))
+    caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"])
+               + " Only edges that were found have an error; those that were missed are counted beside it. The paper "
+                 "scores "
+               "30 flights of its own, says of no edge that it was missed, and splits windows at random.")
+    return Figure("Errors at abrupt heights", [words.table_row(n, r) for n, r in rows.items()], caption,
+                  {"height-error": verdict}, lambda canvas: pictures.signed_errors(
+                      canvas.subplots(), {n: errors_m(s) for n, s in found.items()}, said.values[0]))
+
+
+def against_baseline(job: Job) -> Figure:
+    """Performance:1c: best, the paper's method and its baseline, side by side."""
+    ours, theirs, gain = SAID["baseline"].values
+    rows = {name: summary.summarise(recorded.scores(job, name)[0]) for name in ("best", "paper", "baseline")}
+    better = {n: 1.0 - rows[n]["mean_abs_error_m"] / rows["baseline"]["mean_abs_error_m"] for n in ("paper", "best")
+              if rows[n]["mean_abs_error_m"] is not None}
+    table = [words.table_row(n, r) for n, r in rows.items()]
+    found = (f"paper's method {words.score(rows['paper'])}; baseline {words.score(rows['baseline'])}; best "
+             f"{words.score(rows['best'])}. Below the baseline's error: "
+             + ", ".join(f"{n} {100 * b:.0f} %" for n, b in better.items()))
+    verdict = words.judged(words.reaches(rows["paper"], ours) and better.get("paper", 0.0) >= gain, found)
+
+    def draw(canvas):
+        left, right = canvas.subplots(1, 2)
+        pictures.bars(left, table, "mean_abs_error_m", "error_low_m", "error_high_m", "mean error of edges found, m")
+        pictures.paper_line(left, ours, f"paper's method in the paper {ours:g} m")
+        pictures.paper_line(left, theirs, f"baseline in the paper {theirs:g} m")
+        pictures.bars(right, table, "missed", "missed_low", "missed_high", "missed edges, %", factor=100.0)
+
+    caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"]) + " Platforms only: no recorded "
+                                                                                    "flight "
+               "crosses a material interface, over which the paper averages too.")
+    return Figure("Errors of the method and of the baseline", table, caption, {"baseline": verdict}, draw)

@@ -1,0 +1,41 @@
+"""The page: every figure, the paper's numbers beside ours, a verdict on each claim."""
+
+import csv
+import io
+from collections import Counter
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from airtouch import __version__
+from airtouch.logs.files import write_bytes
+from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, SAID, UNTESTABLE
+from airtouch.report.write import embed
+
+CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNTESTABLE: "open"}
+
+
+def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
+    """`index.html` in the folder: self-contained but for the links to each figure's SVG and CSV."""
+    verdicts = [(entry, claim) for entry in records.values() for claim in entry["claims"].values()]
+    count = Counter(claim["verdict"] for _, claim in verdicts)
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string((resources.files("airtouch.paper_figures") / "page.html").read_text("utf-8"))
+    text = template.render(
+        records=[{**entry, "image": _image(out, entry)} for entry in records.values()], classes=CLASSES, count=count,
+        verdicts=CLASSES, total=len(SAID), judged=len(verdicts), command=command, version=__version__,
+        quick=any(entry.get("quick") for entry in records.values()))
+    path = out / "index.html"
+    write_bytes(text.encode(), path, force=True)
+    return path
+
+
+def cells(table: bytes) -> list[list[str]]:
+    """The cells of a CSV, the header first."""
+    return list(csv.reader(io.StringIO(table.decode())))
+
+
+def _image(out: Path, entry: dict[str, Any]) -> str:
+    return "" if "missing" in entry else embed((out / f"{entry['name']}.png").read_bytes())

@@ -1,0 +1,78 @@
+"""Plots that several figures share, each drawn on a matplotlib axes."""
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from airtouch.report.figures import COLOURS, MUTED, STYLE
+
+PAPER = "#444444"  #: what the paper says, in every plot
+WIDTH_IN, HEIGHT_IN = 6.4, 3.8
+
+
+def render(draw: Any) -> tuple[bytes, bytes]:
+    """(PNG, SVG) of a figure that `draw` fills."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": "airtouch"}):
+        canvas = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
+        draw(canvas)
+        files = []
+        for form in ("png", "svg"):
+            buffer = io.BytesIO()
+            canvas.savefig(buffer, format=form, dpi=130, metadata={"Date": None} if form == "svg" else None)
+            files.append(buffer.getvalue())
+    return files[0], files[1]
+
+
+def colour(name: str) -> str:
+    """A detector's colour."""
+    return COLOURS.get(name.split(",")[0], MUTED)
+
+
+def signed_errors(axes: Any, errors: Mapping[str, Sequence[float]], paper_m: float) -> None:
+    """Errors edge by edge, positive early; the band is the paper's mean absolute error."""
+    axes.axhspan(-paper_m, paper_m, color=PAPER, alpha=0.15, lw=0, label=f"paper: mean |error| {paper_m:.4g} m")
+    for name, values in errors.items():
+        axes.plot(np.arange(1, len(values) + 1), values, ".", ms=4, color=colour(name), alpha=0.8, label=name)
+    axes.axhline(0.0, color=MUTED, lw=0.6)
+    axes.set(xlabel="edge", ylabel="error, m (positive: early)", ylim=(-0.55, 0.55))
+    axes.legend(fontsize=7, frameon=False, ncols=len(errors) + 1, loc="upper left")
+
+
+def found_within(axes: Any, errors: Mapping[str, tuple[Sequence[float], int]], styles: Mapping[str, Any] | None = None,
+                 ) -> None:
+    """Share of all true edges found within a distance; misses keep a curve below 1. name -> (errors, edges)."""
+    for name, (values, edges) in errors.items():
+        steps = np.sort(np.abs(values))
+        if edges:
+            axes.step(np.r_[0.0, steps, 1.0], np.r_[0.0, np.arange(1, len(steps) + 1), len(steps)] / edges,
+                      where="post", label=f"{name} ({edges})", **((styles or {}).get(name, {})))
+    axes.set(xlim=(0, 0.4), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges")
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=7, frameon=False, loc="lower right")
+
+
+def bars(axes: Any, rows: Sequence[Mapping[str, Any]], value: str, low: str, high: str, label: str,
+         colours: Sequence[str] | None = None, factor: float = 1.0) -> None:
+    """One bar a row with its 95 % interval."""
+    for i, row in enumerate(rows):
+        if row[value] is None:
+            axes.text(i, 0.0, "none found", ha="center", va="bottom", fontsize=7)
+            continue
+        axes.bar(i, factor * row[value], color=colours[i] if colours else colour(str(row["what"])), width=0.7)
+        if row[low] is not None:
+            axes.plot([i, i], [factor * row[low], factor * row[high]], color="black", lw=1)
+    axes.set_xticks(range(len(rows)), [str(r["what"]) for r in rows], fontsize=7,
+                    rotation=20 if len(rows) > 4 else 0, ha="right" if len(rows) > 4 else "center")
+    axes.set_ylabel(label)
+
+
+def paper_line(axes: Any, value: float, text: str) -> None:
+    """A dashed line at what the paper says."""
+    axes.axhline(value, color=PAPER, ls="--", lw=1)
+    axes.annotate(text, (0.995, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7,
+                  color=PAPER)

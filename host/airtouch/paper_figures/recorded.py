@@ -1,0 +1,72 @@
+"""Scores of detectors on recorded flights, cross-validated by flight, as `airtouch crossval` makes them."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from airtouch.detector import ablation, crossval, dataset, folds, free_air
+from airtouch.detector.registry import Detector, get
+from airtouch.detector.score import FlightScore
+from airtouch.paper_figures.figure import Job, Missing
+
+#: of a full run and of a quick one: a detector's training options
+FULL: dict[str, dict[str, Any]] = {"best": {}, "paper": {}, "baseline": {}}
+QUICK: dict[str, dict[str, Any]] = {"best": {"steps": 300}, "paper": {"epochs": 3}, "baseline": {}}
+QUICK_FOLD = 0  #: the one fold that a quick run holds out
+ABLATION_FOLDS = (0, 1)  #: held out one after another where the paper's choices are varied; the others are trained on
+AIR = ("neuralswarm/flights", "crazypad", "imrclab")  #: folders beside the flights in which nothing is an edge
+
+
+def files(job: Job) -> list[dataset.FlightFile]:
+    """The clean flights of the folder. Raises Missing without one."""
+    if job.flights is None:
+        raise Missing("no recorded flights here: give their folder with --flights, or set AIRTOUCH_FLIGHTS")
+    return dataset.collect([job.flights])
+
+
+@cache
+def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]]:
+    """(one score a flight, one entry a fold) of a detector that never saw the flight it is scored on; kept while the
+    program runs, since several figures are of the same scores."""
+    found = files(job)
+    options = (QUICK if job.quick else FULL)[name]
+    air = free_air.read(_air(job.flights)) if name == "best" and not job.quick else []
+    held = folds.by_fold(found)
+    if job.quick:
+        held = {QUICK_FOLD: held[QUICK_FOLD]} if QUICK_FOLD in held else dict(list(held.items())[:1])
+    result, entries, _ = crossval.crossval(name, found, job.work / "folds", folds=held, options=options, free_air=air,
+                                           tell=lambda line: job.tell(f"{name}, {line}"))
+    return result, entries
+
+
+def varied(job: Job, name: str, detector: Detector | None, options: dict[str, Any],
+           ) -> tuple[list[FlightScore], list[dict[str, Any]]]:
+    """The same for one of the paper's choices varied, over ABLATION_FOLDS (a quick run: QUICK_FOLD alone)."""
+    found = files(job)
+    every = folds.by_fold(found)
+    wanted = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
+    held = {k: every[k] for k in wanted if k in every} or dict(list(every.items())[:1])
+    shown = name if detector is None else f"variant-{name}"
+    result, entries, _ = crossval.crossval(shown, found, job.work / "folds", folds=held, options=options,
+                                           detector=detector, tell=lambda line: job.tell(f"{name}, {line}"))
+    return result, entries
+
+
+def in_float(job: Job, name: str, entries: list[dict[str, Any]]) -> list[FlightScore]:
+    """The same folds and models as `varied` gave, with the float network as trained."""
+    kept = {entry["fold"] for entry in entries}
+    return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in kept], entries,
+                             job.work / "folds")
+
+
+def _air(flights: Path) -> list[Path]:
+    return [folder for name in AIR if (folder := flights.parent / name).is_dir()]
+
+
+def said(job: Job, flights: int, edges: int) -> str:
+    """How the recorded flights were split, for captions."""
+    if job.quick:
+        return (f"Recorded flights, {flights} of one fold ({edges} edges), by models of the other folds, briefly "
+                f"trained "
+                "(--quick).")
+    return f"{flights} recorded flights of the paper's authors, {edges} edges, cross-validated by flight in five folds."

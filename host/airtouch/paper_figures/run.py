@@ -1,0 +1,123 @@
+"""Makes the figures one by one, keeps what is done, and goes on where a figure cannot be made."""
+
+import hashlib
+import importlib
+import json
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from airtouch import __version__
+from airtouch.errors import AirTouchError, nearest
+from airtouch.logs.files import write_bytes
+from airtouch.paper_figures import claims, page, pictures
+from airtouch.paper_figures.figure import Figure, Job, Missing, table_csv
+
+#: name on the command line -> (module, function), in the order of the page
+FIGURES = {
+    "fig8a": ("overall", "heights"), "fig8b": ("materials", "overall"), "fig8c": ("overall", "against_baseline"),
+    "fig8d": ("conditions", "by_height"), "fig8e": ("conditions", "by_angle"), "fig8f": ("materials", "by_pair"),
+    "fig8g": ("components", "df_loss"), "fig8h": ("components", "time_resolution"),
+           "fig8i": ("components", "input_size"),
+    "sizes": ("sizes", "sizes"), "table1": ("table1", "power"), "wind": ("conditions", "wind"),
+    "table2": ("resources", "resources"), "fig11b": ("vision_figures", "light"),
+           "fig11c": ("vision_figures", "network_size"),
+    "fusion": ("vision_figures", "fusion"), "range": ("sensing_range", "sensing_range"),
+}
+
+
+def names(only: Sequence[str]) -> list[str]:
+    """The figures asked for, all where none is. Raises AirTouchError for an unknown one."""
+    for name in only:
+        if name not in FIGURES:
+            raise AirTouchError(f"no figure {name!r}{nearest(name, FIGURES)}; known: {', '.join(FIGURES)}")
+    return [name for name in FIGURES if not only or name in only]
+
+
+def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, command: str = "airtouch paper",
+        ) -> dict[str, dict[str, Any]]:
+    """Figures as NAME.png, .svg, .csv and .json in `out`, and index.html of all that are there; the records by name.
+
+    A figure that is there with the same settings is not made again. One that needs what is missing, or whose input is
+    bad, says so in its record ("missing") and the others are made. Raises AirTouchError, before any work, where `out`
+    holds a figure of other settings and `force` is not given.
+    """
+    key = settings_key(job)
+    old = {name: record(out, name) for name in chosen}
+    stale = [name for name, entry in old.items() if entry and entry["key"] != key and "missing" not in entry]
+    if stale and not force:
+        raise AirTouchError(f"{out / stale[0]}.csv was made with other settings; use --force, or another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    for number, name in enumerate(chosen, start=1):
+        entry = old[name]
+        if entry and entry["key"] == key and "missing" not in entry and not force:
+            job.tell(f"[{number}/{len(chosen)}] {name}: done before")
+            continue
+        started = time.monotonic()
+        job.tell(f"[{number}/{len(chosen)}] {name}")
+        entry = make(name, job, out)
+        entry |= {"key": key, "seconds": round(time.monotonic() - started, 1), "quick": job.quick}
+        write_bytes(json.dumps(entry, indent=1).encode(), out / f"{name}.json", force=True)
+        page.write(out, records(out), command)
+        job.tell(f"    {entry.get('missing') or 'written'}, {entry['seconds']:.0f} s")
+    found = records(out)
+    page.write(out, found, command)
+    return found
+
+
+def make(name: str, job: Job, out: Path) -> dict[str, Any]:
+    """The record of one figure, whose picture and table are written."""
+    module, function = FIGURES[name]
+    said = {claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
+    try:
+        figure: Figure = getattr(importlib.import_module(f"airtouch.paper_figures.{module}"), function)(job)
+    except AirTouchError as error:
+        reason = str(error) if isinstance(error, Missing) else f"it could not be made: {error}"
+        for claim in said.values():
+            claim |= {"verdict": claims.UNTESTABLE, "found": reason}
+        return {"name": name, "title": name, "caption": "", "missing": reason, "claims": said, "rows": []}
+    if set(figure.verdicts) != set(said):
+        raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(said)}")
+    for claim, verdict in figure.verdicts.items():
+        said[claim] |= {"verdict": verdict.verdict, "found": verdict.found}
+    png, svg = pictures.render(figure.draw)
+    table = table_csv(figure.rows)
+    for data, ending in ((png, "png"), (svg, "svg"), (table, "csv")):
+        write_bytes(data, out / f"{name}.{ending}", force=True)
+    return {"name": name, "title": figure.title, "caption": figure.caption, "claims": said,
+            "rows": [dict(zip(_head(table), line, strict=True)) for line in _lines(table)]}
+
+
+def _head(table: bytes) -> list[str]:
+    return next(iter(page.cells(table)))
+
+
+def _lines(table: bytes) -> list[list[str]]:
+    return page.cells(table)[1:]
+
+
+def records(out: Path) -> dict[str, dict[str, Any]]:
+    """The records of all figures in a folder, in the order of the page."""
+    return {name: entry for name in FIGURES if (entry := record(out, name))}
+
+
+def record(out: Path, name: str) -> dict[str, Any] | None:
+    """A figure's record, None where there is none, it is damaged or its files are gone."""
+    try:
+        entry = json.loads((out / f"{name}.json").read_text())
+        whole = "missing" in entry or all((out / f"{name}.{e}").exists() for e in ("png", "svg", "csv"))
+        return entry if whole and entry["claims"] is not None and entry["key"] else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def settings_key(job: Job) -> str:
+    """Twelve hexadecimal digits that change with anything a figure depends on but its code."""
+    total = hashlib.sha256(f"{__version__} {job.quick}".encode())
+    for place in (job.flights, job.power_log):
+        for path in sorted(place.iterdir()) if place is not None and place.is_dir() else [place]:
+            stat = os.stat(path) if path is not None and path.exists() else None
+            total.update(f"{path and path.name} {stat and (stat.st_size, stat.st_mtime_ns)}".encode())
+    return total.hexdigest()[:12]

@@ -1,0 +1,126 @@
+"""From how far a drone feels the ground: mass and rotor size, curves measured and published (section 8.1)."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.paper_figures import pictures, words
+from airtouch.paper_figures.claims import SAID
+from airtouch.paper_figures.figure import Figure, Job
+from airtouch.simulation import effects
+from airtouch.simulation.effects.ground_effect import faded, thrust_ratio
+
+#: rms of the vertical force that thrust does not explain, share of the weight, recorded flights of the authors at
+#: 100 Hz (0.5 to 0.7 %); a larger drone is taken to know its thrust as well
+NOISE = 0.006
+THRESHOLD = 0.01  #: share of the weight at which the small drone's range comes out as the paper's 12 cm or less
+GRAVITY = 9.81
+HEIGHTS_M = np.geomspace(0.02, 6.0, 400)  #: of the rotor discs over the ground
+SMALL = "crazyflie-34g"  #: preset of `ground_effect` fitted to neural-swarm's flights
+
+
+def cheeseman_bennett(height_m: np.ndarray, radius_m: float) -> np.ndarray:
+    """Gain of lift at the same power, share: 1 / (1 - (R / 4 h)^2) - 1. Source: Cheeseman, Bennett 1955, hover."""
+    return 1.0 / (1.0 - np.minimum((radius_m / (4.0 * height_m)) ** 2, 0.9)) - 1.0
+
+
+def sanchez_cuevas(height_m: np.ndarray, radius_m: float, spacing_m: float) -> np.ndarray:
+    """Gain of lift of a quadrotor, share. Source: Sanchez-Cuevas, Heredia, Ollero 2017, eq. 8, K_b = 2."""
+    return np.array([thrust_ratio(h, radius_m, spacing_m, 2.0) for h in np.atleast_1d(height_m)])
+
+
+def measured(height_m: np.ndarray, preset: str, scale: float = 1.0) -> np.ndarray:
+    """Gain of lift, share, of a curve fitted to recorded flights; scale: of all lengths against the drone flown."""
+    values = effects.get("ground_effect").presets[preset]
+    craft = vehicles.load("crazyflie-2.1")
+    spacing = math.sqrt(2.0) * craft.arm_m
+    return np.array([values["strength"] * faded(thrust_ratio(h, craft.rotor_radius_m, spacing, 2.0), h, values["fade"])
+                     for h in np.atleast_1d(height_m) / scale])
+
+
+def reach(curve: Callable[[np.ndarray], np.ndarray], threshold: float = THRESHOLD) -> float:
+    """The greatest height, m, at which a curve of lift is at least the threshold; 0 where it never is."""
+    above = np.flatnonzero(curve(HEIGHTS_M) >= threshold)
+    return float(HEIGHTS_M[above[-1]]) if len(above) else 0.0
+
+
+def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+    """Lift against height of a quadrotor by each source, measured curves scaled with the rotor."""
+    scale = radius_m / vehicles.load("crazyflie-2.1").rotor_radius_m
+    return {"Cheeseman, Bennett": lambda h: cheeseman_bennett(h, radius_m),
+            "Sanchez-Cuevas": lambda h: sanchez_cuevas(h, radius_m, math.sqrt(2.0) * arm_m),
+            "measured on 34 g, scaled with the rotor": lambda h: measured(h, SMALL, scale)}
+
+
+def sensing_range(job: Job) -> Figure:
+    """Heights at which the lift is THRESHOLD of the weight, and what is left of it at the paper's 3 m."""
+    mass, span, propeller, claimed = SAID["range"].values
+    small = vehicles.load("crazyflie-2.1-flow")
+    craft = [("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
+             ("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
+             ("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
+    rows = []
+    for name, mass_kg, radius, arm in craft:
+        for source, curve in curves(radius, arm).items():
+            there = float(curve(np.array([claimed]))[0])
+            rows.append({"what": name, "curve": source, "mass_kg": mass_kg, "rotor_radius_m": radius,
+                         "range_m": reach(curve), "range_at_noise_over_10_m": reach(curve, NOISE / 10),
+                         "lift_at_3_m_share": there, "lift_at_3_m_n": there * mass_kg * GRAVITY,
+                         "seconds_to_see_it": averaging_s(there)})
+    rows.append({"what": "frame of 67 g", "curve": "measured", "mass_kg": 0.067, "rotor_radius_m": None,
+                 "range_m": reach(lambda h: measured(h, "frame-67g"))})
+    large = [r for r in rows if r["mass_kg"] == mass]
+    tiny = [r for r in rows if r["mass_kg"] == small.mass_kg]
+    verdicts = {
+        "range": words.judged(any(r["range_m"] >= claimed for r in large),
+                              f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(large):.2f} to "
+                              f"{most(large):.2f} m; at 3 m {100 * max(r['lift_at_3_m_share'] for r in large):.4f} % "
+                              f"at "
+                              f"most, against a noise of {100 * NOISE:.1f} %; to tell it at 3 sigma takes "
+                              f"{min(r['seconds_to_see_it'] for r in large):.0f} s of hover or more (three curves, two "
+                              "readings of the propeller's size; nothing was flown)"),
+        "range-small": words.judged(most(tiny) <= 1.5 * SAID["range-small"].values[0],
+                                    f"lift of 1 % of the weight up to {least(tiny):.3f} to {most(tiny):.3f} m by three "
+                                    "curves; measured on 34 g (20 flights) it ends near 0.08 m of body height")}
+    caption = (f"Heights are of the rotor discs. The range is where the lift falls below {100 * THRESHOLD:.0f} % of "
+               f"the weight; "
+               f"the force that thrust does not explain has a noise of {100 * NOISE:.1f} % rms at 100 Hz. Mass does "
+               f"not enter the "
+               "curves: lift is a share of the weight, and the lengths are those of rotors and frame. The measured "
+               "curve is "
+               "scaled with the rotor, which nobody measured at 2.5 kg.")
+
+    def draw(canvas):
+        axes = canvas.subplots()
+        for (_, _, radius, arm), colour in zip(craft, pictures.COLOURS.values(), strict=False):
+            for (source, curve), style in zip(curves(radius, arm).items(), (":", "--", "-"), strict=True):
+                axes.loglog(HEIGHTS_M, 100 * np.maximum(curve(HEIGHTS_M), 1e-9), ls=style, color=colour, lw=1.1,
+                            label=f"rotor {1000 * radius:.4g} mm, {source}")
+        axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.MUTED,
+                    label="67 g frame, measured")
+        axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
+        axes.text(0.021, 100 * NOISE, "noise of the force", fontsize=7, va="bottom")
+        axes.axvline(claimed, color=pictures.PAPER, ls="--", lw=1)
+        axes.text(claimed, 30, "paper: 3 m ", fontsize=7, ha="right")
+        axes.set(xlabel="height of the rotors over the ground, m", ylabel="lift gained, % of the weight",
+                 ylim=(1e-4, 60))
+        axes.legend(fontsize=5.5, frameon=False, loc="lower left")
+
+    return Figure("Sensing range of larger drones", rows, caption, verdicts, draw)
+
+
+def averaging_s(lift: float, sigmas: float = 3.0, rate_hz: float = 100.0) -> float:
+    """Seconds of hover after which a lift (share) stands `sigmas` above white noise of the force."""
+    return (sigmas * NOISE / lift) ** 2 / rate_hz if lift > 0.0 else math.inf
+
+
+def least(rows: list[dict]) -> float:
+    """The shortest range of some rows."""
+    return min(r["range_m"] for r in rows)
+
+
+def most(rows: list[dict]) -> float:
+    """The longest range of some rows."""
+    return max(r["range_m"] for r in rows)

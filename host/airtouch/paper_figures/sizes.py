@@ -1,0 +1,101 @@
+"""Sizes, speed and accuracy after pruning and int8 (section 7.5)."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector import paper, summary
+from airtouch.detector.train import SPARSITY
+from airtouch.kernels.network import infer_float, infer_int8, parameter_bytes
+from airtouch.paper_figures import pictures, recorded, words
+from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, SAID, UNTESTABLE
+from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
+
+FLOAT_BYTES = 4
+
+
+def sizes(job: Job) -> Figure:
+    """The paper's network in float and int8, with none and with the shipped share of the first dense layer zero."""
+    model = paper.load(None)
+    weights = sum(int(np.size(w)) for w in model.weights.values())
+    times = _milliseconds(model)
+    rows: list[dict[str, Any]] = [
+        {"what": "paper's network, float", "bytes": FLOAT_BYTES * weights, "ms_here": times["float"]},
+        {"what": "shipped: 80 % zeros, int8", "bytes": parameter_bytes(model.int8), "ms_here": times["int8"]}]
+    accuracy = ""
+    try:
+        accuracy = _accuracies(job, rows)
+    except Missing as missing:
+        accuracy = str(missing)
+    before, after = SAID["size"].values
+    ours = rows[1]["bytes"]
+    faster = times["float"] / times["int8"]
+    lost = [r for r in rows if r.get("balanced_float") is not None]
+    verdicts = {
+        "size": words.judged(abs(FLOAT_BYTES * weights - before) < 0.1 * before and ours <= after,
+                             f"{FLOAT_BYTES * weights:,} bytes in float ({weights:,} weights and biases), {ours:,} "
+                             f"bytes "
+                             f"shipped, {FLOAT_BYTES * weights / ours:.1f} times less"),
+        "speed": Verdict(UNTESTABLE, f"no GAP8 here; on this machine float {times['float']:.3f} ms and int8 "
+                         f"{times['int8']:.3f} ms a window ({faster:.1f} times), plain C, one thread"),
+        "accuracy": Verdict(NOT_REPRODUCED if lost else UNTESTABLE, accuracy)}
+    if lost and lost[-1]["balanced_float"] - lost[-1]["balanced_int8"] > 0.05 and lost[-1]["balanced_float"] > 0.92:
+        verdicts["accuracy"] = Verdict(REPRODUCED, accuracy)
+    caption = ("Bytes are what the drone carries: weights, biases and scales; where zeros are left out, with their "
+               "places. "
+               "Accuracy is balanced over windows of recorded flights held out by flight; the paper's is of windows "
+               "drawn "
+               "at random, which share samples with those trained on.")
+
+    def draw(canvas):
+        left, right = canvas.subplots(1, 2)
+        left.barh([r["what"] for r in rows], [r["bytes"] / 1000 for r in rows], color=pictures.COLOURS["paper"])
+        left.axvline(before / 1000, color=pictures.PAPER, ls="--", lw=1)
+        left.axvline(after / 1000, color=pictures.PAPER, ls="--", lw=1)
+        left.set(xlabel="parameters, kB (dashed: the paper's)")
+        left.tick_params(axis="y", labelsize=7)
+        some = [r for r in rows if r.get("balanced_int8") is not None]
+        for key, marker in (("balanced_float", "o"), ("balanced_int8", "s")):
+            right.plot([100 * r["zeros"] for r in some], [100 * r[key] for r in some], marker + "-", ms=4,
+                       label=key.removeprefix("balanced_"), color=pictures.COLOURS["paper"],
+                       alpha=1.0 if marker == "s" else 0.5)
+        for value in SAID["accuracy"].values:
+            right.axhline(100 * value, color=pictures.PAPER, ls="--", lw=1)
+        right.set(xlabel="zeros in the first dense layer, %", ylabel="window accuracy, % (dashed: the paper's)",
+                  ylim=(45, 100))
+        if some:
+            right.legend(fontsize=7, frameon=False)
+
+    return Figure("Sizes and accuracy after pruning and int8", rows, caption, verdicts, draw)
+
+
+def _milliseconds(model: Any) -> dict[str, float]:
+    """Milliseconds a window of the float and the int8 network through the C kernels here; least of three runs."""
+    windows = np.random.default_rng(0).normal(size=(200, 100, 3)).astype(np.float32)
+    found = {}
+    for name, call in (("float", lambda: infer_float(model.float_layers, windows)),
+                       ("int8", lambda: infer_int8(model, windows))):
+        spent = []
+        for _ in range(3):
+            started = time.perf_counter()
+            call()
+            spent.append(time.perf_counter() - started)
+        found[name] = 1e3 * min(spent) / len(windows)
+    return found
+
+
+def _accuracies(job: Job, rows: list[dict[str, Any]]) -> str:
+    """Adds a row for each share of zeros, with the accuracies of float and int8 on flights held out; says them."""
+    epochs = {"epochs": 3} if job.quick else {}
+    said = []
+    for zeros, options in ((0.0, {"sparsity": 0.0}), (SPARSITY, {})):
+        scores, folds = recorded.varied(job, "paper", None, {**epochs, **options})
+        exact = recorded.in_float(job, "paper", folds)
+        row, float_row = summary.summarise(scores), summary.summarise(exact)
+        rows.append({"what": f"{100 * zeros:.0f} % zeros, int8", "bytes": folds[0]["parameters"]["parameter_bytes"],
+                     "zeros": zeros, "balanced_float": float_row["balanced_accuracy"],
+                     "balanced_int8": row["balanced_accuracy"], "flights": row["flights"]})
+        said.append(f"{100 * zeros:.0f} % zeros: float {words.percent(float_row['balanced_accuracy'])}, int8 "
+                    f"{words.percent(row['balanced_accuracy'], row['intervals']['balanced_accuracy'])}")
+    return f"balanced, by flight, n = {rows[-1]['flights']} flights: " + "; ".join(said)

@@ -1,0 +1,77 @@
+"""Table 1: power of each stage, measured where there is a log of an INA219, estimated where not."""
+
+from airtouch.errors import AirTouchError
+from airtouch.paper_figures import pictures, words
+from airtouch.paper_figures.claims import SAID, UNTESTABLE
+from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
+from airtouch.power import ina219, stages
+
+
+def power(job: Job) -> Figure:
+    """The paper's Table 1 beside a measurement or an estimate."""
+    return measured(job) if job.power_log else estimated()
+
+
+def measured(job: Job) -> Figure:
+    """From a log with a column of stages. Raises AirTouchError for one that cannot be read."""
+    try:
+        trace = ina219.parse(job.power_log.read_text(encoding="utf-8", errors="replace"), str(job.power_log))
+    except OSError as error:
+        raise AirTouchError(f"{job.power_log}: cannot be read: {error.strerror}") from None
+    found = ina219.by_stage(trace, tuple(stages.PAPER_MW))
+    if not found:
+        raise AirTouchError(f"{job.power_log}: no column of stages; the sketch in tools/power writes one")
+    rows = [{"what": stages.NAMES.get(name, name), "mw": mw, "low_mw": mw - half, "high_mw": mw + half,
+             "paper_mw": stages.PAPER_MW.get(name), "seconds": found[name].seconds, "lines": found[name].lines}
+            for name, (mw, half) in ina219.added(found).items()]
+    last = list(found.values())[-1]
+    total, half = last.mw, last.half_mw
+    verdicts = {"power": words.judged(total - half <= SAID["power"].values[0],
+                                      f"total {total:.1f} mW [{total - half:.1f}, {total + half:.1f}] over "
+                                      f"{last.seconds:.0f} s"),
+                "negligible": _negligible(total - next(iter(found.values())).mw, "measured")}
+    return Figure("Power", rows, f"Measured with an INA219: {job.power_log.name}; 95 % intervals from blocks of 1 s.",
+                  verdicts, lambda canvas: _draw(canvas, rows))
+
+
+def estimated() -> Figure:
+    """From counted instructions. Raises Missing where the counts are not there."""
+    if not stages.BUDGETS.is_dir():
+        raise Missing("the counted instructions are in a checkout alone (tests/emulation); clone the repository, or "
+                      "measure and give --power-log")
+    found = stages.estimate(*(stages.counts(stages.BUDGETS / f"{n}.toml") for n in ("budget", "gap8_budget")))
+    rows = [{"what": stages.NAMES.get(name, name), "mw": (e.low_mw + e.high_mw) / 2, "low_mw": e.low_mw,
+             "high_mw": e.high_mw, "instructions_a_step": e.instructions,
+             "paper_mw": stages.PAPER_MW.get(name.split(",")[0])} for name, e in found.items()]
+    parts = [found[n] for n in ("FC-FE", "CCS-FF", "filter", "network, paper on the GAP8")]
+    low, high = sum(p.low_mw for p in parts), sum(p.high_mw for p in parts)
+    verdicts = {"power": Verdict(UNTESTABLE, f"no meter here; the work itself is estimated at {low:.1f} to {high:.1f} "
+                                             f"mW "
+                                 "for the paper's stages (43 mW there), from counted instructions, without idle power, "
+                                 "clocks and regulators"),
+                "negligible": _negligible(high, "estimated, at most")}
+    return Figure("Power", rows, "An estimate, nothing was measured: instructions counted in the emulator times energy "
+                                 "an "
+                  "instruction, 100 steps a second (power.md). A log of an INA219 is read with --power-log.", verdicts,
+                  lambda canvas: _draw(canvas, rows))
+
+
+def _negligible(mw: float, how: str) -> Verdict:
+    share = mw / SAID["negligible"].values[0]
+    return words.judged(share < 0.05, f"{how} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the paper's "
+                                      f"own 43 "
+                        "mW are 1.4 %. The propellers' power was not measured here")
+
+
+def _draw(canvas, rows) -> None:
+    axes = canvas.subplots()
+    places = range(len(rows))
+    axes.barh([p - 0.2 for p in places], [r["mw"] for r in rows], height=0.38, color=pictures.COLOURS["best"],
+              label="here",
+              xerr=[[r["mw"] - r["low_mw"] for r in rows], [r["high_mw"] - r["mw"] for r in rows]])
+    axes.barh([p + 0.2 for p in places], [r["paper_mw"] or 0.0 for r in rows], height=0.38, color=pictures.PAPER,
+              label="paper, measured")
+    axes.set_yticks(places, [r["what"] for r in rows], fontsize=7)
+    axes.invert_yaxis()
+    axes.set(xlabel="power, mW (logarithmic)", xscale="log", xlim=(0.01, 200))
+    axes.legend(fontsize=7, frameon=False)

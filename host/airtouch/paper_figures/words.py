@@ -1,0 +1,67 @@
+"""Figures in words: values with intervals, and the rules by which a claim counts as reproduced."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED
+from airtouch.paper_figures.figure import Verdict
+
+MOST_MISSED = 0.10  #: share of missed edges above which a mean error over the others says little
+
+
+def metres(row: Mapping[str, Any]) -> str:
+    """`0.018 m [0.013, 0.024]`, the mean error of a summary with its 95 % interval."""
+    value, interval = row["mean_abs_error_m"], row["intervals"]["mean_abs_error_m"]
+    if value is None:
+        return "no edge found"
+    return f"{value:.3f} m" + (f" [{interval[0]:.3f}, {interval[1]:.3f}]" if interval else "")
+
+
+def percent(value: float | None, interval: tuple[float, float] | list[float] | None = None) -> str:
+    """`2.9 % [0, 6.9]` of shares."""
+    if value is None:
+        return "-"
+    said = f"{100 * value:.1f} %"
+    return said if interval is None else f"{said} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
+
+
+def missed(row: Mapping[str, Any]) -> str:
+    """`2.9 % of 174 missed [0, 6.9]`."""
+    interval = row["intervals"]["missed"]
+    said = f"{percent(row['missed'])} of {row['edges']} missed"
+    return said if interval is None else f"{said} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
+
+
+def score(row: Mapping[str, Any]) -> str:
+    """Error, misses and false edges side by side."""
+    return f"{metres(row)}, {missed(row)}, {row['false_per_minute'] or 0:.1f} false a minute"
+
+
+def reaches(row: Mapping[str, Any], error_m: float) -> bool:
+    """Whether the 95 % interval of the mean error reaches down to the paper's, at MOST_MISSED missed at most."""
+    interval = row["intervals"]["mean_abs_error_m"]
+    value = row["mean_abs_error_m"]
+    if value is None or row["missed"] > MOST_MISSED:
+        return False
+    return (interval[0] if interval else value) <= error_m
+
+
+def judged(yes: bool, found: str) -> Verdict:
+    """A verdict of two."""
+    return Verdict(REPRODUCED if yes else NOT_REPRODUCED, found)
+
+
+def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:
+    """The columns that every table of scores has."""
+    def pair(key: str) -> tuple[float | None, float | None]:
+        return tuple(row["intervals"][key] or (None, None))
+
+    low, high = pair("mean_abs_error_m")
+    missed_low, missed_high = pair("missed")
+    hit = row["hit"]["0.05"]
+    hit_low, hit_high = row["intervals"]["hit"]["0.05"] or (None, None)
+    return {"what": name, **more, "flights": row["flights"], "edges": row["edges"],
+            "mean_abs_error_m": row["mean_abs_error_m"], "error_low_m": low, "error_high_m": high,
+            "missed": row["missed"], "missed_low": missed_low, "missed_high": missed_high,
+            "within_0.05_m": hit, "within_low": hit_low, "within_high": hit_high,
+            "false_per_minute": row["false_per_minute"], "balanced_accuracy": row["balanced_accuracy"]}

@@ -1,0 +1,1 @@
+"""A downward camera beside AirTouch: rendered frames, edges in them, crossings, and both together."""

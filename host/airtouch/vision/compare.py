@@ -1,0 +1,110 @@
+"""Camera, AirTouch and both together on the same simulated flights, scored alike."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.detector import registry, tuning
+from airtouch.detector.dataset import Condition
+from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore, match, score_flight
+from airtouch.detector.trace import Detection
+from airtouch.vision import lines
+from airtouch.vision.camera import Camera
+from airtouch.vision.crossings import Film, Sight, detections, frames, sight
+
+THRESHOLDS = 30  #: tried, quantiles of the strengths of the frames trained on
+TOGETHER_S = 0.6  #: a crossing of the camera and one of AirTouch within this are of one edge
+SHARES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  #: of the camera in the time of an edge that both find, tried
+Sights = Sequence[Sequence[Sight]]  #: one sequence a film
+
+
+@dataclass(frozen=True)
+class Fusion:
+    """How crossings are joined at one light.
+
+    share: the camera's, in the time of an edge that both find. camera_alone, airtouch_alone: whether an edge that one
+    of them finds alone counts.
+    """
+
+    share: float
+    camera_alone: bool
+    airtouch_alone: bool
+
+
+def filmed(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper], seed: int,
+           tell: Callable[[str], None] = lambda _: None) -> dict[str, list[list[Sight]]]:
+    """What each way to an edge map sees in each film at one light; every frame is rendered once."""
+    camera = Camera()
+    found: dict[str, list[list[Sight]]] = {name: [] for name in mappers}
+    for number, shot in enumerate(films, start=1):
+        seen: dict[str, list[Sight]] = {name: [] for name in mappers}
+        for time_s, image in frames(camera, shot, lux, seed):
+            small = lines.binned(image)
+            for name, mapper in mappers.items():
+                seen[name].append(sight(camera, shot, time_s, lines.strongest(mapper(small), camera)))
+        for name, some in seen.items():
+            found[name].append(some)
+        tell(f"{lux:g} lux: {number} of {len(films)} flights")
+    return found
+
+
+def threshold(films: Sequence[Film], sights: Sights) -> float:
+    """The strength from which a line counts, for the best timed F1 over films to train on."""
+    strengths = np.array([s.strength for some in sights for s in some])
+    candidates = np.unique(np.quantile(strengths, np.linspace(0.3, 0.99, THRESHOLDS)))
+    chosen, _, _ = tuning.choose([float(c) for c in candidates], [f.edges for f in films],
+                                 lambda c, i: detections(sights[i], c, films[i].speed_mps))
+    return chosen
+
+
+def crossings(films: Sequence[Film], sights: Sights, least: float) -> list[list[Detection]]:
+    """The camera's crossings of each film."""
+    return [detections(some, least, shot.speed_mps) for shot, some in zip(films, sights, strict=True)]
+
+
+def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
+    """AirTouch's crossings of each film by a shipped detector, its lag taken off, within what was filmed."""
+    detector = registry.get(name)
+    model = detector.load(None)
+    lag = detector.lag_s(model) / SAMPLE_PERIOD_S
+    found = []
+    for shot in films:
+        moved = [replace(d, sample=round(d.sample - lag)) for d in detector.run(shot.log, model).edges]
+        found.append([d for d in moved if shot.first_s <= d.sample * SAMPLE_PERIOD_S <= shot.last_s])
+    return found
+
+
+def scored(films: Sequence[Film], found: Sequence[Sequence[Detection]]) -> list[FlightScore]:
+    """One score a film: its edges, and the crossings that are none a minute of film."""
+    scores = []
+    for shot, some in zip(films, found, strict=True):
+        filming = np.zeros(len(shot.log), bool)
+        filming[int(shot.first_s / SAMPLE_PERIOD_S):int(shot.last_s / SAMPLE_PERIOD_S)] = True
+        inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in some]
+        scores.append(score_flight(Path(shot.log.source).name, Condition(speed_mps=shot.speed_mps), shot.edges, filming,
+                                   np.full(len(shot.log), np.nan), inside))
+    return scores
+
+
+def fused(seen: Sequence[Detection], felt_there: Sequence[Detection], fusion: Fusion) -> list[Detection]:
+    """Crossings of both: pairs at a weighted time, single ones where the fusion takes them."""
+    pairs = match([d.sample for d in seen], [d.sample for d in felt_there], TOGETHER_S / SAMPLE_PERIOD_S)
+    joined = [Detection(round(fusion.share * seen[i].sample + (1.0 - fusion.share) * felt_there[j].sample),
+                        felt_there[j].kind) for i, j in pairs]
+    if fusion.camera_alone:
+        joined += [d for i, d in enumerate(seen) if i not in {i for i, _ in pairs}]
+    if fusion.airtouch_alone:
+        joined += [d for j, d in enumerate(felt_there) if j not in {j for _, j in pairs}]
+    return sorted(joined, key=lambda d: d.sample)
+
+
+def choose_fusion(films: Sequence[Film], seen: Sequence[Sequence[Detection]], felt_there: Sequence[Sequence[Detection]],
+                  ) -> Fusion:
+    """The fusion with the best timed F1 over films to train on. What both find is always joined, at a share
+    between 0 (AirTouch's time) and 1 (the camera's)."""
+    choices = [Fusion(share, camera, airtouch) for share in SHARES for camera in (True, False)
+               for airtouch in (True, False)]
+    return max(choices, key=lambda f: tuning.timed_f1(
+        [(shot.edges, fused(a, b, f)) for shot, a, b in zip(films, seen, felt_there, strict=True)]))

@@ -1,0 +1,103 @@
+"""A floor and a raised platform with textures, rendered through a moving camera.
+
+Each pixel's ray meets the platform's top, or the floor beside it. The platform is a thin board: its sides, the drone's
+own shadow, gloss and the lens's distortion are left out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from airtouch.vision.camera import Camera
+
+TILE_PX = 512
+FLOOR_M_PER_PX, TOP_M_PER_PX = 2.0e-3, 2.5e-4  #: of the textures, finer than a pixel sees
+
+
+@dataclass(frozen=True)
+class Scene:
+    """floor, top: textures, albedo (TILE_PX, TILE_PX) float32, repeated. corners_m: (k, 2) of the platform, convex,
+    anticlockwise. top_m: its height."""
+
+    floor: np.ndarray
+    top: np.ndarray
+    corners_m: np.ndarray
+    top_m: float
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the camera is, (3,) m, and its attitude, (3, 3) body to world."""
+
+    place_m: np.ndarray
+    attitude: np.ndarray
+
+
+def texture(rng: np.random.Generator, albedo: float, contrast: float, slope: float = 1.0) -> np.ndarray:
+    """A tile of 1/f^slope noise around a mean albedo; contrast: its rms over the mean. Repeats without a seam."""
+    across = np.fft.fftfreq(TILE_PX)[:, None] ** 2 + np.fft.rfftfreq(TILE_PX)[None, :] ** 2
+    across[0, 0] = np.inf
+    spectrum = np.fft.rfft2(rng.normal(size=(TILE_PX, TILE_PX))) * across ** (-slope / 2.0)
+    noise = np.fft.irfft2(spectrum, s=(TILE_PX, TILE_PX))
+    return np.clip(albedo * (1.0 + contrast * noise / noise.std()), 0.02, 0.98).astype(np.float32)
+
+
+def ground_points(camera: Camera, pose: Pose, height_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """x and y (rows, columns), m, at which the pixels' rays meet the plane z = height_m; NaN for rays that never do."""
+    u, v = np.meshgrid(np.arange(camera.width) - camera.centre[0], np.arange(camera.height) - camera.centre[1])
+    rays = np.stack([u, -v, np.full(u.shape, -camera.focal_px)], axis=-1) @ pose.attitude.T  # body x forward, y left
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = (height_m - pose.place_m[2]) / rays[..., 2]
+    along = np.where((rays[..., 2] < 0.0) & (along > 0.0), along, np.nan)
+    return pose.place_m[0] + along * rays[..., 0], pose.place_m[1] + along * rays[..., 1]
+
+
+def project(camera: Camera, pose: Pose, points_m: np.ndarray) -> np.ndarray:
+    """(n, 2) pixels (x, y) of points (n, 3) in front of the camera."""
+    seen = (points_m - pose.place_m) @ pose.attitude
+    return np.column_stack([camera.centre[0] - camera.focal_px * seen[:, 0] / seen[:, 2],
+                            camera.centre[1] + camera.focal_px * seen[:, 1] / seen[:, 2]])
+
+
+def view(camera: Camera, pose: Pose, scene: Scene) -> np.ndarray:
+    """Albedo (rows, columns), float32, that a camera at rest sees."""
+    image = _sampled(scene.floor, *ground_points(camera, pose, 0.0), FLOOR_M_PER_PX)
+    if pose.place_m[2] > scene.top_m:
+        x, y = ground_points(camera, pose, scene.top_m)
+        on_top = over(scene, x, y)
+        if on_top.any():
+            image = np.where(on_top, _sampled(scene.top, x, y, TOP_M_PER_PX), image)
+    return image
+
+
+def over(scene: Scene, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Whether points lie within the platform's outline; NaN does not."""
+    ahead = np.roll(scene.corners_m, -1, axis=0) - scene.corners_m
+    inside = np.ones(np.shape(x), bool)
+    for (cx, cy), (dx, dy) in zip(scene.corners_m, ahead, strict=True):
+        inside &= dx * (y - cy) - dy * (x - cx) >= 0.0
+    return inside
+
+
+def blurred(camera: Camera, poses: Sequence[Pose], scene: Scene) -> np.ndarray:
+    """The mean of the views of several poses within an exposure."""
+    return np.mean([view(camera, pose, scene) for pose in poses], axis=0)
+
+
+def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> np.ndarray:
+    """(rows, columns) bool: pixels within `width_px` of the platform's rim, for a camera at rest: truth to train on."""
+    x, y = ground_points(camera, pose, scene.top_m)
+    inside = over(scene, x, y).astype(np.uint8)
+    size = 2 * int(np.ceil(width_px)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    return (cv2.dilate(inside, kernel) - cv2.erode(inside, kernel)) > 0
+
+
+def _sampled(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
+    """The texture at places, bilinear, repeated; the mean where a ray meets nothing."""
+    mean = float(tile.mean())
+    u, v = (np.mod(np.nan_to_num(a / m_per_px), TILE_PX).astype(np.float32) for a in (x, y))
+    found = cv2.remap(tile, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return np.where(np.isfinite(x), found, np.float32(mean))

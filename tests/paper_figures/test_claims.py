@@ -1,0 +1,31 @@
+"""What the page says of the paper against the paper's source."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from airtouch.paper_figures import run
+from airtouch.paper_figures.claims import SAID
+
+SOURCE = Path(__file__).parents[3] / "shared" / "paper" / "airtouch.tex"
+
+
+@pytest.mark.skipif(not SOURCE.exists(), reason="the paper's source is not on this machine")
+@pytest.mark.parametrize("name", SAID)
+def test_each_quote_stands_in_its_line(name):
+    said = SAID[name]
+    assert said.quote in SOURCE.read_text("utf-8").splitlines()[said.line - 1]
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_each_number_stands_in_its_quote(name):
+    said = SAID[name]
+    numbers = [float(n.replace(",", "")) for n in re.findall(r"\d[\d,]*\.?\d*", said.quote)]
+    for value in said.values:
+        assert any(value == pytest.approx(n * scale) for n in numbers
+                   for scale in (1, 0.01, 0.001, 1e3, 1e6, 60)), value
+
+
+def test_every_claim_belongs_to_a_figure_and_every_figure_has_one():
+    assert {said.figure for said in SAID.values()} == set(run.FIGURES)

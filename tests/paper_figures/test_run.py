@@ -1,0 +1,84 @@
+"""The runner: what is done stays, what cannot be made says so, what is of other settings is not replaced unasked."""
+
+import csv
+import json
+import sys
+import types
+
+import pytest
+from click.testing import CliRunner
+
+from airtouch.cli.paper import command
+from airtouch.errors import AirTouchError
+from airtouch.paper_figures import run
+from airtouch.paper_figures.claims import REPRODUCED, UNTESTABLE
+from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """Three figures in place of the real ones: one that works, one that lacks flights, one whose input is bad."""
+    made = []
+
+    def works(job):
+        made.append(job.quick)
+        verdicts = {name: Verdict(REPRODUCED, f"n = {len(made)} <of 3>") for name in ("height-4cm", "height-9cm")}
+        return Figure("Works", [{"what": "a", "value": 1.5}, {"what": "b", "n": 2}], "Simulated.", verdicts,
+                      lambda canvas: canvas.subplots().plot([1, 2]))
+
+    def lacks(job):
+        raise Missing("no recorded flights here: give --flights")
+
+    def bad(job):
+        raise AirTouchError("log.csv:7: current is 'x', a number is needed")
+
+    module = types.ModuleType("airtouch.paper_figures.made_up")
+    module.works, module.lacks, module.bad = works, lacks, bad
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(run, "FIGURES", {"fig8d": ("made_up", "works"), "fig8e": ("made_up", "lacks"),
+                                         "table1": ("made_up", "bad")})
+    return made
+
+
+def test_what_is_missing_is_said_and_the_others_are_made(figures, tmp_path):
+    out = tmp_path / "paper"
+    found = run.run(run.names(()), out, Job(None, out / "work"))
+    assert list(csv.DictReader((out / "fig8d.csv").open())) == [{"what": "a", "value": "1.5", "n": ""},
+                                                                {"what": "b", "value": "", "n": "2"}]
+    assert (out / "fig8d.png").read_bytes()[:4] == b"\x89PNG" and b"<svg" in (out / "fig8d.svg").read_bytes()
+    assert not (out / "fig8e.csv").exists()
+    assert "no recorded flights" in found["fig8e"]["missing"] and "log.csv:7" in found["table1"]["missing"]
+    assert {c["verdict"] for name in ("fig8e", "table1") for c in found[name]["claims"].values()} == {UNTESTABLE}
+    page = (out / "index.html").read_text()
+    assert "n = 1 &lt;of 3&gt;" in page and "Not made: no recorded flights" in page and "0.364" not in page
+
+
+def test_done_figures_stay_and_damaged_ones_are_made_again(figures, tmp_path):
+    job = Job(None, tmp_path / "work")
+    run.run(["fig8d"], tmp_path, job)
+    run.run(["fig8d"], tmp_path, job)
+    assert len(figures) == 1
+    (tmp_path / "fig8d.svg").unlink()
+    run.run(["fig8d"], tmp_path, job)
+    (tmp_path / "fig8d.json").write_text('{"key": ')
+    run.run(["fig8d"], tmp_path, job)
+    run.run(["fig8d"], tmp_path, job, force=True)
+    assert len(figures) == 4
+
+
+def test_figures_of_other_settings_are_not_replaced_unasked(figures, tmp_path):
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work"))
+    with pytest.raises(AirTouchError, match="fig8d.csv was made with other settings; use --force"):
+        run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work", quick=True))
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work", quick=True), force=True)
+    assert figures == [False, True] and json.loads((tmp_path / "fig8d.json").read_text())["quick"]
+
+
+def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tmp_path, monkeypatch):
+    monkeypatch.setattr("airtouch.cli.paper.find_flights", lambda: None)
+    result = CliRunner().invoke(command, ["--out", str(tmp_path)])
+    assert result.exit_code == 2 and "reproduced" in result.stdout and "Not made" not in result.stdout
+    with pytest.raises(AirTouchError, match="no figure 'fig8x'; did you mean"):
+        run.names(["fig8x"])
+    missing = CliRunner().invoke(command, ["--flights", str(tmp_path / "none"), "--out", str(tmp_path)])
+    assert "no such file or folder" in str(missing.exception)

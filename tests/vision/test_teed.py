@@ -1,0 +1,51 @@
+"""The network's sizes against TEED's publication, its NumPy against Keras."""
+
+import numpy as np
+import pytest
+
+from airtouch.vision import teed, training
+from skips import needs
+
+
+def test_three_colours_give_the_published_number_of_parameters():
+    """58K parameters (Soria et al. 2023).
+
+    Added up by hand: 448 + 2320 + 4640 + 9248 + 13872 + 20784 + 544 + 1584 + 22 + 38 + 4930 + 480.
+    """
+    assert teed.parameters(colours=3) == 58910
+    assert teed.parameters() == 58910 - 2 * 9 * 16
+
+
+def test_multiplications_of_one_layer_at_a_time():
+    """The first layer: 9 x 16 of one colour, at half the rows and columns."""
+    less = teed.multiplications(320, 320, colours=3) - teed.multiplications(320, 320, colours=1)
+    assert less == 2 * 9 * 16 * 160 * 160
+
+
+def test_smish_is_its_definition():
+    x = np.linspace(-20.0, 20.0, 401)
+    assert teed.smish(x) == pytest.approx(x * np.tanh(np.log1p(1.0 / (1.0 + np.exp(-x)))), abs=1e-12)
+
+
+@needs("keras")
+@needs("tensorflow")
+def test_numpy_equals_keras():
+    model = teed.build_keras((4, 8, 12))
+    assert model.count_params() == teed.parameters((4, 8, 12))
+    rng = np.random.default_rng(3)
+    for layer in model.layers:  # biases too, which start at 0
+        layer.set_weights([rng.normal(scale=0.3, size=w.shape) for w in layer.get_weights()])
+    image = rng.integers(0, 255, (24, 40)).astype(np.uint8)
+    logit = np.asarray(model(teed.normalised(image)[None, ..., None]))[0, ..., 0]
+    assert np.ptp(logit) > 0.1
+    assert teed.infer(teed.weights_of_keras(model), image) == pytest.approx(1.0 / (1.0 + np.exp(-logit)), abs=1e-5)
+
+
+@pytest.mark.parametrize("name", training.SIZES)
+def test_weights_that_come_with_the_package_fit_their_network(name):
+    weights, seconds = training.load(name)
+    shapes = teed.layers(training.SIZES[name])
+    assert {f"{n}.{part}" for n in shapes for part in ("kernel", "bias")} == set(weights) and seconds > 0.0
+    for layer, shape in shapes.items():
+        assert weights[f"{layer}.kernel"].shape == shape and weights[f"{layer}.bias"].shape == (teed.outputs(layer,
+                                                                                                             shape),)
