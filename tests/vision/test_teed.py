@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from airtouch.vision import teed, training
+from airtouch.vision import teed
+from airtouch.vision import weights as shipped
 from skips import needs
 
 
@@ -41,10 +42,10 @@ def test_numpy_equals_keras():
     assert teed.infer(teed.weights_of_keras(model), image) == pytest.approx(1.0 / (1.0 + np.exp(-logit)), abs=1e-5)
 
 
-@pytest.mark.parametrize("name", training.SIZES)
+@pytest.mark.parametrize("name", shipped.SIZES)
 def test_weights_that_come_with_the_package_fit_their_network(name):
-    weights, seconds = training.load(name)
-    shapes = teed.layers(training.SIZES[name])
+    weights, seconds = shipped.load(name)
+    shapes = teed.layers(shipped.SIZES[name])
     assert {f"{n}.{part}" for n in shapes for part in ("kernel", "bias")} == set(weights) and seconds > 0.0
     for layer, shape in shapes.items():
         assert weights[f"{layer}.kernel"].shape == shape and weights[f"{layer}.bias"].shape == (teed.outputs(layer,

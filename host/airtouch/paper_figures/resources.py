@@ -11,7 +11,7 @@ from airtouch.paper_figures.claims import REPRODUCED, SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.parameters import DEFAULT
 from airtouch.reference.int8_network import multiplications
-from airtouch.vision import teed, training
+from airtouch.vision import teed, weights
 from airtouch.vision.camera import Camera
 
 PAPER_CAMERA = (320, 320)  #: rows and columns that the paper states for its camera
@@ -21,12 +21,12 @@ FLOPS_A_MAC = 2
 def resources(job: Job) -> Figure:
     """The paper's network, `best` and a network with TEED's structure, counted from their shapes."""
     ours, stream = paper.load(None), best.load(None)
-    weights = sum(int(np.size(w)) for w in ours.weights.values())
+    count = sum(int(np.size(w)) for w in ours.weights.values())
     mac = multiplications(ours.int8)
     dense_mac = _dense_multiplications(ours)
     vision_mac = teed.multiplications(*PAPER_CAMERA, colours=3)
     parameters = teed.parameters(colours=3)
-    camera, vision_seconds = Camera(), training.load("teed")[1]
+    camera, vision_seconds = Camera(), weights.load("teed")[1]
     window_bits = 32 * 3 * DEFAULT.feature_window
     ring_bits = 32 * 9 * DEFAULT.band_window
     frame_bits = 8 * camera.width * camera.height
@@ -35,9 +35,9 @@ def resources(job: Job) -> Figure:
         {"what": "TEED's structure, 320 x 320", "mac": vision_mac, "flops": FLOPS_A_MAC * vision_mac,
          "parameters": parameters, "parameter_bytes": 4 * parameters, "training_s": vision_seconds,
          "frame_bits": 8 * PAPER_CAMERA[0] * PAPER_CAMERA[1]},
-        {"what": "paper's network, no zeros", "mac": dense_mac, "flops": FLOPS_A_MAC * dense_mac, "parameters": weights,
-         "parameter_bytes": 4 * weights, "frame_bits": window_bits},
-        {"what": "paper's network as shipped", "mac": mac, "flops": FLOPS_A_MAC * mac, "parameters": weights,
+        {"what": "paper's network, no zeros", "mac": dense_mac, "flops": FLOPS_A_MAC * dense_mac, "parameters": count,
+         "parameter_bytes": 4 * count, "frame_bits": window_bits},
+        {"what": "paper's network as shipped", "mac": mac, "flops": FLOPS_A_MAC * mac, "parameters": count,
          "parameter_bytes": parameter_bytes(ours.int8), "frame_bits": window_bits},
         {"what": "best, a step of 10 ms", "mac": own["mac_per_sample"], "flops": FLOPS_A_MAC * own["mac_per_sample"],
          "parameter_bytes": own["parameter_bytes"], "frame_bits": 8 * own["state_bytes"]}]
@@ -85,7 +85,7 @@ def resources(job: Job) -> Figure:
 
 def _training(job: Job, rows: list[dict[str, Any]], vision_seconds: float) -> Verdict:
     """What a fold of the paper's network took in this run, beside the vision network's training."""
-    text = f"vision network {vision_seconds / 60:.1f} min of processor time on {training.IMAGES} rendered images"
+    text = f"vision network {vision_seconds / 60:.1f} min of processor time on rendered images"
     try:
         _, folds = recorded.scores(job, "paper")
     except Missing:

@@ -13,7 +13,7 @@ from airtouch.logs.files import write_bytes
 from airtouch.paper_figures import pictures, simulated, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
-from airtouch.vision import teed, training
+from airtouch.vision import teed, weights
 
 SCENE = "paper-4cm"  #: 4 cm over the platform, straight on, as the paper's comparison
 LUX, QUICK_LUX = (500.0, 200.0, 100.0, 50.0, 20.0, 10.0, 5.0), (100.0, 20.0, 5.0)
@@ -87,11 +87,11 @@ def network_size(job: Job) -> Figure:
     """Performance:3c: the camera's errors against the size of its network, AirTouch's against the size of its own."""
     films, seen, felt = _everything(job)
     lux = 100.0
-    rows = {name: summary.summarise(_scores(films, seen[name, lux])) for name in training.SIZES}
-    table = [words.table_row(name, r, parameters=teed.parameters(training.SIZES[name]), lux=lux) for name,
+    rows = {name: summary.summarise(_scores(films, seen[name, lux])) for name in weights.SIZES}
+    table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux) for name,
              r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
-    text = "; ".join(f"{teed.parameters(training.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
+    text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
                      for n, r in rows.items())
     ours = {name: summary.summarise(_scores(films, felt[name])) for name in FELT}
     verdicts = {
@@ -103,7 +103,7 @@ def network_size(job: Job) -> Figure:
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
-        sizes = [teed.parameters(training.SIZES[n]) for n in rows]
+        sizes = [teed.parameters(weights.SIZES[n]) for n in rows]
         for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
             _curve(axes, sizes, list(rows.values()), key, factor, COLOURS["teed"], "vision, 100 lux")
             for name, row in ours.items():
@@ -194,8 +194,8 @@ def _everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dic
         try:
             stored = json.loads(kept.read_text())
         except (OSError, ValueError):
-            names = training.SIZES if lux == 100.0 else ("teed",)
-            mappers = {"classical": lines.classical, **{n: lines.learned(training.load(n)[0]) for n in names}}
+            names = weights.SIZES if lux == 100.0 else ("teed",)
+            mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in names}}
             sights = compare.filmed(films, lux, mappers, SEED, job.tell)
             stored = {}
             for name, some in sights.items():

@@ -7,7 +7,6 @@ their last bits from machine to machine.
 """
 
 import time
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,8 @@ from airtouch.vision import teed
 from airtouch.vision.camera import Camera, expose, exposure_s
 from airtouch.vision.crossings import SUBPOSES, draw_texture
 from airtouch.vision.lines import binned
+from airtouch.vision.weights import SIZES
 
-SIZES = {"teed": teed.WIDTHS, "half": (8, 16, 24), "quarter": (4, 8, 12), "eighth": (2, 4, 6)}  #: name -> widths
 IMAGES, STEPS, BATCH, CROP_PX, PEAK_RATE = 500, 600, 8, 96, 2e-3
 EDGES_WEIGH = 6.0  #: an edge pixel in the loss against another; about one in thirty is one
 SEED = 5
@@ -74,19 +73,6 @@ def train(name: str, images: np.ndarray, truth: np.ndarray, steps: int = STEPS, 
         model.train_on_batch(np.stack([x[place] for place in cut])[..., None],
                              np.stack([truth[place] for place in cut])[..., None])
     return teed.weights_of_keras(model)
-
-
-def load(name: str) -> tuple[teed.Weights, float]:
-    """(weights, seconds that their training took) of a size that comes with the package.
-
-    Raises AirTouchError where the file is missing or damaged.
-    """
-    path = str(resources.files("airtouch.vision") / f"{name}.npz")
-    try:
-        with np.load(path) as file:
-            return {key: file[key].astype(np.float32) for key in file.files if key != "seconds"}, float(file["seconds"])
-    except (OSError, ValueError, KeyError) as error:
-        raise AirTouchError(f"{path}: {error}; make it with python -m airtouch.vision.training") from None
 
 
 def main() -> None:

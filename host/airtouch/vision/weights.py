@@ -1,0 +1,23 @@
+"""The sizes of the network, and its weights, which `python -m airtouch.vision.training` made."""
+
+from importlib import resources
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.vision import teed
+
+SIZES = {"teed": teed.WIDTHS, "half": (8, 16, 24), "quarter": (4, 8, 12), "eighth": (2, 4, 6)}  #: name -> widths
+
+
+def load(name: str) -> tuple[teed.Weights, float]:
+    """(weights, seconds that their training took) of a size that comes with the package.
+
+    Raises AirTouchError where the file is missing or damaged.
+    """
+    path = str(resources.files("airtouch.vision") / f"{name}.npz")
+    try:
+        with np.load(path) as file:
+            return {key: file[key].astype(np.float32) for key in file.files if key != "seconds"}, float(file["seconds"])
+    except (OSError, ValueError, KeyError) as error:
+        raise AirTouchError(f"{path}: {error}; make it with python -m airtouch.vision.training") from None
