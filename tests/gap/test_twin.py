@@ -147,3 +147,39 @@ def test_ratio_and_share_follow_whatever_an_effect_sets_in_the_plant(study, fiel
     assert law.ratio(()) == pytest.approx(1.0)
     assert np.abs(np.log(law.ratio((Active(made, {"factor": 1.5}),)))).max() > 0.01
     assert law.ratio((Active(made, {"factor": 1.0}),)) == pytest.approx(1.0)
+
+
+def leaves(table):
+    """Every number of a structured array, as views of one element."""
+    if table.dtype.names:
+        for name in table.dtype.names:
+            yield from leaves(table[name])
+    else:
+        flat = table.reshape(-1)
+        yield from (flat[k:k + 1] for k in range(len(flat)))
+
+
+def test_rows_alike_in_their_loop_have_the_same_spectra():
+    """What the spectra are kept by leaves no number of the plant out that they depend on."""
+    plant, f = prepare(VEHICLE, ())[0].copy(), np.array([0.7, 2.0, 9.0, 31.0])
+    row, strengths = plant[0], np.ones(5)
+
+    def seen(axis):
+        c = loop_model.firmware(row, axis)
+        whole = [loop_model.spectra(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
+        if axis != "thrust":
+            whole += [loop_model.turning_per_command(c, row, axis, strengths, f),
+                      loop_model.torque_per_command(row, axis, f)]
+        return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in whole])
+
+    before, others = {axis: seen(axis) for axis in loop_model.AXES}, 0
+    for number in leaves(plant):
+        kept = number.copy()
+        number[...] = ~kept if number.dtype == bool else (1.07 * kept + 1e-3 if number.dtype.kind == "f" else kept + 1)
+        for axis, (key, made) in before.items():
+            changed, now = seen(axis)
+            others += changed != key
+            if changed == key:
+                np.testing.assert_array_equal(now, made)
+        number[...] = kept
+    assert others > 50  # else nothing was changed

@@ -15,6 +15,7 @@ from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.data import Data
 from airtouch.gap.least_squares import bounded_step, cost_of, limits, weights_of, without_offsets
 from airtouch.gap.problem import LOOP, Part, Problem, problem_of
+from airtouch.gap.spectra import squared
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8
@@ -207,7 +208,10 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
 
     def push(offsets: np.ndarray) -> np.ndarray:
         """What offsets add to the spectra."""
-        return sum((a * c for a, (c, _) in zip(offsets, constants, strict=True)), np.zeros(len(problem.base)))
+        out = np.zeros(len(problem.base), complex)
+        for amount, (here, column, _) in zip(offsets, problem.offsets, strict=True):
+            out[here] = amount * column
+        return out
 
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
@@ -259,8 +263,10 @@ def strongest(problem: Problem, term: Term, values: np.ndarray, others: np.ndarr
     if not unit.any():
         return term
 
+    size = squared(values)
+
     def cost(log_x: float) -> float:
-        return -problem.likelihood(values, others + random_effects.growth(term, np.exp(log_x)) * unit)
+        return -problem.likelihood_of(size, others + random_effects.growth(term, np.exp(log_x)) * unit)
 
     top = np.log(min(float(high[0]), 1e3))
     grid = np.linspace(np.log(0.003), top, 40)

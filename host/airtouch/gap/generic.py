@@ -17,7 +17,7 @@ from airtouch.gap.basis import BASIS, basis
 from airtouch.gap.candidates import Term
 from airtouch.gap.data import Data
 from airtouch.gap.problem import GROUPS, Part, Problem, problem_of, whole_of
-from airtouch.gap.spectra import OVERLAP_WEIGHT, blocks
+from airtouch.gap.spectra import OVERLAP_WEIGHT, blocks, squared
 
 CHANNELS = 9  #: that are regressed: force, torque, rate
 NOTHING = 1e-9  #: variance of a coefficient that has no scatter
@@ -92,7 +92,7 @@ class _Half:
     def system(self, cell: _Cell, values: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix and right-hand side for values of a cell; tails as those of what is left of them."""
         nu, tail, power = self.problem.freedom[cell.own], self.problem.tail[cell.own], self.power[cell.own]
-        weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + np.abs(left) ** 2 / power) / power
+        weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(left) / power) / power
         weighted = cell.columns.conj().T * weights
         return 2.0 * (weighted @ cell.columns).real, 2.0 * (weighted @ values).real
 
@@ -105,13 +105,13 @@ class _Half:
             x = np.linalg.solve(normal + np.diag(precision), right)
             left = values - cell.columns @ x
         nu, tail = self.problem.freedom[cell.own], self.problem.tail[cell.own]
-        tails = (nu + 1.0) * np.log1p(np.abs(left) ** 2 / self.power[cell.own] / tail)
+        tails = (nu + 1.0) * np.log1p(squared(left) / self.power[cell.own] / tail)
         return left, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
     def powers(self, left: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Power of what is left over what it should be, freedom, tail and group of the values that are known."""
         known = self.problem.known
-        over = np.abs(left[known]) ** 2 / self.power[known]
+        over = squared(left[known]) / self.power[known]
         return over, self.problem.freedom[known], self.problem.tail[known], self.groups[known]
 
 

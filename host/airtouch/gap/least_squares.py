@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.gap.candidates import Term
 from airtouch.gap.problem import Problem
-from airtouch.gap.spectra import OVERLAP_WEIGHT
+from airtouch.gap.spectra import OVERLAP_WEIGHT, squared
 
 
 def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
@@ -17,34 +17,24 @@ def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
 
 def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
     power = problem.power + added
-    e = np.abs(values) ** 2 / power
+    e = squared(values) / power
     return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
 
 
-def solve(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
-           at: np.ndarray, twin: tuple[np.ndarray, np.ndarray] | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Step of ridge regression that lowers values + sum(step * column), and the covariance.
+def _normal(columns: Sequence[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray, at: np.ndarray,
+            twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and right-hand side of the ridge regression that lowers values + sum(step * column).
 
     twin: gradient and information of the likelihood from the commands' spectra.
     """
-    normal, slope = _normal(columns, prior, values, weights, at, twin)
-    covariance = np.linalg.pinv(normal, hermitian=True)
-    return covariance @ slope, covariance
+    j = np.ascontiguousarray(columns, complex).view(float)  # real and imaginary parts side by side
+    wj = j * np.repeat(weights, 2)
+    normal = 2.0 * (wj @ j.T) + np.diag(1.0 / prior ** 2)
+    slope = -2.0 * (wj @ np.ascontiguousarray(values, complex).view(float)) - at / prior ** 2
+    return normal + twin[1], slope + twin[0]
 
 
-def _normal(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray, at: np.ndarray,
-            twin: tuple[np.ndarray, np.ndarray] | None) -> tuple[np.ndarray, np.ndarray]:
-    """Normal matrix and right-hand side of that ridge regression."""
-    j = np.array(columns)
-    wj = j.conj() * weights
-    normal = 2.0 * (wj @ j.T).real + np.diag(1.0 / prior ** 2)
-    slope = -2.0 * (wj @ values).real - at / prior ** 2
-    if twin is not None:
-        slope, normal = slope + twin[0], normal + twin[1]
-    return normal, slope
-
-
-def bounded_step(columns: list[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
+def bounded_step(columns: Sequence[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
                  x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
                  twin: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """A step that leaves parameters at a bound there when it would take them past it, and the covariance (n, n) of x.
@@ -81,15 +71,19 @@ def cost_of(problem: Problem, values: np.ndarray, added: np.ndarray | float, x: 
     return -problem.likelihood(values, added) + 0.5 * float(((np.concatenate([x, offsets]) / prior) ** 2).sum())
 
 
-def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float,
-                     ) -> tuple[np.ndarray, float]:
-    constants = problem.constant()
-    if not constants:
-        return values, 0.0
-    prior, found = np.array([p for _, p in constants]), np.zeros(len(constants))
-    left = values
-    for _ in range(2):
-        step, _ = solve([-c for c, _ in constants], prior, left, weights_of(problem, left, added), found)
-        found = found + step
-        left = values - sum(a * c for a, (c, _) in zip(found, constants, strict=True))
-    return left, 0.5 * float(((found / prior) ** 2).sum())
+def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:
+    """Values less the offsets between flights of highest posterior, and minus the log of these offsets' prior.
+
+    An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
+    """
+    power, left, cost = problem.power + added, values.copy(), 0.0
+    for here, column, spread in problem.offsets:
+        amount, most = 0.0, OVERLAP_WEIGHT * (problem.freedom[here] + 1.0) * problem.known[here] / power[here]
+        for _ in range(2):
+            weights = most / (problem.tail[here] + squared(left[here]) / power[here])
+            normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
+            slope = 2.0 * float(np.vdot(column, weights * left[here]).real) - amount / spread ** 2
+            amount += slope / normal
+            left[here] = values[here] - amount * column
+        cost += 0.5 * (amount / spread) ** 2
+    return left, cost

@@ -109,6 +109,25 @@ def _share(part: Any, of: Any) -> float:
     return float(part) / float(of)
 
 
+def of_loop(row: Any, axis: str) -> tuple[float, ...]:
+    """All that a plant row gives the loop of one axis beside its controller: rows alike in this have the same spectra.
+
+    The controller itself, where it is the firmware's, is `firmware(row, axis)`.
+    """
+    lags = [float(row[name]) for name in ("actuator_delay", "motor_rise", "motor_fall", "sensor_delay")]
+    gains = [float(np.mean(row["gain"])), *(float(row[name]) for name in (
+        "height_gain", "rate_gain", "attitude_gain", "position_gain", "gravity", "mass"))]
+    if axis == "thrust":
+        return (*lags, *gains)
+    i = AXES.index(axis) - 1
+    return (*lags, *gains[:-1], _arm(row, i), float(row["inertia"][i]))
+
+
+def _arm(row: Any, i: int) -> float:
+    """Mean distance of the rotors from the axis of roll (0) or pitch (1), m."""
+    return float(np.mean(np.abs(row["rotor_y" if i == 0 else "rotor_x"])))
+
+
 def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
 
@@ -200,7 +219,7 @@ def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> 
         height = climb * c.angle * k * (1.0 + c.angle_integral / s) / s
         return lift / float(row["mass"]) * motor / s, climb, height, 0.0 * s, climb + height
     i = AXES.index(axis) - 1
-    arm = float(np.mean(np.abs(row["rotor_y" if i == 0 else "rotor_x"])))
+    arm = _arm(row, i)
     k = c.gain * float(row["rate_gain"])
     change = c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
     filtered = late / _butterworth(s, c.lowpass_hz) / _butterworth(s, c.chip_hz)

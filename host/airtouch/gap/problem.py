@@ -19,7 +19,7 @@ from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.data import Data, spectra
 from airtouch.gap.response import FIRST_BIN
-from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged
+from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
 from airtouch.gap.twin import COMMAND_ONLY
 from airtouch.gap.twin_view import TwinView
 from airtouch.simulation.effects import Active
@@ -138,7 +138,7 @@ class Problem:
         if not self.own or not loop or not law.changes_loop(loop):
             return np.zeros(self.own)
         change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
-        return DOUBT ** 2 * np.abs(change) ** 2 * self.torque
+        return DOUBT ** 2 * squared(change) * self.torque
 
     def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
         """Whether the loops of roll and pitch differ between two hypotheses."""
@@ -150,6 +150,12 @@ class Problem:
         if self._constant is None:
             self._constant = self._constants()
         return self._constant
+
+    @functools.cached_property
+    def offsets(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
+        """`constant` without zeros: indices, values there, deviation. No two have an index in common."""
+        places = [np.flatnonzero(column) for column, _ in self.constant()]
+        return [(here, column[here], spread) for here, (column, spread) in zip(places, self.constant(), strict=True)]
 
     def _constants(self) -> list[tuple[np.ndarray, float]]:
         columns = []
@@ -174,7 +180,11 @@ class Problem:
 
     def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
         """Log likelihood of what is left, over nothing in particular; only differences mean something."""
-        return float(self.each(values, added).sum())
+        return self.likelihood_of(squared(values), added)
+
+    def likelihood_of(self, size: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+        """The same, from the values' squared size: for one set of values and many powers."""
+        return float(self._each(size, added).sum())
 
     def power_slopes(self, values: np.ndarray, added: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Slope (own,) of the log likelihood against the expected power of each value of the replay view, and its
@@ -183,14 +193,17 @@ class Problem:
         """
         own = slice(self.own)
         power = self.power[own] + added[own]
-        e = np.abs(values[own]) ** 2 / power
+        e = squared(values[own]) / power
         share = OVERLAP_WEIGHT * self.known[own] / power
         return share * ((self.freedom[own] + 1.0) * e / (self.tail[own] + e) - 1.0), share / power
 
     def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+        """Log likelihood of each value."""
+        return self._each(squared(values), added)
+
+    def _each(self, size: np.ndarray, added: np.ndarray | float) -> np.ndarray:
         power = self.power + added
-        e = np.abs(values) ** 2 / power
-        tails = (self.freedom + 1.0) * np.log1p(e / self.tail)
+        tails = (self.freedom + 1.0) * np.log1p(size / power / self.tail)
         return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + tails), 0.0)
 
 

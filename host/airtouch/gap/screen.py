@@ -83,7 +83,7 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
     for train, test in ((0, 1), (1, 0)):
         problem = problem_of(screen.data, parts[train])
         constants = problem.constant()
-        columns = [*tables[train], *(-c for c, _ in constants)]
+        columns = np.array([*tables[train], *(-c for c, _ in constants)])
         prior = np.concatenate([np.full(len(tables[train]), 30.0), [p for _, p in constants]])
         x, offsets = np.zeros(len(tables[train])), np.zeros(len(constants))
         nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
@@ -93,7 +93,7 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
                                       x, offsets, low, high, nothing)
             x = np.clip(x + change[:len(x)], low, high)
             offsets = offsets + change[len(x):]
-            values = left[train] + sum(a * c for a, c in zip(np.concatenate([x, offsets]), columns, strict=True))
+            values = left[train] + np.concatenate([x, offsets]) @ columns
         problem = problem_of(screen.data, parts[test])
         moved = left[test] + sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(left[test])))
         after, cost = without_offsets(problem, moved, added[test])

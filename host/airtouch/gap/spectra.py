@@ -60,6 +60,11 @@ def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
     return spectrum
 
 
+def squared(values: np.ndarray) -> np.ndarray:
+    """|values|^2 of complex values; the root that `abs` takes costs five times as much."""
+    return values.real ** 2 + values.imag ** 2
+
+
 def judged(regime: str) -> np.ndarray:
     """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only.
 

@@ -6,9 +6,9 @@ of level flight and, through `loop_model`, the controller and its noise; a hypot
 then multiplies them by the ratio of the modelled spectra with and without it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from airtouch.gap.loop_model import (
     Controller,
     excess_phase,
     firmware,
+    of_loop,
     spectra,
     torque_per_command,
     turning_per_command,
@@ -53,6 +54,7 @@ LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "
                "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 SMOOTH = 2.0  #: bins: a block's window and `response.SMOOTH`
 PLANTS = 500  #: hypotheses whose plant is cached
+LOOPS = 1000  #: spectra of an axis that are cached, about 10 kB each
 MOST_CHANGE = 5.0  #: of the share of torque
 #: effects that change the commands alone: replayed motor commands hold nothing of them
 COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
@@ -113,7 +115,7 @@ class Twin:
         row, first = self._row(active), self._plain
         after, before = self._shares(row, f), self._shares(first, f)
         share = after / before if self.by_firmware else np.ones_like(before)
-        motors = torque_per_command(row, AXES[1], f) / torque_per_command(first, AXES[1], f)
+        motors = self._torque(row, AXES[1], f) / self._torque(first, AXES[1], f)
         return Change(motors[:, None], share / np.maximum(np.abs(share) / MOST_CHANGE, 1.0), before)
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
@@ -146,18 +148,33 @@ class Twin:
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
         """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""
-        key = ("share", row.tobytes())
-        kept = self.__dict__.setdefault("_kept", {})
+        made = np.ones((2, len(f), 3), complex)
+        for i, axis in enumerate(AXES[1:]):
+            made[:, :, i] = self._of_axis("share", row, axis, f, partial(self._share, row, i + 1, f))
+        return made
+
+    def _share(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
+        """`_shares` of axis i, complex (2, bins)."""
+        every = self.strengths[i]
+        steps = np.full(len(every), 1e-30)
+        steps[-4:-1] = every[-4:-1]  # of the velocity and angle paths
+        turning = turning_per_command(controller, row, AXES[i], np.stack([every, steps]), f, SMOOTH)
+        return turning / self._torque(row, AXES[i], f)
+
+    def _torque(self, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+        """`loop_model.torque_per_command`."""
+        return self._of_axis("torque", row, axis, f, lambda _: torque_per_command(row, axis, f))
+
+    def _of_axis(self, what: str, row: Any, axis: str, f: np.ndarray, make: Callable[[Controller], Any]) -> Any:
+        """What a controller makes of an axis at frequencies f; made once for all plant rows with the same loop."""
+        by_firmware = self.by_firmware or what == "torque"  # in which a controller counts for its period alone
+        controller = firmware(row, axis) if by_firmware else self.controllers[AXES.index(axis)]
+        key = (what, axis, controller, of_loop(row, axis), f.tobytes())
+        kept = self.__dict__.setdefault("_axes", {})
         if key not in kept:
-            made = np.ones((2, len(f), 3), complex)
-            for i, axis in enumerate(AXES[1:]):
-                every = self.strengths[i + 1]
-                steps = np.full(len(every), 1e-30)
-                steps[-4:-1] = every[-4:-1]  # of the velocity and angle paths
-                c = firmware(row, axis) if self.by_firmware else self.controllers[i + 1]
-                turning = turning_per_command(c, row, axis, np.stack([every, steps]), f, SMOOTH)
-                made[:, :, i] = turning / torque_per_command(row, axis, f)
-            kept[key] = made
+            if len(kept) >= LOOPS:
+                kept.clear()
+            kept[key] = make(controller)
         return kept[key]
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
@@ -184,12 +201,12 @@ class Twin:
         f = fine_frequencies()
         made = []
         for i, axis in enumerate(AXES):
-            controller = firmware(row, axis) if self.by_firmware else self.controllers[i]
+            sources, beyond = self._of_axis("power", row, axis, f, lambda c, axis=axis: (
+                spectra(c, row, axis, f), excess_phase(c, row, axis)))
             strengths = self.strengths[i].copy()
             if self.by_firmware and axis != "thrust":
                 strengths[0] *= (float(row["gyro_noise"][i - 1]) / self._gyro_noise()[i - 1]) ** 2
-            power = strengths @ spectra(controller, row, axis, f)
-            beyond = excess_phase(controller, row, axis)
+            power = strengths @ sources
             made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
         return np.stack([through_window(m) for m in made], axis=1)
 
