@@ -68,8 +68,9 @@ def df_loss(job: Job) -> Figure:
                                   "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
                                   + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
     return Figure("The disturbance-force loss", table, _caption(job, rows) + " Lambda is 0.1; the paper does not say "
-                                                                             "its "
-                  f"own. The lower half is trained on {FEW} flights, where the paper expects most of it.", verdicts,
+                                                                             "its own. The lower half is trained on "
+                                                                             f"{FEW} flights, where the paper expects "
+                                                                             "most of it.", verdicts,
                   lambda canvas: pictures.found_within(canvas.subplots(), {
                       what: (errors_m(some), rows[what]["edges"]) for what, (some, _) in found.items()},
                       {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
@@ -86,8 +87,8 @@ def time_resolution(job: Job) -> Figure:
     verdict = words.judged(better and (rows[50]["mean_abs_error_m"] or 9) < (rows[200]["mean_abs_error_m"] or 9), text)
     return Figure("Time resolution of FC-FE", [words.table_row(f"{s} samples", r, window=s) for s, r in rows.items()],
                   _caption(job, rows) + " A shorter window resolves time better and frequency worse; the hop is one "
-                                        "sample. "
-                  "The paper does not say which windows it compared. Physical filter off.", {"resolution": verdict},
+                                        "sample. The paper does not say which windows it compared. Physical filter "
+                                        "off.", {"resolution": verdict},
                   lambda canvas: _curves(canvas, rows, "window of the band power, samples"))
 
 
@@ -128,5 +129,4 @@ def _caption(job: Job, rows: dict[Any, dict[str, Any]]) -> str:
     row = next(iter(rows.values()))
     epochs = QUICK_EPOCHS if job.quick else EPOCHS
     return (f"Recorded flights, {row['flights']} held out by flight ({row['edges']} edges), float networks without "
-            f"pruning, "
-            f"{epochs} epochs of one cycle.")
+            f"pruning, {epochs} epochs of one cycle.")

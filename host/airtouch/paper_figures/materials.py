@@ -12,7 +12,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, simulated, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
-from airtouch.paper_figures.overall import errors_m
+from airtouch.paper_figures.overall import each_m, errors_m
 
 #: scenario -> the pair as the paper names it
 PAIRS = {"paper-mat-cement": "mat and cement", "paper-grass-cement": "artificial grass and cement",
@@ -58,7 +58,7 @@ def overall(job: Job) -> Figure:
     return Figure("Errors at material interfaces", [words.table_row(n, r) for n, r in rows.items()], _caption(found),
                   {"material-error": Verdict(UNTESTABLE, f"{CIRCULAR}; simulated: {text}")},
                   lambda canvas: pictures.signed_errors(
-                      canvas.subplots(), {n: errors_m(s) for n, s in whole.items()}, said.values[0]))
+                      canvas.subplots(), {n: each_m(s) for n, s in whole.items()}, said.values[0]))
 
 
 def by_pair(job: Job) -> Figure:
@@ -110,6 +110,5 @@ def _number(value: float | None) -> str:
 def _caption(found: dict[tuple[str, str], list[FlightScore]]) -> str:
     flights = len(next(iter(found.values())))
     return (f"Simulated: {flights} flights a pair, cruising 3.8 to 4.5 cm over the surface at 0, 10 and 20 degrees; "
-            f"both "
-            "detectors trained on other simulated flights over the four pairs. Truth is where the drone is. How a "
-            "material changes the lift is not measured but set so that the order of the paper comes out.")
+            "both detectors trained on other simulated flights over the four pairs. Truth is where the drone is. How "
+            "a material changes the lift is not measured but set so that the order of the paper comes out.")

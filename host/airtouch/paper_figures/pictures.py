@@ -33,13 +33,17 @@ def colour(name: str) -> str:
     return COLOURS.get(name.split(",")[0], MUTED)
 
 
-def signed_errors(axes: Any, errors: Mapping[str, Sequence[float]], paper_m: float) -> None:
-    """Errors edge by edge, positive early; the band is the paper's mean absolute error."""
+def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper_m: float) -> None:
+    """Errors edge by edge, positive early, None for a missed one; the band is the paper's mean absolute error."""
     axes.axhspan(-paper_m, paper_m, color=PAPER, alpha=0.15, lw=0, label=f"paper: mean |error| {paper_m:.4g} m")
-    for name, values in errors.items():
-        axes.plot(np.arange(1, len(values) + 1), values, ".", ms=4, color=colour(name), alpha=0.8, label=name)
+    for row, (name, values) in enumerate(errors.items()):
+        edges = np.arange(1, len(values) + 1)
+        missed = np.array([v is None for v in values], bool)
+        axes.plot(edges, [np.nan if v is None else v for v in values], ".", ms=4, color=colour(name), alpha=0.8,
+                  label=name)
+        axes.plot(edges[missed], np.full(missed.sum(), -0.50 - 0.04 * row), "|", ms=5, color=colour(name))
     axes.axhline(0.0, color=MUTED, lw=0.6)
-    axes.set(xlabel="edge", ylabel="error, m (positive: early)", ylim=(-0.55, 0.55))
+    axes.set(xlabel="edge (ticks below: missed)", ylabel="error, m (positive: early)", ylim=(-0.6, 0.55))
     axes.legend(fontsize=7, frameon=False, ncols=len(errors) + 1, loc="upper left")
 
 
@@ -71,8 +75,7 @@ def bars(axes: Any, rows: Sequence[Mapping[str, Any]], value: str, low: str, hig
     axes.set_ylabel(label)
 
 
-def paper_line(axes: Any, value: float, text: str) -> None:
-    """A dashed line at what the paper says."""
-    axes.axhline(value, color=PAPER, ls="--", lw=1)
-    axes.annotate(text, (0.995, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7,
-                  color=PAPER)
+def paper_stars(axes: Any, values: Mapping[int, float]) -> None:
+    """Stars at what the paper says, place on the axis -> value."""
+    axes.plot(list(values), list(values.values()), "*", color="black", ms=9, ls="none", label="in the paper")
+    axes.legend(fontsize=7, frameon=False, loc="upper left")

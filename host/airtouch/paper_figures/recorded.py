@@ -67,6 +67,5 @@ def said(job: Job, flights: int, edges: int) -> str:
     """How the recorded flights were split, for captions."""
     if job.quick:
         return (f"Recorded flights, {flights} of one fold ({edges} edges), by models of the other folds, briefly "
-                f"trained "
-                "(--quick).")
+                "trained (--quick).")
     return f"{flights} recorded flights of the paper's authors, {edges} edges, cross-validated by flight in five folds."

@@ -46,23 +46,19 @@ def resources(job: Job) -> Figure:
     verdicts = {
         "flops": words.judged(_near(dense_mac, said_flops) and _near(FLOPS_A_MAC * vision_mac, theirs_flops),
                               f"paper's network {dense_mac / 1e6:.2f} million multiply-accumulates without zeros (the "
-                              f"paper's "
-                              f"0.28 counts these), {mac / 1e6:.2f} as shipped; TEED at 320 x 320 "
+                              f"paper's 0.28 counts these), {mac / 1e6:.2f} as shipped; TEED at 320 x 320 "
                               f"{FLOPS_A_MAC * vision_mac / 1e6:,.0f} million FLOPs, {vision_mac / 1e6:,.0f} million "
-                              f"multiply-accumulates; 3900 million FLOPs are those of an image of "
-                              f"{np.sqrt(pixels):.0f} x "
-                              f"{np.sqrt(pixels):.0f}. 0.28 of 3900 is 0.007 %, as the text says, not the table's 0.07 "
-                              f"%"),
+                              "multiply-accumulates; 3900 million FLOPs are those of an image of "
+                              f"{np.sqrt(pixels):.0f} x {np.sqrt(pixels):.0f}. 0.28 of 3900 is 0.007 %, as the text "
+                              "says, not the table's 0.07 %"),
         "parameters": words.judged(parameter_bytes(ours.int8) <= SAID["parameters"].values[1]
                                    and _near(parameters, SAID["parameters"].values[0]),
                                    f"{parameter_bytes(ours.int8):,} bytes as shipped; TEED has {parameters:,} weights "
-                                   f"and "
-                                   f"biases: 58 kB at one byte each, {4 * parameters:,} bytes in float"),
+                                   f"and biases: 58 kB at one byte each, {4 * parameters:,} bytes in float"),
         "training": _training(job, rows, vision_seconds),
         "memory": words.judged(window_bits <= SAID["memory"].values[0] and frame_bits > 20 * window_bits,
-                               f"a window of features {window_bits:,} bits, {ring_bits:,} with the samples of its band "
-                               f"power; "
-                               f"a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 "
+                               f"a window of features {window_bits:,} bits, {ring_bits:,} with the samples of its "
+                               f"band power; a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 "
                                f"{8 * PAPER_CAMERA[0] * PAPER_CAMERA[1]:,}: less than a million, not millions")}
 
     def draw(canvas):
@@ -77,9 +73,8 @@ def resources(job: Job) -> Figure:
             axes.set_title(label)
 
     caption = ("Counted from the networks' shapes, not measured. The vision network is written anew with TEED's "
-               "structure; "
-               "three colours as published. Training is of one model, processor time here and the paper's own minutes "
-               "elsewhere: its machine is not named.")
+               "structure; three colours as published. Training is of one model, processor time here and the paper's "
+               "own minutes elsewhere: its machine is not named.")
     return Figure("Resources", rows, caption, verdicts, draw)
 
 
@@ -94,9 +89,8 @@ def _training(job: Job, rows: list[dict[str, Any]], vision_seconds: float) -> Ve
     rows[1]["training_s"] = seconds
     verdict = REPRODUCED if seconds < SAID["training"].values[1] else UNTESTABLE
     return Verdict(verdict, f"paper's network {seconds / 60:.1f} min a fold here (n = {len(folds)}, choice of "
-                            f"thresholds "
-                   f"included, {folds[0]['parameters'].get('epochs_run', '?')} epochs of one cycle in place of 200); "
-                   f"{text}")
+                            f"thresholds included, {folds[0]['parameters'].get('epochs_run', '?')} epochs of one "
+                            f"cycle in place of 200); {text}")
 
 
 def _dense_multiplications(model: Any) -> int:

@@ -16,6 +16,7 @@ from airtouch.simulation.effects.ground_effect import faded, thrust_ratio
 #: 100 Hz (0.5 to 0.7 %); a larger drone is taken to know its thrust as well
 NOISE = 0.006
 THRESHOLD = 0.01  #: share of the weight at which the small drone's range comes out as the paper's 12 cm or less
+IDEAL = 3.0 * NOISE / math.sqrt(100.0)  #: three sigma of the mean over one second, were the noise white
 GRAVITY = 9.81
 HEIGHTS_M = np.geomspace(0.02, 6.0, 400)  #: of the rotor discs over the ground
 SMALL = "crazyflie-34g"  #: preset of `ground_effect` fitted to neural-swarm's flights
@@ -66,31 +67,33 @@ def sensing_range(job: Job) -> Figure:
         for source, curve in curves(radius, arm).items():
             there = float(curve(np.array([claimed]))[0])
             rows.append({"what": name, "curve": source, "mass_kg": mass_kg, "rotor_radius_m": radius,
-                         "range_m": reach(curve), "range_at_noise_over_10_m": reach(curve, NOISE / 10),
+                         "range_m": reach(curve), "range_at_best_m": reach(curve, IDEAL),
                          "lift_at_3_m_share": there, "lift_at_3_m_n": there * mass_kg * GRAVITY,
                          "seconds_to_see_it": averaging_s(there)})
     rows.append({"what": "frame of 67 g", "curve": "measured", "mass_kg": 0.067, "rotor_radius_m": None,
                  "range_m": reach(lambda h: measured(h, "frame-67g"))})
     large = [r for r in rows if r["mass_kg"] == mass]
     tiny = [r for r in rows if r["mass_kg"] == small.mass_kg]
+    kept = reach(lambda h: measured(h, SMALL))
     verdicts = {
-        "range": words.judged(any(r["range_m"] >= claimed for r in large),
+        "range": words.judged(any(r["range_at_best_m"] >= claimed for r in large),
                               f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(large):.2f} to "
-                              f"{most(large):.2f} m; at 3 m {100 * max(r['lift_at_3_m_share'] for r in large):.4f} % "
-                              f"at "
-                              f"most, against a noise of {100 * NOISE:.1f} %; to tell it at 3 sigma takes "
-                              f"{min(r['seconds_to_see_it'] for r in large):.0f} s of hover or more (three curves, two "
-                              "readings of the propeller's size; nothing was flown)"),
-        "range-small": words.judged(most(tiny) <= 1.5 * SAID["range-small"].values[0],
-                                    f"lift of 1 % of the weight up to {least(tiny):.3f} to {most(tiny):.3f} m by three "
-                                    "curves; measured on 34 g (20 flights) it ends near 0.08 m of body height")}
+                              f"{most(large):.2f} m by three curves and two readings of the propeller's size; with "
+                              f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to "
+                              f"{max(r['range_at_best_m'] for r in large):.1f} m at most. At 3 m "
+                              f"{100 * min(r['lift_at_3_m_share'] for r in large):.1g} to "
+                              f"{100 * max(r['lift_at_3_m_share'] for r in large):.2f} % of the weight are left. "
+                              "Nothing was flown"),
+        "range-small": words.judged(kept <= SAID["range-small"].values[0],
+                                    f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at "
+                                    f"{kept:.3f} m of rotor height; published curves say {least(tiny):.3f} to "
+                                    f"{most(tiny):.3f} m")}
     caption = (f"Heights are of the rotor discs. The range is where the lift falls below {100 * THRESHOLD:.0f} % of "
-               f"the weight; "
-               f"the force that thrust does not explain has a noise of {100 * NOISE:.1f} % rms at 100 Hz. Mass does "
-               f"not enter the "
-               "curves: lift is a share of the weight, and the lengths are those of rotors and frame. The measured "
-               "curve is "
-               "scaled with the rotor, which nobody measured at 2.5 kg.")
+               f"the weight. The force that thrust does not explain has a noise of {100 * NOISE:.1f} % rms at 100 Hz; "
+               f"if it were white and nothing else, a mean over one second would show {100 * IDEAL:.2f} % at three "
+               "sigma. Mass does not enter the curves: lift is a share of the weight, and the lengths are those of "
+               "rotors and frame. The measured curve is scaled with the rotor, which nobody measured at 2.5 kg, and "
+               "the published ones are used far beyond the heights at which they were fitted.")
 
     def draw(canvas):
         axes = canvas.subplots()
@@ -101,7 +104,7 @@ def sensing_range(job: Job) -> Figure:
         axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.MUTED,
                     label="67 g frame, measured")
         axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
-        axes.text(0.021, 100 * NOISE, "noise of the force", fontsize=7, va="bottom")
+        axes.text(5.9, 100 * NOISE, "noise of the force", fontsize=7, va="bottom", ha="right")
         axes.axvline(claimed, color=pictures.PAPER, ls="--", lw=1)
         axes.text(claimed, 30, "paper: 3 m ", fontsize=7, ha="right")
         axes.set(xlabel="height of the rotors over the ground, m", ylabel="lift gained, % of the weight",

@@ -35,18 +35,15 @@ def sizes(job: Job) -> Figure:
     verdicts = {
         "size": words.judged(abs(FLOAT_BYTES * weights - before) < 0.1 * before and ours <= after,
                              f"{FLOAT_BYTES * weights:,} bytes in float ({weights:,} weights and biases), {ours:,} "
-                             f"bytes "
-                             f"shipped, {FLOAT_BYTES * weights / ours:.1f} times less"),
+                             f"bytes shipped, {FLOAT_BYTES * weights / ours:.1f} times less"),
         "speed": Verdict(UNTESTABLE, f"no GAP8 here; on this machine float {times['float']:.3f} ms and int8 "
                          f"{times['int8']:.3f} ms a window ({faster:.1f} times), plain C, one thread"),
         "accuracy": Verdict(NOT_REPRODUCED if lost else UNTESTABLE, accuracy)}
     if lost and lost[-1]["balanced_float"] - lost[-1]["balanced_int8"] > 0.05 and lost[-1]["balanced_float"] > 0.92:
         verdicts["accuracy"] = Verdict(REPRODUCED, accuracy)
     caption = ("Bytes are what the drone carries: weights, biases and scales; where zeros are left out, with their "
-               "places. "
-               "Accuracy is balanced over windows of recorded flights held out by flight; the paper's is of windows "
-               "drawn "
-               "at random, which share samples with those trained on.")
+               "places. Accuracy is balanced over windows of recorded flights held out by flight; the paper's is of "
+               "windows drawn at random, which share samples with those trained on.")
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)

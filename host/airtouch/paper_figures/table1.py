@@ -46,21 +46,19 @@ def estimated() -> Figure:
     parts = [found[n] for n in ("FC-FE", "CCS-FF", "filter", "network, paper on the GAP8")]
     low, high = sum(p.low_mw for p in parts), sum(p.high_mw for p in parts)
     verdicts = {"power": Verdict(UNTESTABLE, f"no meter here; the work itself is estimated at {low:.1f} to {high:.1f} "
-                                             f"mW "
-                                 "for the paper's stages (43 mW there), from counted instructions, without idle power, "
-                                 "clocks and regulators"),
+                                             "mW for the paper's stages (43 mW there), from counted instructions, "
+                                             "without idle power, clocks and regulators"),
                 "negligible": _negligible(high, "estimated, at most")}
-    return Figure("Power", rows, "An estimate, nothing was measured: instructions counted in the emulator times energy "
-                                 "an "
-                  "instruction, 100 steps a second (power.md). A log of an INA219 is read with --power-log.", verdicts,
+    return Figure("Power", rows, "An estimate, nothing was measured: instructions counted in the emulator times "
+                                 "energy an instruction, 100 steps a second (power.md). A log of an INA219 is read "
+                                 "with --power-log.", verdicts,
                   lambda canvas: _draw(canvas, rows))
 
 
 def _negligible(mw: float, how: str) -> Verdict:
     share = mw / SAID["negligible"].values[0]
     return words.judged(share < 0.05, f"{how} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the paper's "
-                                      f"own 43 "
-                        "mW are 1.4 %. The propellers' power was not measured here")
+                                      "own 43 mW are 1.4 %. The propellers' power was not measured here")
 
 
 def _draw(canvas, rows) -> None:

@@ -23,10 +23,8 @@ FELT = ("best", "paper")
 COLOURS = {"classical": "#8a6d00", "teed": "#7a3e9d", "half": "#a678c4", "quarter": "#c9aedb", "eighth": "#e0d3ea",
            "fusion": "#1a7f37"}
 LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate move the error of a line's place. It "
-          "cannot say how "
-          "a real platform looks: no gloss, no shadow of the drone (which at 4 cm hides most of the light), no lens "
-          "errors, "
-          "no rim of its own colour, and the network was trained on the same renderer.")
+          "cannot say how a real platform looks: no gloss, no shadow of the drone (which at 4 cm hides most of the "
+          "light), no lens errors, no rim of its own colour, and the network was trained on the same renderer.")
 
 
 def light(job: Job) -> Figure:
@@ -78,8 +76,7 @@ def light(job: Job) -> Figure:
         left.legend(fontsize=6.5, frameon=False)
 
     caption = (f"Simulated: {len(films)} flights, 4 cm over the platform, camera and AirTouch on the same flights; "
-               f"frames of "
-               f"324 x 244 rendered at 6 a second. {LIMITS}")
+               f"frames of 324 x 244 rendered at 6 a second. {LIMITS}")
     return Figure("Errors against light", table, caption, verdicts, draw)
 
 
@@ -116,8 +113,7 @@ def network_size(job: Job) -> Figure:
         left.legend(fontsize=6.5, frameon=False)
 
     caption = (f"Simulated: the {len(films)} flights of fig11b at 100 lux. Widths are divided by 2, 4 and 8; each "
-               f"network has the "
-               f"same training. Dashed: the paper's 53 KB. {LIMITS}")
+               f"network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
     return Figure("Errors against the size of the network", table, caption, verdicts, draw)
 
 
@@ -137,10 +133,9 @@ def fusion(job: Job) -> Figure:
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in _lux(job))
     verdict = words.judged(all(low <= 0.0 for _, low, _ in worst),
-                           f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; both are below the better one "
-                           f"by "
-                           f"{max(v for v, _, _ in worst):.3f} at most, and nowhere beyond the 95 % interval of the "
-                           f"difference"
+                           f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; both are below the better "
+                           f"one by {max(v for v, _, _ in worst):.3f} at most, and nowhere beyond the 95 % interval "
+                           "of the difference"
                            if all(low <= 0.0 for _, low, _ in worst) else
                            f"timed F1: {text}; both are below the better one beyond the interval at "
                            + ", ".join(f"{v:g} lux" for _, low, v in worst if low > 0.0))
@@ -154,9 +149,8 @@ def fusion(job: Job) -> Figure:
         axes.legend(fontsize=7, frameon=False)
 
     caption = (f"Simulated: {len(films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 s are "
-               f"one edge, at "
-               "a weighted time; weight, and whether edges of one sense alone count, are chosen at each light on "
-               f"{_count(job)[0]} other flights. Timed F1 counts a match 1 - |error| / 1.5 s. {LIMITS}")
+               "one edge, at a weighted time; weight, and whether edges of one sense alone count, are chosen at each "
+               f"light on {_count(job)[0]} other flights. Timed F1 counts a match 1 - |error| / 1.5 s. {LIMITS}")
     return Figure("Camera and AirTouch together", table, caption, {"backup": verdict}, draw)
 
 

@@ -14,8 +14,7 @@ from airtouch.vision import scene as scenes
 from airtouch.vision.camera import Camera, expose, exposure_s
 from airtouch.vision.lines import Line
 
-MARGIN_S = 1.0  #: filmed before the first edge and after the last
-SUBPOSES = 7  #: of an exposure, evenly spaced
+MARGIN_S = 0.8  #: filmed before the first edge and after the last
 GROUP_S = 0.6  #: frames further apart than this are of different edges
 SAMPLE_S = 0.01
 
@@ -63,8 +62,9 @@ def frames(camera: Camera, shot: Film, lux: float, seed: int) -> Iterator[tuple[
     rng = np.random.default_rng([seed, shot.log.meta["flight"], int(1000 * lux)])
     albedo = 0.5 * float(shot.scene.floor.mean() + shot.scene.top.mean())
     seconds = exposure_s(camera, lux, albedo)
+    shares = scenes.subposes(camera, shot.speed_mps, seconds, shot.clearance_m)
     for time_s in np.arange(shot.first_s + rng.uniform(0.0, 1.0 / camera.frame_hz), shot.last_s, 1.0 / camera.frame_hz):
-        inside = [pose(shot.log, time_s + share * seconds) for share in np.linspace(-0.5, 0.5, SUBPOSES)]
+        inside = [pose(shot.log, time_s + share * seconds) for share in shares]
         yield float(time_s), expose(camera, scenes.blurred(camera, inside, shot.scene), lux, seconds, rng)
 
 

@@ -6,13 +6,15 @@ own shadow, gloss and the lens's distortion are left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
 
-from airtouch.vision.camera import Camera
+from airtouch.vision.camera import Camera, blur_px
 
 TILE_PX = 512
+BLUR_STEP_PX = 5.0
 FLOOR_M_PER_PX, TOP_M_PER_PX = 2.0e-3, 2.5e-4  #: of the textures, finer than a pixel sees
 
 
@@ -45,13 +47,19 @@ def texture(rng: np.random.Generator, albedo: float, contrast: float, slope: flo
 
 
 def ground_points(camera: Camera, pose: Pose, height_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """x and y (rows, columns), m, at which the pixels' rays meet the plane z = height_m; NaN for rays that never do."""
-    u, v = np.meshgrid(np.arange(camera.width) - camera.centre[0], np.arange(camera.height) - camera.centre[1])
-    rays = np.stack([u, -v, np.full(u.shape, -camera.focal_px)], axis=-1) @ pose.attitude.T  # body x forward, y left
-    with np.errstate(divide="ignore", invalid="ignore"):
-        along = (height_m - pose.place_m[2]) / rays[..., 2]
-    along = np.where((rays[..., 2] < 0.0) & (along > 0.0), along, np.nan)
+    """x and y (rows, columns), float32, m, at which the pixels' rays meet the plane z = height_m, or NaN."""
+    rays = _rays(camera) @ pose.attitude.T.astype(np.float32)  # (rows, columns, 3)
+    down = rays[..., 2]
+    along = np.full(down.shape, np.nan, np.float32)
+    np.divide(height_m - pose.place_m[2], down, out=along, where=down * (height_m - pose.place_m[2]) > 0.0)
     return pose.place_m[0] + along * rays[..., 0], pose.place_m[1] + along * rays[..., 1]
+
+
+@cache
+def _rays(camera: Camera) -> np.ndarray:
+    """(rows, columns, 3) float32: the pixels' directions in the body, x forward, y left, z up; z is -focal_px."""
+    u, v = np.meshgrid(np.arange(camera.width) - camera.centre[0], np.arange(camera.height) - camera.centre[1])
+    return np.stack([u, -v, np.full(u.shape, -camera.focal_px)], axis=-1).astype(np.float32)
 
 
 def project(camera: Camera, pose: Pose, points_m: np.ndarray) -> np.ndarray:
@@ -81,6 +89,12 @@ def over(scene: Scene, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return inside
 
 
+def subposes(camera: Camera, speed_mps: float, seconds: float, distance_m: float) -> np.ndarray:
+    """Shares of an exposure, -0.5 to 0.5, at which to render: 3 to 13, in steps of BLUR_STEP_PX."""
+    count = int(np.ceil(blur_px(camera, speed_mps, seconds, distance_m) / BLUR_STEP_PX)) + 1
+    return np.linspace(-0.5, 0.5, int(np.clip(count, 3, 13)))
+
+
 def blurred(camera: Camera, poses: Sequence[Pose], scene: Scene) -> np.ndarray:
     """The mean of the views of several poses within an exposure."""
     return np.mean([view(camera, pose, scene) for pose in poses], axis=0)
@@ -97,7 +111,6 @@ def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> 
 
 def _sampled(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
     """The texture at places, bilinear, repeated; the mean where a ray meets nothing."""
-    mean = float(tile.mean())
-    u, v = (np.mod(np.nan_to_num(a / m_per_px), TILE_PX).astype(np.float32) for a in (x, y))
-    found = cv2.remap(tile, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-    return np.where(np.isfinite(x), found, np.float32(mean))
+    u, v = (np.mod(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px), np.float32(TILE_PX)) for a in (x, y))
+    found = cv2.remap(tile, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return found if np.isfinite(x).all() else np.where(np.isfinite(x), found, tile.mean())

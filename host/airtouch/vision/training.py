@@ -15,7 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.vision import scene as scenes
 from airtouch.vision import teed
 from airtouch.vision.camera import Camera, expose, exposure_s
-from airtouch.vision.crossings import SUBPOSES, draw_texture
+from airtouch.vision.crossings import draw_texture
 from airtouch.vision.lines import binned
 from airtouch.vision.weights import SIZES
 
@@ -42,10 +42,11 @@ def examples(count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
         albedo = 0.5 * float(scene.floor.mean() + scene.top.mean())
         seconds = exposure_s(camera, lux, albedo)
         level = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
-        places = [np.array([x + speed * s * seconds, 0.0, 0.76 + high]) for s in np.linspace(-0.5, 0.5, SUBPOSES)]
+        shares = scenes.subposes(camera, abs(speed), seconds, high)
+        places = [np.array([x + speed * s * seconds, 0.0, 0.76 + high]) for s in shares]
         shown = scenes.blurred(camera, [scenes.Pose(p, level) for p in places], scene)
         images[i] = binned(expose(camera, shown, lux, seconds, rng))
-        truth[i] = binned(scenes.outline(camera, scenes.Pose(places[SUBPOSES // 2], level), scene, 2.0)) > 0.4
+        truth[i] = binned(scenes.outline(camera, scenes.Pose(np.array([x, 0.0, 0.76 + high]), level), scene, 2.0)) > 0.4
     return images, truth
 
 
