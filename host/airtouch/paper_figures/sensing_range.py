@@ -81,8 +81,8 @@ def sensing_range(job: Job) -> Figure:
                               f"{most(large):.2f} m by three curves and two readings of the propeller's size; with "
                               f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to "
                               f"{max(r['range_at_best_m'] for r in large):.1f} m at most. At 3 m "
-                              f"{100 * max(r['lift_at_3_m_share'] for r in large):.2f} % of the weight is left at most. "
-                              "Nothing was flown"),
+                              f"{100 * max(r['lift_at_3_m_share'] for r in large):.2f} % of the weight is left at "
+                              "most. Nothing was flown"),
         "range-small": words.judged(kept <= SAID["range-small"].values[0],
                                     f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at "
                                     f"{kept:.3f} m of rotor height; published curves say {least(tiny):.3f} to "
