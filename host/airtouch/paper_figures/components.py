@@ -17,7 +17,7 @@ from airtouch.paper_figures.figure import Figure, Job
 from airtouch.paper_figures.overall import errors_m
 
 FEW = 10  #: training flights where the paper says that its loss helps most
-EPOCHS, QUICK_EPOCHS = 6, 2
+EPOCHS, QUICK_EPOCHS = 6, 1
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The sizes of the network, and its weights, which `python -m airtouch.vision.training` made."""
 
+import hashlib
 from importlib import resources
 
 import numpy as np
@@ -21,3 +22,12 @@ def load(name: str) -> tuple[teed.Weights, float]:
             return {key: file[key].astype(np.float32) for key in file.files if key != "seconds"}, float(file["seconds"])
     except (OSError, ValueError, KeyError) as error:
         raise AirTouchError(f"{path}: {error}; make it with python -m airtouch.vision.training") from None
+
+
+def digest(settings: str) -> str:
+    """Twelve hexadecimal digits that change with any of the weights and with the settings."""
+    total = hashlib.sha256(settings.encode())
+    for name in SIZES:
+        for key, values in sorted(load(name)[0].items()):
+            total.update(key.encode() + values.tobytes())
+    return total.hexdigest()[:12]
