@@ -1,0 +1,204 @@
+"""Verdicts on scores whose answer is known: reproduced where they are the paper's, not where they are not."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure as Canvas
+
+from airtouch.detector.dataset import Condition
+from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.paper_figures import (
+    components,
+    conditions,
+    materials,
+    overall,
+    recorded,
+    resources,
+    simulated,
+    sizes,
+    vision_figures,
+)
+from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, UNTESTABLE, of
+from airtouch.paper_figures.figure import Job, table_csv
+
+
+def flights(error_m, missed=0.0, count=20, seed=0, balanced=0.9, **condition):
+    """Scores of flights with two edges each: errors around +-error_m, a share of the edges missed."""
+    rng = np.random.default_rng(seed)
+    speed = condition.setdefault("speed_mps", 0.3)
+    found = []
+    for number in range(count):
+        edges = []
+        for kind in ("entry", "exit"):
+            error = error_m * rng.choice([-1, 1]) * rng.uniform(0.9, 1.1)
+            edges.append(EdgeScore(kind, 100) if rng.uniform() < missed else
+                         EdgeScore(kind, 100, 110, kind, error / speed, error))
+        right = round(1000 * balanced)
+        found.append(FlightScore(f"f{number}", Condition(**condition), tuple(edges), (), 2, 30.0,
+                                 (right, 1000, right, 1000)))
+    return found
+
+
+@pytest.fixture
+def job(tmp_path):
+    return Job(tmp_path, tmp_path / "work")
+
+
+def verdict(figure, claim):
+    """The verdict, after the picture was drawn and the table written."""
+    canvas = Canvas()
+    figure.draw(canvas)
+    assert canvas.axes and table_csv(figure.rows).count(b"\n") == len(figure.rows) + 1 and figure.caption
+    return figure.verdicts[claim].verdict
+
+
+def folds(**parameters):
+    return [{"fold": 0, "seconds": 60.0, "parameters": {"converged_after_epochs": 3, "parameter_bytes": 11088,
+                                                        "epochs_run": 9, **parameters}}]
+
+
+@pytest.mark.parametrize(("paper_m", "missed", "answer"), [(0.028, 0.0, REPRODUCED), (0.028, 0.5, NOT_REPRODUCED),
+                                                           (0.06, 0.0, NOT_REPRODUCED)])
+def test_overall_errors(job, monkeypatch, paper_m, missed, answer):
+    scores = {"best": flights(0.018), "paper": flights(paper_m, missed), "baseline": flights(0.364)}
+    monkeypatch.setattr(recorded, "scores", lambda _, name: (scores[name], folds()))
+    assert verdict(overall.heights(job), "height-error") == answer
+    gains = verdict(overall.against_baseline(job), "baseline")
+    assert gains == (REPRODUCED if missed == 0.0 and paper_m < 0.051 else NOT_REPRODUCED)
+
+
+def test_errors_by_height(job, monkeypatch):
+    near, far = flights(0.03), flights(0.03, missed=0.9)
+    monkeypatch.setattr(simulated, "flown", lambda scene, count: scene)
+    monkeypatch.setattr(simulated, "scores", lambda scene, name: near if scene == "paper-4cm" else far)
+    monkeypatch.setattr(recorded, "scores", lambda _, name: (flights(0.02, height="low"), folds()))
+    figure = conditions.by_height(job)
+    assert verdict(figure, "height-4cm") == verdict(figure, "height-9cm") == REPRODUCED
+    monkeypatch.setattr(simulated, "scores", lambda scene, name: far)  # all alike: 9 cm is no worse than 4
+    figure = conditions.by_height(job)
+    assert verdict(figure, "height-4cm") == verdict(figure, "height-9cm") == NOT_REPRODUCED
+
+
+@pytest.mark.parametrize(("at_20", "left", "trend", "sides"), [(0.08, 0.08, REPRODUCED, REPRODUCED),
+                                                               (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
+                                                               (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
+def test_errors_by_angle(job, monkeypatch, at_20, left, trend, sides):
+    some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, left))
+            for s in flights(error, height="low", angle_deg=angle)]
+    monkeypatch.setattr(recorded, "scores", lambda _, name: (some, folds()))
+    figure = conditions.by_angle(job)
+    assert (verdict(figure, "angle"), verdict(figure, "angle-sides")) == (trend, sides)
+
+
+@pytest.mark.parametrize(("calm", "windy", "answer"), [((0.03, 0.0), (0.03, 0.0), REPRODUCED),
+                                                       ((0.03, 0.0), (0.09, 0.0), NOT_REPRODUCED),
+                                                       ((0.03, 0.0), (0.03, 0.5), NOT_REPRODUCED)])
+def test_wind(job, monkeypatch, calm, windy, answer):
+    monkeypatch.setattr(simulated, "flown", lambda scene, count, blown=(): ["windy" if blown else "calm"] * count)
+    monkeypatch.setattr(simulated, "scores", lambda some, name: flights(*(windy if some[0] == "windy" else calm)))
+    assert verdict(conditions.wind(job), "wind") == answer
+
+
+def test_materials_are_shown_and_never_judged(job, monkeypatch):
+    found = {(name, scene): flights(0.05) for name in materials.DETECTORS for scene in materials.PAIRS}
+    monkeypatch.setattr(materials, "pair_scores", lambda _: found)
+    assert verdict(materials.overall(job), "material-error") == UNTESTABLE
+    figure = materials.by_pair(job)
+    assert {verdict(figure, claim) for claim in of("fig8f")} == {UNTESTABLE}
+    assert figure.rows[0]["median_error_m"] == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.parametrize(("without", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
+                                                                  (0.10, 3, NOT_REPRODUCED, NOT_REPRODUCED)])
+def test_the_loss(job, monkeypatch, without, epochs, loss, sooner):
+    def varied(_, name, *__):
+        bare = "no-df" in name
+        return flights(without if bare else 0.10), folds(converged_after_epochs=epochs if bare else 3)
+
+    monkeypatch.setattr(recorded, "files", lambda _: [])
+    monkeypatch.setattr(recorded, "varied", varied)
+    figure = components.df_loss(job)
+    assert (verdict(figure, "df-loss"), verdict(figure, "df-epochs")) == (loss, sooner)
+
+
+@pytest.mark.parametrize(("shortest", "resolution"),
+                         [(0.05, REPRODUCED), (0.10, NOT_REPRODUCED), (0.2, NOT_REPRODUCED)])
+def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
+    monkeypatch.setattr(recorded, "files", lambda _: [])
+    monkeypatch.setattr(recorded, "varied", lambda _, name, *__: (
+        flights(shortest if name == "stft-50" else 0.10, missed=0.5 if name in ("input-50", "input-250") else 0.2),
+                                                                  folds()))
+    assert verdict(components.time_resolution(job), "resolution") == resolution
+    assert verdict(components.input_size(job), "input-size") == REPRODUCED
+
+
+@pytest.mark.parametrize(("exact", "int8", "answer"), [(0.97, 0.86, REPRODUCED), (0.71, 0.70, NOT_REPRODUCED)])
+def test_sizes(job, monkeypatch, exact, int8, answer):
+    monkeypatch.setattr(recorded, "varied", lambda *_: (flights(0.05, balanced=int8), folds()))
+    monkeypatch.setattr(recorded, "in_float", lambda *_: flights(0.05, balanced=exact))
+    figure = sizes.sizes(job)
+    assert verdict(figure, "accuracy") == answer and verdict(figure, "speed") == UNTESTABLE
+    assert figure.rows[0]["bytes"] == 4 * (36944 + 66)  # weights and biases of the paper's network
+
+
+def test_resources(job, monkeypatch):
+    monkeypatch.setattr(recorded, "scores", lambda _, name: (flights(0.05), folds()))
+    figure = resources.resources(job)
+    assert verdict(figure, "flops") == NOT_REPRODUCED and verdict(figure, "parameters") == REPRODUCED
+    by_hand = 98 * 3 * 16 * 3 + 47 * 3 * 32 * 48 + 2208 * 16 + 16 * 2
+    assert figure.rows[1]["mac"] == by_hand
+    assert verdict(figure, "memory") == REPRODUCED and verdict(figure, "training") == REPRODUCED
+
+
+def seen(monkeypatch, camera_m, felt_m):
+    """The camera and AirTouch with errors of 0.01 s a 3 mm, at every light, instead of what is rendered."""
+    rng = np.random.default_rng(3)
+    edges = (SimpleNamespace(sample=300, kind="entry"), SimpleNamespace(sample=600, kind="exit"))
+    log = SimpleNamespace(source="f", __len__=None)
+    films = [SimpleNamespace(edges=edges, speed_mps=0.3, log=log) for _ in range(16)]
+
+    def crossed(error_m):
+        from airtouch.detector.trace import Detection
+
+        return [[Detection(e.sample + round(rng.choice([-1, 1]) * error_m / 0.003), "edge") for e in edges]
+                for _ in films]
+
+    ways = ("classical", "fusion", *vision_figures.weights.SIZES)
+    there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in vision_figures.LUX}
+    monkeypatch.setattr(vision_figures, "_everything",
+                        lambda _: (films, there, {n: crossed(felt_m) for n in ("best", "paper")}))
+    monkeypatch.setattr(vision_figures, "_scores", lambda films, found: [
+        FlightScore("f", Condition(speed_mps=0.3), tuple(EdgeScore(
+            e.kind, e.sample, d.sample, "edge", (e.sample - d.sample) * 0.01, (e.sample - d.sample) * 0.003)
+            for e, d in zip(film.edges, some, strict=True)), (), 2, 10.0) for film,
+                                                                         some in zip(films, found, strict=True)])
+
+
+def test_light_as_in_the_paper(job, monkeypatch):
+    seen(monkeypatch, lambda way, lux: 0.012 if lux >= 100 else 0.06, 0.033)
+    figure = vision_figures.light(job)
+    assert {verdict(figure, claim) for claim in of("fig11b")} == {REPRODUCED}
+    assert "cross between 100 and 50 lux" in figure.verdicts["light-dark"].found
+
+
+def test_light_where_the_camera_is_better_throughout(job, monkeypatch):
+    seen(monkeypatch, lambda way, lux: 0.009, 0.06)
+    figure = vision_figures.light(job)
+    assert verdict(figure, "light-dark") == verdict(figure, "light-airtouch") == NOT_REPRODUCED
+    assert "the camera is the better one throughout" in figure.verdicts["light-dark"].found
+
+
+@pytest.mark.parametrize(("small_m", "answer"), [(0.06, REPRODUCED), (0.012, NOT_REPRODUCED)])
+def test_size_of_the_networks(job, monkeypatch, small_m, answer):
+    seen(monkeypatch, lambda way, lux: small_m if way == "eighth" else 0.012, 0.033)
+    monkeypatch.setattr(recorded, "varied", lambda _, name, __, options: (
+        flights(0.02), folds(parameter_bytes=round(13000 * (1 - options["sparsity"])))))
+    figure = vision_figures.network_size(job)
+    assert verdict(figure, "network-vision") == answer and verdict(figure, "network-airtouch") == REPRODUCED
+
+
+@pytest.mark.parametrize(("joined_m", "answer"), [(0.012, REPRODUCED), (0.2, NOT_REPRODUCED)])
+def test_both_together(job, monkeypatch, joined_m, answer):
+    seen(monkeypatch, lambda way, lux: joined_m if way == "fusion" else 0.015, 0.033)
+    assert verdict(vision_figures.fusion(job), "backup") == answer
