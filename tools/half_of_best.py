@@ -1,7 +1,7 @@
 """How much `best` hangs on which half of the samples it computes at: `python tools/half_of_best.py [FOLDER]`.
 
 `best` computes at every second sample. A log that begins one sample later makes it compute at the others, which
-parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2 of the manifest's clean flights.
+parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2, clean flights.
 """
 
 import csv

@@ -18,12 +18,22 @@
  * 4 X_w[k] = 2 X[k] - X[k-1] - X[k+1].
  *
  * No heap, no global, no division or trigonometry in a step.
+ *
+ * Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
+ *   desktop's bits.
+ * Threads: no globals: different objects may be used at once; one object by one thread at a time.
+ * Memory: BAND_POWER_FLOATS floats of the caller's, 10.9 kB for 9 channels at 2 s of 100 Hz.
+ * Cost: 3,130 instructions of a Cortex-M4 a step for 9 channels (`python -m tools.emulator.count`).
  */
 #pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /** Floats of storage for a bank; @p bins counts one neighbour on each side of the band. */
 #define BAND_POWER_FLOATS(window, channels, bins) \
@@ -91,3 +101,7 @@ void bandPowerReset(bandPower_t *self);
  * Costs about 48 instructions a bin and channel of a Cortex-M4; never fails.
  */
 bool bandPowerStep(bandPower_t *self, const float *sample, float *power);
+
+#ifdef __cplusplus
+}
+#endif

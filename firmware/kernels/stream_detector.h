@@ -2,6 +2,12 @@
  * @file stream_detector.h
  * The streaming detector in one struct: motion channels, int8 network, decoder.
  * One step a sample at 100 Hz; the network runs on every stride-th one.
+ *
+ * Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
+ *   desktop's bits.
+ * Threads: no globals: different objects may be used at once; one object by one thread at a time.
+ * Memory: streamDetector_t and the arena, 4.3 kB for the shipped network; 280 bytes of stack.
+ * Cost: 33,060 instructions of a Cortex-M4 on every stride-th sample, else 1,000.
  */
 #pragma once
 
@@ -11,6 +17,10 @@
 #include "kernel_types.h"
 #include "motion_channels.h"
 #include "stream_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /** The detector. The network and the arena belong to the caller and must outlive it. */
 typedef struct {
@@ -42,3 +52,7 @@ bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const fl
 
 /** Quantise channels as the network takes them. */
 void streamQuantise(const streamQuantisation_t *quantisation, const float *channels, int32_t count, int8_t *q);
+
+#ifdef __cplusplus
+}
+#endif

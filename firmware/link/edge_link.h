@@ -9,11 +9,20 @@
  *
  * The two ends are link_sender.h and link_receiver.h; host/docs/link.md says how they talk.
  * No OS, no heap, no global.
+ *
+ * Target: C11, any processor of either byte order; no floating point.
+ * Threads: pure functions without state: any number at once.
+ * Memory: edgeLinkPacket_t, about 100 bytes, and as many of the caller's for its bytes.
+ * Cost: two steps a byte for the checksum, by a table of 16 values.
  */
 #pragma once
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 #define EDGE_LINK_VERSION 0xA1
 #define EDGE_LINK_MAX_BYTES 98   ///< of a packet
@@ -120,3 +129,7 @@ void edgeLinkDigest(const char *sha256, uint8_t digest[EDGE_LINK_DIGEST_BYTES]);
 
 /** a - b of sequence numbers, which wrap. */
 static inline int32_t edgeLinkAfter(uint32_t a, uint32_t b) { return (int32_t)(a - b); }
+
+#ifdef __cplusplus
+}
+#endif

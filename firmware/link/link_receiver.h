@@ -4,10 +4,19 @@
  * late ones are dropped, missing ones asked for again. Where samples are gone for good the network
  * is reset, and gives no answer before it has seen a whole window of the new stream; so each
  * answer is what the network would have given without any fault.
+ *
+ * Target: C11, any processor; no floating point.
+ * Threads: no globals: different objects may be used at once; one object by one thread at a time.
+ * Memory: linkReceiver_t, about 120 bytes; the networks are the caller's.
+ * Cost: a packet: its parsing, and the network at most EDGE_LINK_SAMPLES times.
  */
 #pragma once
 
 #include "edge_link.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 #define LINK_BEATS 20  ///< heartbeats after the last packet: ten seconds of them
 
@@ -66,3 +75,7 @@ uint16_t linkReceiverTake(linkReceiver_t *receiver, const uint8_t *bytes, uint16
  * stays off the wire, where a damaged byte costs the flight (host/docs/flash.md).
  */
 uint16_t linkReceiverHeartbeat(linkReceiver_t *receiver, uint32_t uptimeMs, uint8_t *bytes);
+
+#ifdef __cplusplus
+}
+#endif

@@ -7,10 +7,19 @@
  *
  * One step of 10 ms: linkSenderPush() once, linkSenderPoll() once or twice, and linkSenderTake()
  * for each packet that came. Never waits, never fails.
+ *
+ * Target: C11, any processor; no floating point.
+ * Threads: no globals: different objects may be used at once; one object by one thread at a time.
+ * Memory: linkSender_t alone, 3.6 kB, most of it the samples that may be sent again.
+ * Cost: a packet: its packing or parsing. No loop over the history.
  */
 #pragma once
 
 #include "edge_link.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 #define LINK_HISTORY 288      ///< samples kept: the longest fault that leaves no gap, in steps
 #define LINK_WINDOW 8         ///< packets on their way, at most
@@ -109,3 +118,7 @@ bool linkSenderAccept(linkSender_t *sender, uint32_t sequence);
 
 /** Samples that wait for confirmation. */
 uint32_t linkSenderBacklog(const linkSender_t *sender);
+
+#ifdef __cplusplus
+}
+#endif

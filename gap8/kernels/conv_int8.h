@@ -1,6 +1,15 @@
+// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+//   (extensions.h), same bits.
+// Threads: each core of a team writes its own outputs and nothing else.
+// Memory: 256 bytes of stack.
+// Cost: kernelRows * kernelColumns * inChannels multiplications an output, or those of the kept blocks.
 #pragma once
 
 #include "job_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 enum { CONV_MAX_FILTER = 64 };  // kernelRows * kernelColumns * inChannels at most, a multiple of four
 
@@ -26,3 +35,7 @@ void convInt8(const jobInt8_t *job);
  * @brief Whether convInt8 can do a pool on the way: two positions to one.
  */
 int32_t convCanPool(const layerInt8_t *pool);
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,9 +1,19 @@
 // What one core is asked to do of a layer, and how a layer is shared among cores.
+//
+// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+//   (extensions.h), same bits.
+// Threads: a job belongs to one core.
+// Memory: plain values; the arrays are the caller's.
+// Cost: none.
 #pragma once
 
 #include <stdint.h>
 
 #include "layer_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 // Every core of a team calls a kernel with the same layer, input and output and its own
 // `core`. It writes its own outputs and no other byte; which those are follows from core
@@ -30,3 +40,7 @@ typedef struct {
 static inline int32_t shareBegin(int32_t items, int32_t core, int32_t cores) {
   return items * core / cores;
 }
+
+#ifdef __cplusplus
+}
+#endif

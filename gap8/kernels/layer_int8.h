@@ -12,9 +12,18 @@
 // each block, blockSkips says how many blocks of four inputs to pass over before it (a gap
 // of more than 255 is bridged by blocks of zero weights), and weights holds its four
 // values. Five bytes a block, nothing to unpack.
+//
+// Target: C11, any processor.
+// Threads: constants: any number of readers.
+// Memory: the arrays are the caller's, usually in flash.
+// Cost: none.
 #pragma once
 
 #include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef enum {
   LAYER_CONV = 0,          // convInt8: stride 1, no padding
@@ -62,3 +71,7 @@ static inline int32_t shapeFits(int32_t rows, int32_t columns, int32_t channels)
   return rows >= 1 && columns >= 1 && channels >= 1 && rows <= LAYER_MAX_VALUES && columns <= LAYER_MAX_VALUES / rows &&
          channels <= LAYER_MAX_VALUES / (rows * columns);
 }
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,7 +1,17 @@
 // The same network in float: what the int8 one is checked against. Not for the drone.
+//
+// Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
+//   desktop's bits.
+// Threads: pure functions without state: any number at once.
+// Memory: networkFloatArenaSize floats of the caller's.
+// Cost: one multiplication a weight and position, in float: for tests, not for the drone.
 #pragma once
 
 #include "layer_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef struct {
   int32_t kind;  // LAYER_CONV, LAYER_MAX_POOL or LAYER_DENSE; shapes as in layerInt8_t
@@ -38,3 +48,7 @@ int32_t networkFloatArenaSize(const networkFloat_t *network);
  * @return the last layer's output, inside the arena.
  */
 const float *networkFloatRun(const networkFloat_t *network, const float *input, float *arena);
+
+#ifdef __cplusplus
+}
+#endif

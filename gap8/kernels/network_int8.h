@@ -1,6 +1,15 @@
+// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+//   (extensions.h), same bits.
+// Threads: the arena is one caller's, or one team's of cores; networks are constants.
+// Memory: networkInt8ArenaBytes of the caller's, 4,560 for the paper's network.
+// Cost: 262 k multiplications for the paper's network, 233 k pruned.
 #pragma once
 
 #include "job_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 // A network: layers in order, each reading what the one before wrote.
 typedef struct {
@@ -62,3 +71,7 @@ const int8_t *networkInt8RunTeam(const networkInt8_t *network, const int8_t *inp
  * @brief What one core does of one layer, by the layer's kind. No barrier.
  */
 void layerInt8Run(const jobInt8_t *job);
+
+#ifdef __cplusplus
+}
+#endif

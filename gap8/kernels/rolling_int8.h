@@ -1,6 +1,15 @@
+// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+//   (extensions.h), same bits.
+// Threads: no globals: different objects may be used at once; one object by one thread at a time.
+// Memory: rollingInt8_t, 1.5 kB, and rollingInt8ArenaBytes of the caller's.
+// Cost: 40 k multiplications a sample for the paper's network at stride 1, 11 k at stride 4.
 #pragma once
 
 #include "network_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 enum { ROLLING_MAX_STEPS = 8, ROLLING_MAX_STRIDE = 16 };
 
@@ -81,3 +90,7 @@ void rollingInt8Reset(rollingInt8_t *self);
  * @return the last layer's output, valid until the next call, or NULL where there is none.
  */
 const int8_t *rollingInt8Step(rollingInt8_t *self, const int8_t *sample);
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,6 +1,15 @@
+// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+//   (extensions.h), same bits.
+// Threads: each core of a team writes its own outputs and nothing else.
+// Memory: none.
+// Cost: 4 multiplications a block.
 #pragma once
 
 #include "job_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /**
  * @brief Fully connected layer whose weights are blocks of four, used where they lie.
@@ -11,3 +20,7 @@
  * fails; reads no input outside the blocks that it is given.
  */
 void sparseDenseInt8(const jobInt8_t *job);
+
+#ifdef __cplusplus
+}
+#endif

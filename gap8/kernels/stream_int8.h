@@ -1,6 +1,15 @@
+// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+//   (extensions.h), same bits.
+// Threads: no globals: different objects may be used at once; one object by one thread at a time.
+// Memory: streamState_t, 0.1 kB, and streamInt8ArenaBytes of the caller's, 3.4 kB for the shipped network.
+// Cost: the kept weights once on every stride-th sample, 32,145 instructions of a Cortex-M4; else a copy.
 #pragma once
 
 #include "layer_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 enum { STREAM_MAX_CONVS = 10 };
 
@@ -66,3 +75,7 @@ void streamInt8Reset(const streamInt8_t *network, streamState_t *state, int8_t *
  * this sample.
  */
 const int8_t *streamInt8Step(const streamInt8_t *network, streamState_t *state, const int8_t *sample);
+
+#ifdef __cplusplus
+}
+#endif

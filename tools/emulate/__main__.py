@@ -21,7 +21,7 @@ from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
 from tools.emulate import build, gap8, height
 from tools.emulate.compare import report
-from tools.emulate.replay import Replay, replay
+from tools.emulate.replay import VEHICLES, Replay, replay
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
 CLONE = "git clone --recursive --branch 2026.08 https://github.com/bitcraze/crazyflie-firmware ~/crazyflie-firmware"
@@ -70,11 +70,13 @@ def main(arguments: list[str]) -> int:
                         help="closed loop over edges of every kind: the height kept or not")
     parser.add_argument("--gap8", action="store_true",
                         help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
+    parser.add_argument("--config", help="of firmware/app: app-config-tap and the like")
+    parser.add_argument("--platform", default="cf2", choices=VEHICLES, help="of the firmware (cf2)")
     given = parser.parse_args(arguments)
     build.tools()
     if not given.built:
-        build.compile_firmware(given.base.expanduser().resolve(), given.height and "app-config-height" or
-                               given.gap8 and "app-config-gap8" or "app-config")
+        config = "app-config-height" if given.height else "app-config-gap8" if given.gap8 else "app-config"
+        build.compile_firmware(given.base.expanduser().resolve(), given.config or config, given.platform)
     elf = build.link()
     if given.fly:
         return 0 if report(elf) else 1
@@ -88,7 +90,7 @@ def main(arguments: list[str]) -> int:
     for i, log in enumerate(logs):
         changes = CHANGES if i == len(logs) - 1 else {}
         begun = time.monotonic()
-        found = replay(elf, later(log, given.begin), given.steps, changes)
+        found = replay(elf, later(log, given.begin), given.steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
         show(name, time.monotonic() - begun, found)

@@ -369,7 +369,7 @@ extern uint32_t g_pfnVectors;
 void Reset_Handler(void);
 // board.ld and build.py put these where the bootloader is, and where the firmware looks for its own of them.
 __attribute__((section(".boot"), used)) static const void *const boot[2] = {&_estack, (const void *)Reset_Handler};
-__attribute__((section(".device"), used)) static const char device[32] = "0;CF21";
+__attribute__((section(".device"), used)) static const char device[32] = DEVICE;  // build.py
 __attribute__((section(".number"), used)) static const uint16_t number[10] = {1, 0, 2, 0, 3, 0, 0, 0, 0, 1024};
 
 void __wrap_SystemInit(void) {

@@ -35,6 +35,8 @@ WRAPPED = (
 LEFT_OUT = ("i2cdevInit", "i2cdevRead", "i2cdevReadReg8", "i2cdevReadReg16", "i2cdevWrite", "i2cdevWriteReg8",
             "i2cdevWriteReg16", "usblinkInit", "adcInit", "buzzerInit", "watchdogInit")
 CORE = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+#: platform -> what the factory writes into the processor for it, by which the firmware knows its board
+DEVICES = {"cf2": "0;CF21", "cf21bl": "0;C21B"}
 #: where the STM32 keeps its type, number and size, and board.ld does
 OWN, BOARDS, PAGE = 0x1FFF7000, 0x08001000, 0x1000
 
@@ -53,17 +55,23 @@ def release(base: Path) -> str:
     return run.stdout.strip() or "unknown"
 
 
-def compile_firmware(base: Path, config: str = "app-config") -> str:
-    """`make firmware` of this checkout; what it printed."""
+def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf2") -> str:
+    """`make firmware` of this checkout; what it printed. Another platform than cf2 gets FR-CFAR alone."""
     found = release(base) if (base / ".git").exists() else "unknown"
     if (base / "tools/make/oot.mk").is_file() and found.split("-")[0] != RELEASE:
         raise AirTouchError(f"{base} is {found}, the board is written for {RELEASE}: git -C {base} checkout {RELEASE}")
+    networks = "" if platform == "cf2" else "no"
     run = subprocess.run(["make", "-C", ROOT, "--no-print-directory", "firmware", f"CRAZYFLIE_BASE={base}",
-                          f"CONFIG={config}"], capture_output=True, text=True)
+                          f"CONFIG={config}", f"PLATFORM={platform}", f"NETWORKS={networks}"], capture_output=True, text=True)
     if run.returncode:
         said = [line for line in run.stderr.splitlines() if line.startswith("make firmware: ")]
         raise AirTouchError(said[0] if said else run.stderr[-2000:])
     return run.stdout
+
+
+def platform() -> str:
+    """The platform of the last `make firmware`."""
+    return Path((BUILT / "image").read_text().strip()).stem.split("-")[0]
 
 
 def _flags() -> tuple[list[str], Path]:
@@ -97,8 +105,9 @@ def link() -> Path:
     here = Path(__file__).parent
     nothing = OUT / "left_out.c"
     nothing.write_text("".join(f"int __wrap_{name}(void) {{ return 0; }}\n" for name in LEFT_OUT))
+    device = f'-DDEVICE="{DEVICES[platform()]}"'
     for source in (here / "board.c", nothing):
-        _run("arm-none-eabi-gcc", *flags, "-std=gnu11", "-O2", "-g", "-Wall", "-Werror", "-c", source,
+        _run("arm-none-eabi-gcc", *flags, device, "-std=gnu11", "-O2", "-g", "-Wall", "-Werror", "-c", source,
              "-o", OUT / f"{source.stem}.o")
     elf = OUT / "board.elf"
     objects = _objects()

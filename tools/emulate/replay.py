@@ -15,6 +15,7 @@ from airtouch.sitl.app import LOGS, PARAMS
 from tools.emulate.board import REPLAY, Board
 
 VEHICLE = "crazyflie-2.1-flow"  #: that `make firmware` builds cf2 for
+VEHICLES = {"cf2": VEHICLE, "cf21bl": "crazyflie-2.1-brushless"}  #: platform -> vehicle
 GRAVITY, DEGREE = np.float32(9.81), np.float32(0.01745329252)  #: app_sensors.c
 #: log variables that the app reads, in its order
 FED = ("stateEstimate.ax", "stateEstimate.ay", "stateEstimate.az", "gyro.x", "gyro.y", "gyro.z", "motor.m1", "motor.m2",
@@ -93,11 +94,14 @@ def differs(name: str, board: float, desktop: float) -> bool:
 
 
 def replay(elf: Path, log: FlightLog, steps: int | None = None,
-           changes: Mapping[int, Mapping[str, float]] | None = None) -> Replay:
-    """Fly a recorded flight through the emulated firmware. changes: step -> parameters of `airtouch` set before it."""
+           changes: Mapping[int, Mapping[str, float]] | None = None, vehicle: str = VEHICLE) -> Replay:
+    """Fly a recorded flight through the emulated firmware, built for this vehicle.
+
+    changes: step -> parameters of `airtouch` set before it.
+    """
     table, changes = rows(log)[:steps], changes or {}
     names = [f"airtouch.{name}" for name in LOGS]
-    core, found = AppCore(vehicle=vehicles.load(VEHICLE)), Replay()
+    core, found = AppCore(vehicle=vehicles.load(vehicle)), Replay()
     with Board(elf, REPLAY, names) as board:
         board.ask("W", FED)
         board.go()

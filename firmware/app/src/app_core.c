@@ -62,8 +62,17 @@ static void beginLink(appCore_t *core) {
   core->local = (appLocal_t){0};
 }
 
+/** Sets `best` up; false where its network is not one that the detector takes, or has no room here. */
+static bool beginBest(appCore_t *core) {
+  return streamInt8Check(&airtouchStream) < 0 &&
+         (uint32_t)streamInt8ArenaBytes(&airtouchStream) <= sizeof core->arena &&
+         streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
+                            &airtouchStreamDecoder, core->arena);
+}
+
 /** Kernels, detector and stream begin anew; counters stay. */
 static void begin(appCore_t *core) {
+  core->networksFit = beginBest(core) && core->networksFit;
   core->detector = detectorInForce(core);
   core->log.detector = core->detector;
   core->log.over = 0;
@@ -73,8 +82,6 @@ static void begin(appCore_t *core) {
   core->sinceEdge = UINT16_MAX;
   core->still = 0;
   beginPipeline(core);
-  streamDetectorInit(&core->best, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
-                     &airtouchStreamDecoder, core->arena);
   beginLink(core);
   setThresholds(core);
 }

@@ -1,10 +1,19 @@
 /**
  * @file stream_window.h
  * How much of the past an answer of a streaming network depends on.
+ *
+ * Target: C11, any processor.
+ * Threads: pure functions without state: any number at once.
+ * Memory: none.
+ * Cost: a loop over the convolutions.
  */
 #pragma once
 
 #include "stream_int8.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /** Samples, the newest included, that the network's output at one step depends on. */
 static inline uint16_t streamWindow(const streamInt8_t *network) {
@@ -14,3 +23,7 @@ static inline uint16_t streamWindow(const streamInt8_t *network) {
   }
   return (uint16_t)(network->convs[0].layer.inRows + network->stride * steps);
 }
+
+#ifdef __cplusplus
+}
+#endif
