@@ -10,7 +10,7 @@
 #define HALF_PI 1.57079632679489662f
 #define MAX_WINDOW 16384
 #define RECENT_SAMPLES 16u  // in which the latest sums are kept apart
-#define USUAL_BINS 7  // those of 6 to 8 Hz in 2 s: the loops over them unroll
+#define USUAL_BINS 7        // those of 6 to 8 Hz in 2 s: the loops over them unroll
 
 // Inlined whatever the compiler thinks of it, so that USUAL_BINS is a constant there. With -DAIRTOUCH_PLAIN_C it is C11
 // alone, as gap8/kernels/extensions.h: the same bits, only slower.
@@ -75,8 +75,8 @@ static void findTwiddles(bandPower_t *self) {
   }
 }
 
-bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float lowHz, float highHz,
-                   uint16_t hop, uint16_t channels, float *storage, size_t floats) {
+bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float lowHz, float highHz, uint16_t hop,
+                   uint16_t channels, float *storage, size_t floats) {
   memset(self, 0, sizeof(*self));
   if (window < 4 || window > MAX_WINDOW || hop == 0 || channels == 0) {
     return false;
@@ -199,7 +199,7 @@ static void advance(bandPower_t *self) {
 }
 
 INLINED float channelPower(const bandSum_t *sum, const bandSum_t *recent, const float *twiddle, uint16_t bins,
-                                 bool nyquist) {
+                           bool nyquist) {
   float re0 = 0.0f, im0 = 0.0f;            // the bin before this one
   float reSlope0 = 0.0f, imSlope0 = 0.0f;  // and its difference from the one before that
   float power = 0.0f, last = 0.0f;
@@ -230,8 +230,7 @@ INLINED float channelPower(const bandSum_t *sum, const bandSum_t *recent, const 
 INLINED void findPowers(const bandPower_t *self, float *power, uint16_t bins) {
   size_t first = 0;
   for (uint16_t c = 0; c < self->channels; c++, first += bins) {
-    power[c] = self->gain * channelPower(self->sum + first, self->recent + first, self->twiddle, bins,
-                                         self->nyquist);
+    power[c] = self->gain * channelPower(self->sum + first, self->recent + first, self->twiddle, bins, self->nyquist);
   }
 }
 

@@ -41,7 +41,7 @@ extern "C" {
 
 /** Sums over one bin of one channel. */
 typedef struct {
-  float re;       ///< over the last N samples
+  float re;  ///< over the last N samples
   float im;
   float blockRe;  ///< since the channel's block of N samples began
   float blockIm;
@@ -49,7 +49,7 @@ typedef struct {
 
 /** A bank of channels. Set up by bandPowerInit(); read nothing but through the functions. */
 typedef struct {
-  uint16_t window;    ///< N, samples
+  uint16_t window;  ///< N, samples
   uint16_t channels;
   uint16_t firstBin;  ///< the lower neighbour of the band
   uint16_t bins;      ///< of the band and its two neighbours
@@ -87,8 +87,8 @@ uint16_t bandPowerBins(float sampleRateHz, uint16_t window, float lowHz, float h
  *         channel, no hop, a band without bins or too little storage
  * Costs 2 N sines; the only place that uses any.
  */
-bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float lowHz, float highHz,
-                   uint16_t hop, uint16_t channels, float *storage, size_t floats);
+bool bandPowerInit(bandPower_t *self, float sampleRateHz, uint16_t window, float lowHz, float highHz, uint16_t hop,
+                   uint16_t channels, float *storage, size_t floats);
 
 /** Forgets every sample; keeps the settings. */
 void bandPowerReset(bandPower_t *self);

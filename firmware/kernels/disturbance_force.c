@@ -28,13 +28,11 @@ float totalThrust(const airtouchVehicle_t *vehicle, const float pwm[4]) {
   return thrust;
 }
 
-void disturbanceForce(const airtouchVehicle_t *vehicle, const float acc[3], float thrust,
-                      const float thrustAxis[3], float force[3]) {
+void disturbanceForce(const airtouchVehicle_t *vehicle, const float acc[3], float thrust, const float thrustAxis[3],
+                      float force[3]) {
   for (int i = 0; i < 3; i++) {
     force[i] = vehicle->mass * acc[i] - thrust * thrustAxis[i];
   }
 }
 
-float forceNorm(const float force[3]) {
-  return sqrtf(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
-}
+float forceNorm(const float force[3]) { return sqrtf(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]); }

@@ -38,8 +38,8 @@ float totalThrust(const airtouchVehicle_t *vehicle, const float pwm[4]);
  * @param thrust      Psi, newtons, voltage taken into account
  * @param thrustAxis  R e_z
  */
-void disturbanceForce(const airtouchVehicle_t *vehicle, const float acc[3], float thrust,
-                      const float thrustAxis[3], float force[3]);
+void disturbanceForce(const airtouchVehicle_t *vehicle, const float acc[3], float thrust, const float thrustAxis[3],
+                      float force[3]);
 
 /** ||f_w||, newtons. */
 float forceNorm(const float force[3]);

@@ -60,8 +60,8 @@ typedef struct {
   uint32_t nonFinite;
   uint32_t sinceAlert;  ///< samples, EDGE_NEVER before any
   uint32_t sinceEdge;
-  uint32_t airborne;    ///< samples
-  bool over;            ///< the decoder's state: over a platform
+  uint32_t airborne;  ///< samples
+  bool over;          ///< the decoder's state: over a platform
   float bandStorage[EDGE_PIPELINE_BAND_FLOATS];
   float cfarStorage[EDGE_PIPELINE_MAX_CELLS];
 } edgePipeline_t;

@@ -29,13 +29,13 @@ void zScoreWindow(const float *features, uint16_t window, uint16_t columns, floa
 
 /** An exponentially weighted mean whose weights are normalised by their sum. */
 typedef struct {
-  float rate;             ///< 1 - e^(-1 / timeConstant)
+  float rate;  ///< 1 - e^(-1 / timeConstant)
   float mean;
-  float low;              ///< what rounding lost of it: mean - low is exact to twice float's digits
-  float weight;           ///< sum of the weights of all samples, that of the newest being 1
-  float weightLow;        ///< what rounding lost of it
-  float gain;             ///< weight of the newest sample in the mean
-  uint32_t settle;        ///< samples until the gain is `rate` for good
+  float low;        ///< what rounding lost of it: mean - low is exact to twice float's digits
+  float weight;     ///< sum of the weights of all samples, that of the newest being 1
+  float weightLow;  ///< what rounding lost of it
+  float gain;       ///< weight of the newest sample in the mean
+  uint32_t settle;  ///< samples until the gain is `rate` for good
 } exponentialMean_t;
 
 /** Sets a mean up; @p timeConstant, in which a weight falls by e, must be positive, in samples. */

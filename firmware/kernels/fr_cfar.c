@@ -10,8 +10,7 @@
 #define POWER_LIMIT 1e30f
 #define MAX_CELLS 32767u
 
-bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, float pFa, float *storage,
-                size_t floats) {
+bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, float pFa, float *storage, size_t floats) {
   memset(self, 0, sizeof(*self));
   const uint32_t lag = (uint32_t)leadingWindow + guardCells;
   if (leadingWindow == 0 || lag > MAX_CELLS || floats < lag) {

@@ -41,8 +41,7 @@ typedef struct {
  * @return false for an empty leading window, more than 32767 cells, a probability
  *         outside 0..1 or too little storage
  */
-bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, float pFa, float *storage,
-                size_t floats);
+bool frCfarInit(frCfar_t *self, uint16_t leadingWindow, uint16_t guardCells, float pFa, float *storage, size_t floats);
 
 /**
  * Another probability of false alarm; the cells stay, so the next threshold is known at once.

@@ -23,22 +23,22 @@ typedef struct {
 /** Settings of the edge pipeline; edgePipelineDefaults() fills them with the paper's. */
 typedef struct {
   float sampleRateHz;
-  float lowHz;                 ///< band, both edges included
+  float lowHz;  ///< band, both edges included
   float highHz;
-  float pFa;                   ///< FR-CFAR: probability of false alarm
-  float forceMeanSamples;      ///< time constant of f_w,z's mean, samples
-  float armPwm;                ///< airborne while the mean PWM is above this
-  float probabilityEntry;      ///< over the platform from here up
-  float probabilityExit;       ///< off it from here down
-  uint16_t window;             ///< band power: samples
-  uint16_t hop;                ///< band power: samples between two outputs
-  uint16_t leadingWindow;      ///< FR-CFAR: cells
-  uint16_t guardCells;         ///< FR-CFAR: cells
-  uint16_t alertHold;          ///< an alert vouches for edges this many samples after it
-  uint16_t armSamples;         ///< airborne for so long before an edge is reported
-  uint16_t dwellSamples;       ///< at least so long between two edges
-  uint8_t cfarNorm;            ///< 0: squared deviation of f_w,z from its mean; 1: ||f_w||
-  uint8_t physicalFilter;      ///< 1: edges without a recent alert are dropped
+  float pFa;               ///< FR-CFAR: probability of false alarm
+  float forceMeanSamples;  ///< time constant of f_w,z's mean, samples
+  float armPwm;            ///< airborne while the mean PWM is above this
+  float probabilityEntry;  ///< over the platform from here up
+  float probabilityExit;   ///< off it from here down
+  uint16_t window;         ///< band power: samples
+  uint16_t hop;            ///< band power: samples between two outputs
+  uint16_t leadingWindow;  ///< FR-CFAR: cells
+  uint16_t guardCells;     ///< FR-CFAR: cells
+  uint16_t alertHold;      ///< an alert vouches for edges this many samples after it
+  uint16_t armSamples;     ///< airborne for so long before an edge is reported
+  uint16_t dwellSamples;   ///< at least so long between two edges
+  uint8_t cfarNorm;        ///< 0: squared deviation of f_w,z from its mean; 1: ||f_w||
+  uint8_t physicalFilter;  ///< 1: edges without a recent alert are dropped
   airtouchVehicle_t vehicle;
 } edgePipelineConfig_t;
 
@@ -97,16 +97,16 @@ typedef struct {
 
 /** How the streaming detector's network takes and gives numbers. */
 typedef struct {
-  float inputScale;  ///< q = floor(x / inputScale + 0.5) + inputZeroPoint
-  float outputScale; ///< logit = outputScale * (q - outputZeroPoint)
+  float inputScale;   ///< q = floor(x / inputScale + 0.5) + inputZeroPoint
+  float outputScale;  ///< logit = outputScale * (q - outputZeroPoint)
   int32_t inputZeroPoint;
   int32_t outputZeroPoint;
 } streamQuantisation_t;
 
 /** What the streaming detector says at one sample. */
 typedef struct {
-  float logits[3];  ///< over, entry, exit: the last ones computed
-  uint8_t ready;    ///< they are new
-  uint8_t edge;     ///< 0 none, 1 entry, 2 exit
-  uint8_t airborne; ///< whether the drone flies
+  float logits[3];   ///< over, entry, exit: the last ones computed
+  uint8_t ready;     ///< they are new
+  uint8_t edge;      ///< 0 none, 1 entry, 2 exit
+  uint8_t airborne;  ///< whether the drone flies
 } streamEvent_t;

@@ -31,13 +31,13 @@ extern "C" {
 /** The channels' memory; plain values, no pointers. */
 typedef struct {
   motionConfig_t config;
-  float held[10];                              ///< last finite acc, gyro, PWM
-  float slow[4];                               ///< slow means of the motor channels
-  float slowThrust;                            ///< slow mean of the lagged thrust, N
-  float lagged;                                ///< thrust behind delay and lag, N
-  float delayed[MOTION_THRUST_DELAY];          ///< thrust on its way, oldest first
-  uint32_t airborne;                           ///< samples in the air
-  uint8_t started;                             ///< a first sample was seen
+  float held[10];                      ///< last finite acc, gyro, PWM
+  float slow[4];                       ///< slow means of the motor channels
+  float slowThrust;                    ///< slow mean of the lagged thrust, N
+  float lagged;                        ///< thrust behind delay and lag, N
+  float delayed[MOTION_THRUST_DELAY];  ///< thrust on its way, oldest first
+  uint32_t airborne;                   ///< samples in the air
+  uint8_t started;                     ///< a first sample was seen
 } motionChannels_t;
 
 /** Sets the memory up; the settings are copied. Scales and time constants must be positive. */

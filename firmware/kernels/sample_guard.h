@@ -13,15 +13,13 @@
 #define SAMPLE_LIMIT 1e15f
 
 /** Where the unit is known, to what a sensor can say: a longer number would be remembered for half a minute. */
-#define ACC_LIMIT 240.0f   ///< m/s^2, full scale of the IMU: 24 g
-#define RATE_LIMIT 40.0f   ///< rad/s, full scale of the IMU: 2000 degrees/s
+#define ACC_LIMIT 240.0f  ///< m/s^2, full scale of the IMU: 24 g
+#define RATE_LIMIT 40.0f  ///< rad/s, full scale of the IMU: 2000 degrees/s
 #define PWM_LIMIT 65535.0f
-#define AXIS_LIMIT 1.0f    ///< of a unit vector's components
+#define AXIS_LIMIT 1.0f  ///< of a unit vector's components
 
 /** @p x limited to @p low .. @p high; all finite. */
-static inline float clampFloat(float x, float low, float high) {
-  return x < low ? low : (x > high ? high : x);
-}
+static inline float clampFloat(float x, float low, float high) { return x < low ? low : (x > high ? high : x); }
 
 /**
  * @p x, clamped to +-@p limit, or the last finite sample when @p x is NaN or infinite.

@@ -26,7 +26,7 @@ static inline float powerOfTwo(int32_t exponent) {
   return power;
 }
 
-#define LOG_2_HIGH 0.693145751953125f    // 16 bits of log 2: exact times any exponent
+#define LOG_2_HIGH 0.693145751953125f  // 16 bits of log 2: exact times any exponent
 #define LOG_2_LOW 1.428606765330187e-06f
 
 /** log x for a normal x > 0. */

@@ -69,20 +69,15 @@ static void getBytes(reader_t *from, void *to, uint16_t bytes) {
 /** The length of a body to be written; false where there is none of this type with this count. */
 static bool bodyLength(const edgeLinkPacket_t *packet, uint16_t *bytes) {
   switch (packet->type) {
-    case EDGE_LINK_RESET:
-      *bytes = 4 + 1 + EDGE_LINK_DIGEST_BYTES;
-      return true;
+    case EDGE_LINK_RESET: *bytes = 4 + 1 + EDGE_LINK_DIGEST_BYTES; return true;
     case EDGE_LINK_FEATURES:
       *bytes = (uint16_t)(3 + packet->features.count * EDGE_LINK_SAMPLE_BYTES);
       return packet->features.count >= 1 && packet->features.count <= EDGE_LINK_SAMPLES;
     case EDGE_LINK_RESULT:
       *bytes = (uint16_t)(6 + packet->result.count * (1 + EDGE_LINK_OUTPUTS));
       return packet->result.count <= EDGE_LINK_ANSWERS;
-    case EDGE_LINK_HEARTBEAT:
-      *bytes = 5 * 4 + 2 + EDGE_LINK_DIGEST_BYTES;
-      return true;
-    default:
-      return false;
+    case EDGE_LINK_HEARTBEAT: *bytes = 5 * 4 + 2 + EDGE_LINK_DIGEST_BYTES; return true;
+    default: return false;
   }
 }
 
@@ -184,18 +179,11 @@ static void getReset(reader_t *from, edgeLinkReset_t *reset) {
 /** Reads a body; false for an unknown type or a count that it cannot have. */
 static bool getBody(reader_t *from, edgeLinkPacket_t *packet) {
   switch (packet->type) {
-    case EDGE_LINK_RESET:
-      getReset(from, &packet->reset);
-      return true;
-    case EDGE_LINK_FEATURES:
-      return getFeatures(from, &packet->features);
-    case EDGE_LINK_RESULT:
-      return getResult(from, &packet->result);
-    case EDGE_LINK_HEARTBEAT:
-      getHeartbeat(from, &packet->heartbeat);
-      return true;
-    default:
-      return false;
+    case EDGE_LINK_RESET: getReset(from, &packet->reset); return true;
+    case EDGE_LINK_FEATURES: return getFeatures(from, &packet->features);
+    case EDGE_LINK_RESULT: return getResult(from, &packet->result);
+    case EDGE_LINK_HEARTBEAT: getHeartbeat(from, &packet->heartbeat); return true;
+    default: return false;
   }
 }
 

@@ -25,17 +25,17 @@ extern "C" {
 #endif
 
 #define EDGE_LINK_VERSION 0xA1
-#define EDGE_LINK_MAX_BYTES 98   ///< of a packet
+#define EDGE_LINK_MAX_BYTES 98  ///< of a packet
 #define EDGE_LINK_SAMPLE_BYTES 12
-#define EDGE_LINK_SAMPLES 7      ///< in a packet, at most
-#define EDGE_LINK_OUTPUTS 3      ///< int8 values of one answer
-#define EDGE_LINK_ANSWERS 7      ///< in a packet, at most
-#define EDGE_LINK_DIGEST_BYTES 8 ///< of a model's SHA-256
+#define EDGE_LINK_SAMPLES 7       ///< in a packet, at most
+#define EDGE_LINK_OUTPUTS 3       ///< int8 values of one answer
+#define EDGE_LINK_ANSWERS 7       ///< in a packet, at most
+#define EDGE_LINK_DIGEST_BYTES 8  ///< of a model's SHA-256
 
 /** What a sample is, and which network takes it. */
 typedef enum {
-  EDGE_LINK_BEST = 1,   ///< 12 int8: motion_channels.h, quantised; outputs: over, entry, exit
-  EDGE_LINK_PAPER = 2,  ///< 3 float32: fused features; outputs: off, over, unused
+  EDGE_LINK_BEST = 1,          ///< 12 int8: motion_channels.h, quantised; outputs: over, entry, exit
+  EDGE_LINK_PAPER = 2,         ///< 3 float32: fused features; outputs: off, over, unused
   EDGE_LINK_PAPER_STREAM = 3,  ///< the same samples and outputs, another network
 } edgeLinkAlgorithm_t;
 
@@ -87,11 +87,11 @@ typedef struct {
 typedef struct {
   uint32_t uptimeMs;
   uint32_t expected;
-  uint32_t taken;    ///< samples used since start
-  uint32_t lost;     ///< samples that never came
-  uint32_t refused;  ///< packets that were not understood
-  uint8_t algorithm; ///< 0 for none
-  uint8_t flags;     ///< as in a result
+  uint32_t taken;     ///< samples used since start
+  uint32_t lost;      ///< samples that never came
+  uint32_t refused;   ///< packets that were not understood
+  uint8_t algorithm;  ///< 0 for none
+  uint8_t flags;      ///< as in a result
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
 } edgeLinkHeartbeat_t;
 

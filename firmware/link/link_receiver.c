@@ -42,8 +42,7 @@ static void beginSession(linkReceiver_t *receiver, const edgeLinkPacket_t *packe
   receiver->mismatch = true;
   for (int i = 0; i < receiver->networkCount; i++) {
     const linkNetwork_t *network = &receiver->networks[i];
-    if (network->algorithm == reset->algorithm &&
-        memcmp(network->digest, reset->digest, EDGE_LINK_DIGEST_BYTES) == 0) {
+    if (network->algorithm == reset->algorithm && memcmp(network->digest, reset->digest, EDGE_LINK_DIGEST_BYTES) == 0) {
       receiver->network = network;
       receiver->mismatch = false;
       receiver->empty = true;
@@ -147,8 +146,8 @@ uint16_t linkReceiverHeartbeat(linkReceiver_t *receiver, uint32_t uptimeMs, uint
     return 0;
   }
   receiver->beats--;
-  edgeLinkPacket_t packet = {.type = EDGE_LINK_HEARTBEAT, .session = receiver->session,
-                             .sequence = receiver->heartbeats++};
+  edgeLinkPacket_t packet = {
+      .type = EDGE_LINK_HEARTBEAT, .session = receiver->session, .sequence = receiver->heartbeats++};
   edgeLinkHeartbeat_t *beat = &packet.heartbeat;
   beat->uptimeMs = uptimeMs;
   beat->expected = receiver->expected;

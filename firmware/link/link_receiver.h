@@ -37,25 +37,25 @@ typedef struct {
   const linkNetwork_t *networks;
   const linkNetwork_t *network;  ///< the session's, NULL without one
   uint8_t networkCount;
-  uint8_t session;               ///< 0 for none
+  uint8_t session;  ///< 0 for none
   uint32_t nonce;
-  uint8_t oldSession;            ///< the one before: a late reset of it changes nothing
+  uint8_t oldSession;  ///< the one before: a late reset of it changes nothing
   uint32_t oldNonce;
-  bool mismatch;                 ///< no network here is the one that the reset asked for
-  bool empty;                    ///< no sample of this session yet
+  bool mismatch;  ///< no network here is the one that the reset asked for
+  bool empty;     ///< no sample of this session yet
   uint32_t expected;
-  uint32_t filled;               ///< samples that the network has seen since its reset
+  uint32_t filled;  ///< samples that the network has seen since its reset
   uint8_t answers;
   struct {
     uint32_t sequence;
     int8_t output[EDGE_LINK_OUTPUTS];
-  } answer[EDGE_LINK_ANSWERS];   ///< the last ones, oldest first
+  } answer[EDGE_LINK_ANSWERS];  ///< the last ones, oldest first
   uint32_t taken;
   uint32_t lost;
   uint32_t refused;
-  uint32_t repeated;             ///< samples that had been used before
+  uint32_t repeated;  ///< samples that had been used before
   uint32_t heartbeats;
-  uint8_t beats;                 ///< heartbeats left until another packet comes
+  uint8_t beats;  ///< heartbeats left until another packet comes
 } linkReceiver_t;
 
 /** Sets the receiver up, without a session. */

@@ -21,12 +21,12 @@
 extern "C" {
 #endif
 
-#define LINK_HISTORY 288      ///< samples kept: the longest fault that leaves no gap, in steps
-#define LINK_WINDOW 8         ///< packets on their way, at most
-#define LINK_RETRY_STEPS 10   ///< without an answer until everything unconfirmed is sent again
-#define LINK_RETRY_MOST 320   ///< between two tries; after LINK_HISTORY steps of silence each wait is twice the last
-#define LINK_DOWN_STEPS 50    ///< without an answer until the link counts as down
-#define LINK_REFUSED_STEPS 100 ///< between two resets to a GAP8 that has another model
+#define LINK_HISTORY 288        ///< samples kept: the longest fault that leaves no gap, in steps
+#define LINK_WINDOW 8           ///< packets on their way, at most
+#define LINK_RETRY_STEPS 10     ///< without an answer until everything unconfirmed is sent again
+#define LINK_RETRY_MOST 320     ///< between two tries; after LINK_HISTORY steps of silence each wait is twice the last
+#define LINK_DOWN_STEPS 50      ///< without an answer until the link counts as down
+#define LINK_REFUSED_STEPS 100  ///< between two resets to a GAP8 that has another model
 
 typedef enum {
   LINK_STARTING = 0,  ///< no answer to the reset yet
@@ -73,10 +73,10 @@ typedef struct {
   uint8_t holdOff;      ///< steps in which requests to go back are old news
   uint8_t session;
   uint8_t algorithm;
-  uint8_t state;        ///< a linkState_t
+  uint8_t state;  ///< a linkState_t
   bool answered;
-  bool sending;         ///< the packet of the last poll was one of samples
-  uint32_t sendingFrom; ///< where `next` stood before it
+  bool sending;          ///< the packet of the last poll was one of samples
+  uint32_t sendingFrom;  ///< where `next` stood before it
 } linkSender_t;
 
 /**

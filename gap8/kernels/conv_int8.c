@@ -13,14 +13,14 @@ typedef struct {
   const int8_t *input;
   int8_t *output;
   outputRange_t range;
-  int32_t filter;       // values of one filter, rounded up to a multiple of four
-  int32_t span;         // of them in one row
-  int32_t rowStride;    // from a row of the input to the next
-  int32_t area;         // positions that become one output: 1 or 2
-  int32_t next;         // from the first of two such positions to the second, in the input
-  int32_t poolRows;     // the same positions as rows x columns
+  int32_t filter;     // values of one filter, rounded up to a multiple of four
+  int32_t span;       // of them in one row
+  int32_t rowStride;  // from a row of the input to the next
+  int32_t area;       // positions that become one output: 1 or 2
+  int32_t next;       // from the first of two such positions to the second, in the input
+  int32_t poolRows;   // the same positions as rows x columns
   int32_t poolColumns;
-  int32_t outputs;      // places in the output, all channels of one counting once
+  int32_t outputs;  // places in the output, all channels of one counting once
   int32_t outColumns;
 } convPlan_t;
 
@@ -41,12 +41,19 @@ static convPlan_t plan(const jobInt8_t *job) {
   const int32_t poolRows = job->pool ? job->pool->kernelRows : 1;
   const int32_t poolColumns = job->pool ? job->pool->kernelColumns : 1;
   const int32_t rowStride = layer->inColumns * layer->inChannels;
-  return (convPlan_t){.layer = layer, .input = job->input, .output = job->output, .range = outputRange(layer),
+  return (convPlan_t){.layer = layer,
+                      .input = job->input,
+                      .output = job->output,
+                      .range = outputRange(layer),
                       .filter = (layer->kernelRows * layer->kernelColumns * layer->inChannels + 3) & ~3,
-                      .span = layer->kernelColumns * layer->inChannels, .rowStride = rowStride,
+                      .span = layer->kernelColumns * layer->inChannels,
+                      .rowStride = rowStride,
                       .next = poolRows > 1 ? rowStride : layer->inChannels,
-                      .area = poolRows * poolColumns, .poolRows = poolRows, .poolColumns = poolColumns,
-                      .outputs = last->outRows * last->outColumns, .outColumns = last->outColumns};
+                      .area = poolRows * poolColumns,
+                      .poolRows = poolRows,
+                      .poolColumns = poolColumns,
+                      .outputs = last->outRows * last->outColumns,
+                      .outColumns = last->outColumns};
 }
 
 enum { PIECE = 16 };  // bytes that are copied at once
@@ -172,8 +179,8 @@ ALWAYS_INLINE void densePairs(const convPlan_t *p, const int8_t *patches, int8_t
 }
 
 // Channels of all lanes, sparse weights.
-ALWAYS_INLINE void sparseChannels(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t channel,
-                                  int32_t end, int32_t lanes, int32_t area) {
+ALWAYS_INLINE void sparseChannels(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t channel, int32_t end,
+                                  int32_t lanes, int32_t area) {
   const layerInt8_t *layer = p->layer;
   const outputRange_t range = p->range;
   const int32_t channels = layer->outChannels;
@@ -208,9 +215,9 @@ ALWAYS_INLINE void sparseChannels(const convPlan_t *p, const int8_t *patches, in
 // A block of one to four lanes: its channels, or pairs of them, from `unit` to `end`.
 typedef void block_t(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t unit, int32_t end);
 
-#define BLOCK(name, inner, lanes, area)                                                                         \
-  static void name(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t unit, int32_t end) {         \
-    inner(p, patches, to, unit, end, lanes, area);                                                              \
+#define BLOCK(name, inner, lanes, area)                                                                 \
+  static void name(const convPlan_t *p, const int8_t *patches, int8_t *to, int32_t unit, int32_t end) { \
+    inner(p, patches, to, unit, end, lanes, area);                                                      \
   }
 
 BLOCK(dense1, densePairs, 1, 1)
@@ -227,9 +234,9 @@ BLOCK(sparsePooled2, sparseChannels, 2, 2)
 BLOCK(sparsePooled4, sparseChannels, 4, 2)
 
 void convInt8(const jobInt8_t *job) {
-  static block_t *const blocks[2][2][LANES] = {  // by sparseness, area and outputs of the block
-      {{dense1, dense2, dense3, dense4}, {densePooled2, densePooled4}},
-      {{sparse1, sparse2, sparse3, sparse4}, {sparsePooled2, sparsePooled4}}};
+  static block_t *const blocks[2][2][LANES] = {// by sparseness, area and outputs of the block
+                                               {{dense1, dense2, dense3, dense4}, {densePooled2, densePooled4}},
+                                               {{sparse1, sparse2, sparse3, sparse4}, {sparsePooled2, sparsePooled4}}};
   _Alignas(4) int8_t patches[LANES * CONV_MAX_FILTER] = {0};  // what a filter is filled up with stays zero
   const convPlan_t p = plan(job);
   const int32_t channels = p.layer->outChannels;

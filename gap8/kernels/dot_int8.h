@@ -13,13 +13,9 @@
 
 enum { UNIT = 4 };
 
-ALWAYS_INLINE int32_t loadUnit(const int8_t *p) {
-  return xpulpLoad4(p);
-}
+ALWAYS_INLINE int32_t loadUnit(const int8_t *p) { return xpulpLoad4(p); }
 
-ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
-  return xpulpDot4(x, w, sum);
-}
+ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) { return xpulpDot4(x, w, sum); }
 
 #elif defined(__ARM_FEATURE_DSP) && AIRTOUCH_GNU
 
@@ -62,12 +58,8 @@ ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
 
 enum { UNIT = 1 };
 
-ALWAYS_INLINE int32_t loadUnit(const int8_t *p) {
-  return *p;
-}
+ALWAYS_INLINE int32_t loadUnit(const int8_t *p) { return *p; }
 
-ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) {
-  return sum + x * w;
-}
+ALWAYS_INLINE int32_t multiplyAdd(int32_t x, int32_t w, int32_t sum) { return sum + x * w; }
 
 #endif

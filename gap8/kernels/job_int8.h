@@ -37,9 +37,7 @@ typedef struct {
 } teamInt8_t;
 
 // The first of `items` that belongs to a core; its last is before the next core's first.
-static inline int32_t shareBegin(int32_t items, int32_t core, int32_t cores) {
-  return items * core / cores;
-}
+static inline int32_t shareBegin(int32_t items, int32_t core, int32_t cores) { return items * core / cores; }
 
 #ifdef __cplusplus
 }

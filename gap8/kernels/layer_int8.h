@@ -62,7 +62,8 @@ typedef struct {
 #define LAYER_RANGE(zeroPoint, least, most) .outputZeroPoint = (zeroPoint), .outputMin = (least), .outputMax = (most)
 #define LAYER_DENSE_ARRAYS(name) \
   .weights = name##Weights, .bias = name##Bias, .multiplier = name##Multiplier, .shift = name##Shift
-#define LAYER_SPARSE_ARRAYS(name) LAYER_DENSE_ARRAYS(name), .blockCounts = name##BlockCounts, .blockSkips = name##BlockSkips
+#define LAYER_SPARSE_ARRAYS(name) \
+  LAYER_DENSE_ARRAYS(name), .blockCounts = name##BlockCounts, .blockSkips = name##BlockSkips
 
 enum { LAYER_MAX_VALUES = 1 << 16 };  // of a layer's input or output: all that the cluster's L1 holds
 

@@ -2,13 +2,9 @@
 
 #include <math.h>
 
-static int32_t inputSize(const layerFloat_t *layer) {
-  return layer->inRows * layer->inColumns * layer->inChannels;
-}
+static int32_t inputSize(const layerFloat_t *layer) { return layer->inRows * layer->inColumns * layer->inChannels; }
 
-static int32_t outputSize(const layerFloat_t *layer) {
-  return layer->outRows * layer->outColumns * layer->outChannels;
-}
+static int32_t outputSize(const layerFloat_t *layer) { return layer->outRows * layer->outColumns * layer->outChannels; }
 
 static float dot(const float *a, const float *b, int32_t count) {
   float sum = 0.0f;
@@ -18,9 +14,7 @@ static float dot(const float *a, const float *b, int32_t count) {
   return sum;
 }
 
-static float activation(const layerFloat_t *layer, float value) {
-  return layer->relu && value < 0.0f ? 0.0f : value;
-}
+static float activation(const layerFloat_t *layer, float value) { return layer->relu && value < 0.0f ? 0.0f : value; }
 
 static void conv(const layerFloat_t *layer, const float *input, float *output) {
   const int32_t span = layer->kernelColumns * layer->inChannels;
@@ -45,8 +39,7 @@ static void maxPool(const layerFloat_t *layer, const float *input, float *output
   const int32_t rowStride = layer->inColumns * channels;
   for (int32_t row = 0; row < layer->outRows; row++) {
     for (int32_t column = 0; column < layer->outColumns; column++) {
-      const float *block =
-          input + row * layer->kernelRows * rowStride + column * layer->kernelColumns * channels;
+      const float *block = input + row * layer->kernelRows * rowStride + column * layer->kernelColumns * channels;
       for (int32_t channel = 0; channel < channels; channel++) {
         float largest = block[channel];
         for (int32_t i = 0; i < layer->kernelRows; i++) {
@@ -63,8 +56,7 @@ static void maxPool(const layerFloat_t *layer, const float *input, float *output
 static void dense(const layerFloat_t *layer, const float *input, float *output) {
   const int32_t inputs = inputSize(layer);
   for (int32_t channel = 0; channel < layer->outChannels; channel++) {
-    output[channel] =
-        activation(layer, layer->bias[channel] + dot(input, layer->weights + channel * inputs, inputs));
+    output[channel] = activation(layer, layer->bias[channel] + dot(input, layer->weights + channel * inputs, inputs));
   }
 }
 

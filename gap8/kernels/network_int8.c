@@ -8,18 +8,12 @@
 #include "max_pool_int8.h"
 #include "sparse_dense_int8.h"
 
-static int32_t inputSize(const layerInt8_t *layer) {
-  return layer->inRows * layer->inColumns * layer->inChannels;
-}
+static int32_t inputSize(const layerInt8_t *layer) { return layer->inRows * layer->inColumns * layer->inChannels; }
 
-static int32_t outputSize(const layerInt8_t *layer) {
-  return layer->outRows * layer->outColumns * layer->outChannels;
-}
+static int32_t outputSize(const layerInt8_t *layer) { return layer->outRows * layer->outColumns * layer->outChannels; }
 
 // Room that so many activations take in the arena, where each tensor is aligned to 4 bytes.
-static int32_t aligned(int32_t bytes) {
-  return (bytes + 3) & ~3;
-}
+static int32_t aligned(int32_t bytes) { return (bytes + 3) & ~3; }
 
 // Layers that step i takes: two where a pool is done with the convolution before it.
 static int32_t layersOfStep(const networkInt8_t *network, int32_t i) {
@@ -48,20 +42,16 @@ static int layerFits(const layerInt8_t *layer) {
     case LAYER_CONV:
     case LAYER_SPARSE_CONV: {
       const int32_t filter = layer->kernelRows * layer->kernelColumns * layer->inChannels;
-      return filter <= CONV_MAX_FILTER && (layer->kind == LAYER_CONV || filter % 4 == 0) &&
-             layer->outRows >= 1 && layer->outRows == layer->inRows - layer->kernelRows + 1 &&
-             layer->outColumns >= 1 && layer->outColumns == layer->inColumns - layer->kernelColumns + 1;
+      return filter <= CONV_MAX_FILTER && (layer->kind == LAYER_CONV || filter % 4 == 0) && layer->outRows >= 1 &&
+             layer->outRows == layer->inRows - layer->kernelRows + 1 && layer->outColumns >= 1 &&
+             layer->outColumns == layer->inColumns - layer->kernelColumns + 1;
     }
     case LAYER_MAX_POOL:
-      return layer->outRows >= 1 && layer->outRows == layer->inRows / layer->kernelRows &&
-             layer->outColumns >= 1 && layer->outColumns == layer->inColumns / layer->kernelColumns &&
-             layer->outChannels == layer->inChannels;
-    case LAYER_DENSE:
-      return layer->outRows == 1 && layer->outColumns == 1;
-    case LAYER_SPARSE_DENSE:
-      return layer->outRows == 1 && layer->outColumns == 1 && inputSize(layer) % 4 == 0;
-    default:
-      return 0;
+      return layer->outRows >= 1 && layer->outRows == layer->inRows / layer->kernelRows && layer->outColumns >= 1 &&
+             layer->outColumns == layer->inColumns / layer->kernelColumns && layer->outChannels == layer->inChannels;
+    case LAYER_DENSE: return layer->outRows == 1 && layer->outColumns == 1;
+    case LAYER_SPARSE_DENSE: return layer->outRows == 1 && layer->outColumns == 1 && inputSize(layer) % 4 == 0;
+    default: return 0;
   }
 }
 
@@ -107,8 +97,12 @@ const int8_t *networkInt8RunTeam(const networkInt8_t *network, const int8_t *inp
     const int32_t pooled = layersOfStep(network, i) > 1;
     const layerInt8_t *last = &network->layers[i + pooled];
     int8_t *y = atEnd ? arena + bytes - aligned(outputSize(last)) : arena;
-    layerInt8Run(&(jobInt8_t){.layer = &network->layers[i], .pool = pooled ? last : NULL, .input = x, .output = y,
-                              .core = team->core, .cores = team->cores});
+    layerInt8Run(&(jobInt8_t){.layer = &network->layers[i],
+                              .pool = pooled ? last : NULL,
+                              .input = x,
+                              .output = y,
+                              .core = team->core,
+                              .cores = team->cores});
     if (team->barrier != NULL) {
       team->barrier(team->context);
     }

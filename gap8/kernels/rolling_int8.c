@@ -5,9 +5,7 @@
 
 #include "conv_int8.h"
 
-static int32_t aligned(int32_t bytes) {
-  return (bytes + 3) & ~3;
-}
+static int32_t aligned(int32_t bytes) { return (bytes + 3) & ~3; }
 
 static int32_t isConv(const layerInt8_t *layer) {
   return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV;
@@ -152,8 +150,12 @@ const int8_t *rollingInt8Step(rollingInt8_t *self, const int8_t *sample) {
     }
     step->wait = step->period;
     int8_t *to = i + 1 < self->stepCount ? nextRow(&self->steps[i + 1]) : self->output;
-    layerInt8Run(&(jobInt8_t){.layer = &step->layer, .pool = step->pool.kind == LAYER_MAX_POOL ? &step->pool : NULL,
-                              .input = rows, .output = to, .core = 0, .cores = 1});
+    layerInt8Run(&(jobInt8_t){.layer = &step->layer,
+                              .pool = step->pool.kind == LAYER_MAX_POOL ? &step->pool : NULL,
+                              .input = rows,
+                              .output = to,
+                              .core = 0,
+                              .cores = 1});
   }
   return self->seen >= self->receptive ? self->output : NULL;
 }

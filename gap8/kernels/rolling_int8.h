@@ -21,22 +21,22 @@ typedef struct {
   int8_t *ring;       // rows of input: for each of `dilation` phases 2 * taps rows, each row kept twice
   int32_t taps;
   int32_t dilation;
-  int32_t rowBytes;   // of the input
-  int32_t period;     // input rows to one row of output
-  int32_t phase;      // dilation phase of the next input row
-  int32_t place;      // its row within the phase, below taps
-  int32_t wait;       // input rows until the next row of output
+  int32_t rowBytes;  // of the input
+  int32_t period;    // input rows to one row of output
+  int32_t phase;     // dilation phase of the next input row
+  int32_t place;     // its row within the phase, below taps
+  int32_t wait;      // input rows until the next row of output
 } rollingStep_t;
 
 // A windowed network that rolls over a stream. The caller owns it and the arena behind it.
 typedef struct {
   rollingStep_t steps[ROLLING_MAX_STEPS];
-  int8_t *output;    // of the last step
+  int8_t *output;  // of the last step
   int32_t stepCount;
-  int32_t stride;    // samples to one output
-  int32_t ahead;     // samples by which an output is earlier than its window's end
-  int32_t receptive; // samples that an output depends on
-  int32_t seen;      // samples since the reset, at most receptive
+  int32_t stride;     // samples to one output
+  int32_t ahead;      // samples by which an output is earlier than its window's end
+  int32_t receptive;  // samples that an output depends on
+  int32_t seen;       // samples since the reset, at most receptive
 } rollingInt8_t;
 
 /**

@@ -6,17 +6,11 @@
 #include "dense_int8.h"
 #include "sparse_dense_int8.h"
 
-static int32_t aligned(int32_t bytes) {
-  return (bytes + 3) & ~3;
-}
+static int32_t aligned(int32_t bytes) { return (bytes + 3) & ~3; }
 
-static int32_t ringRows(const streamConv_t *conv) {
-  return (conv->layer.inRows - 1) * conv->dilation + 1;
-}
+static int32_t ringRows(const streamConv_t *conv) { return (conv->layer.inRows - 1) * conv->dilation + 1; }
 
-static int32_t patchBytes(const layerInt8_t *layer) {
-  return aligned(layer->inRows * layer->inChannels);
-}
+static int32_t patchBytes(const layerInt8_t *layer) { return aligned(layer->inRows * layer->inChannels); }
 
 // The widest of what the patch holds: the taps of a conv, then the head's output.
 static int32_t widestPatch(const streamInt8_t *network) {
@@ -51,8 +45,8 @@ static int layerFits(const layerInt8_t *layer) {
   if (!shapeFits(layer->inRows, 1, layer->inChannels) || !shapeFits(1, 1, layer->outChannels)) {
     return 0;
   }
-  const int dense = layer->kind == LAYER_DENSE ||
-                    (layer->kind == LAYER_SPARSE_DENSE && layer->inRows * layer->inChannels % 4 == 0);
+  const int dense =
+      layer->kind == LAYER_DENSE || (layer->kind == LAYER_SPARSE_DENSE && layer->inRows * layer->inChannels % 4 == 0);
   return dense && layer->inColumns == 1 && layer->outRows == 1 && layer->outColumns == 1;
 }
 

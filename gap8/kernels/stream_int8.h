@@ -34,11 +34,11 @@ typedef struct {
 
 // What a network remembers of the past. The caller owns it and the arena behind it.
 typedef struct {
-  int8_t *rings[STREAM_MAX_CONVS];  // input rows of each conv, in the arena
-  int32_t newest[STREAM_MAX_CONVS]; // index of its newest row
-  int8_t *patch;                    // the taps of one conv, gathered
-  int8_t *skips;                    // what the head reads
-  int32_t phase;                    // samples until the next one that is computed
+  int8_t *rings[STREAM_MAX_CONVS];   // input rows of each conv, in the arena
+  int32_t newest[STREAM_MAX_CONVS];  // index of its newest row
+  int8_t *patch;                     // the taps of one conv, gathered
+  int8_t *skips;                     // what the head reads
+  int32_t phase;                     // samples until the next one that is computed
 } streamState_t;
 
 /**

@@ -18,13 +18,9 @@
 typedef signed char xpulpVector_t __attribute__((vector_size(4)));
 
 // Four bytes of memory: one load, a second one where they straddle two words.
-static inline int32_t xpulpLoad4(const int8_t *p) {
-  return *(const int32_t __attribute__((may_alias)) *)p;
-}
+static inline int32_t xpulpLoad4(const int8_t *p) { return *(const int32_t __attribute__((may_alias)) *)p; }
 
-static inline void xpulpStore4(int8_t *p, int32_t four) {
-  *(int32_t __attribute__((may_alias)) *)p = four;
-}
+static inline void xpulpStore4(int8_t *p, int32_t four) { *(int32_t __attribute__((may_alias)) *)p = four; }
 
 // sum + a[0] b[0] + a[1] b[1] + a[2] b[2] + a[3] b[3]
 static inline int32_t xpulpDot4(int32_t a, int32_t b, int32_t sum) {
@@ -42,9 +38,7 @@ static inline int32_t xpulpPack4(int8_t a, int8_t b, int8_t c, int8_t d) {
 }
 
 // (a + 1) >> 1; the sum must fit in int32.
-static inline int32_t xpulpHalve(int32_t a) {
-  return __builtin_pulp_addRN(a, 0, 1, 1);
-}
+static inline int32_t xpulpHalve(int32_t a) { return __builtin_pulp_addRN(a, 0, 1, 1); }
 
 // (a + b + 2^(shift - 1)) >> shift for shift 1 to 31; the sum must fit in int32.
 static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
@@ -54,13 +48,9 @@ static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
 #elif defined(__riscv_xcvsimd) && AIRTOUCH_GNU
 #define AIRTOUCH_XPULP 1
 
-static inline int32_t xpulpLoad4(const int8_t *p) {
-  return *(const int32_t __attribute__((may_alias)) *)p;
-}
+static inline int32_t xpulpLoad4(const int8_t *p) { return *(const int32_t __attribute__((may_alias)) *)p; }
 
-static inline void xpulpStore4(int8_t *p, int32_t four) {
-  *(int32_t __attribute__((may_alias)) *)p = four;
-}
+static inline void xpulpStore4(int8_t *p, int32_t four) { *(int32_t __attribute__((may_alias)) *)p = four; }
 
 static inline int32_t xpulpDot4(int32_t a, int32_t b, int32_t sum) {
   __asm__("cv.sdotsp.b %0, %1, %2" : "+r"(sum) : "r"(a), "r"(b));
@@ -96,9 +86,7 @@ static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
 
 #include <string.h>
 
-static inline int32_t xpulpByte(int32_t word, int32_t i) {
-  return (int8_t)((uint32_t)word >> (8 * i));
-}
+static inline int32_t xpulpByte(int32_t word, int32_t i) { return (int8_t)((uint32_t)word >> (8 * i)); }
 
 static inline int32_t xpulpPack4(int8_t a, int8_t b, int8_t c, int8_t d) {
   return (int32_t)((uint32_t)(uint8_t)a | (uint32_t)(uint8_t)b << 8 | (uint32_t)(uint8_t)c << 16 |
@@ -111,9 +99,7 @@ static inline int32_t xpulpLoad4(const int8_t *p) {
   return four;
 }
 
-static inline void xpulpStore4(int8_t *p, int32_t four) {
-  memcpy(p, &four, sizeof(four));
-}
+static inline void xpulpStore4(int8_t *p, int32_t four) { memcpy(p, &four, sizeof(four)); }
 
 static inline int32_t xpulpDot4(int32_t a, int32_t b, int32_t sum) {
   for (int32_t i = 0; i < 4; i++) {
@@ -130,9 +116,7 @@ static inline int32_t xpulpMax4(int32_t a, int32_t b) {
   return xpulpPack4(larger[0], larger[1], larger[2], larger[3]);
 }
 
-static inline int32_t xpulpHalve(int32_t a) {
-  return (a + 1) >> 1;
-}
+static inline int32_t xpulpHalve(int32_t a) { return (a + 1) >> 1; }
 
 static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
   return (a + b + (int32_t)(1u << (shift - 1))) >> shift;

@@ -16,7 +16,7 @@
 #define CLEAN_STEPS 320  // before the faults, so that answers come
 #define AFTER_STEPS 120  // after them
 #define QUEUE 64
-#define ROOM 160         // of a packet on the pipe: faults may lengthen it
+#define ROOM 160  // of a packet on the pipe: faults may lengthen it
 
 typedef struct {
   uint8_t bytes[ROOM];
@@ -125,15 +125,12 @@ static void transmit(pipe_t *pipe, const uint8_t *packet, uint16_t length, int s
   memcpy(bytes, packet, length);
   switch (next(script) % 16) {
     case 6:
-    case 7:
-      return;
+    case 7: return;
     case 8:
       push(pipe, bytes, length, step);
       push(pipe, bytes, length, step + next(script) % 50);
       return;
-    case 9:
-      push(pipe, bytes, (uint16_t)(next(script) % (length + 1)), step);
-      return;
+    case 9: push(pipe, bytes, (uint16_t)(next(script) % (length + 1)), step); return;
     case 10:
       bytes[next(script) % length] ^= (uint8_t)(1 + next(script) % 255);
       push(pipe, bytes, length, step);
@@ -144,9 +141,7 @@ static void transmit(pipe_t *pipe, const uint8_t *packet, uint16_t length, int s
       }
       push(pipe, bytes, (uint16_t)(next(script) % ROOM), step);
       return;
-    case 12:
-      push(pipe, bytes, length, step + next(script) % 50);
-      return;
+    case 12: push(pipe, bytes, length, step + next(script) % 50); return;
     case 13: {
       const uint16_t longer = (uint16_t)(length + next(script) % (ROOM - EDGE_LINK_MAX_BYTES));
       for (int i = length; i < longer; i++) {
@@ -158,9 +153,7 @@ static void transmit(pipe_t *pipe, const uint8_t *packet, uint16_t length, int s
       push(pipe, bytes, longer, step);
       return;
     }
-    default:
-      push(pipe, bytes, length, step);
-      return;
+    default: push(pipe, bytes, length, step); return;
   }
 }
 
@@ -271,11 +264,15 @@ static void runScript(const uint8_t *data, size_t length, int *slowest) {
     const char *sha256;
     uint16_t window, stride;
     uint8_t algorithm;
-  } detectors[] = {
-      {&best, AIRTOUCH_STREAM_SHA256, streamWindow(&airtouchStream), (uint16_t)airtouchStream.stride, EDGE_LINK_BEST},
-      {&paper, AIRTOUCH_MODEL_SHA256, AIRTOUCH_MODEL_ROWS, 1, EDGE_LINK_PAPER},
-      {&paperStream, AIRTOUCH_ROLLING_SHA256, AIRTOUCH_ROLLING_ROWS, AIRTOUCH_ROLLING_STRIDE, EDGE_LINK_PAPER_STREAM},
-  }, *detector = &detectors[kind % 3];
+  } detectors[] =
+      {
+          {&best, AIRTOUCH_STREAM_SHA256, streamWindow(&airtouchStream), (uint16_t)airtouchStream.stride,
+           EDGE_LINK_BEST},
+          {&paper, AIRTOUCH_MODEL_SHA256, AIRTOUCH_MODEL_ROWS, 1, EDGE_LINK_PAPER},
+          {&paperStream, AIRTOUCH_ROLLING_SHA256, AIRTOUCH_ROLLING_ROWS, AIRTOUCH_ROLLING_STRIDE,
+           EDGE_LINK_PAPER_STREAM},
+      },
+    *detector = &detectors[kind % 3];
   swift = kind / 3 % 2;
   const world_t *world = detector->world;
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];

@@ -57,16 +57,11 @@ static void take(const uint8_t *bytes, uint16_t length, bool isPacket) {
 // Whether host/docs/link.md has a packet of this type and length with this count.
 static bool documented(int type, int length, int count) {
   switch (type) {
-    case 1:
-      return length == 10 + 13;
-    case 2:
-      return count >= 1 && count <= 7 && length == 10 + 3 + 12 * count;
-    case 3:
-      return count <= 7 && length == 10 + 6 + 4 * count;
-    case 4:
-      return length == 10 + 30;
-    default:
-      return false;
+    case 1: return length == 10 + 13;
+    case 2: return count >= 1 && count <= 7 && length == 10 + 3 + 12 * count;
+    case 3: return count <= 7 && length == 10 + 6 + 4 * count;
+    case 4: return length == 10 + 30;
+    default: return false;
   }
 }
 

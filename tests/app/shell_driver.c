@@ -24,10 +24,10 @@ static void check(bool good, const char *what) {
 static TickType_t tick = 5000;
 static jmp_buf landed;
 static int stepsLeft;
-static TickType_t delay;               // ticks that the next step begins late
-static void (*between)(int step);      // runs before each step, as another task would
-static void (*afterClock)(void);       // runs once, right after the clock was read
-static void (*beforeCritical)(void);   // runs once, as a task that comes in just before interrupts go off
+static TickType_t delay;              // ticks that the next step begins late
+static void (*between)(int step);     // runs before each step, as another task would
+static void (*afterClock)(void);      // runs once, right after the clock was read
+static void (*beforeCritical)(void);  // runs once, as a task that comes in just before interrupts go off
 static int critical;
 
 TickType_t xTaskGetTickCount(void) {
@@ -86,11 +86,11 @@ static void fly(int steps) {
 
 // ---- log variables and parameters
 
-static const char *const names[] = {"stateEstimate.ax", "stateEstimate.ay", "stateEstimate.az", "gyro.x", "gyro.y",
-                                    "gyro.z", "motor.m1", "motor.m2", "motor.m3", "motor.m4", "pm.vbat",
-                                    "stateEstimate.qx", "stateEstimate.qy", "stateEstimate.qz", "stateEstimate.qw"};
-static const float values[] = {0,         0,         0,         0,         0, 0, HOVER_PWM, HOVER_PWM,
-                               HOVER_PWM, HOVER_PWM, 3.8f, 0, 0, 0, 1};
+static const char *const names[] = {"stateEstimate.ax", "stateEstimate.ay", "stateEstimate.az", "gyro.x",
+                                    "gyro.y",           "gyro.z",           "motor.m1",         "motor.m2",
+                                    "motor.m3",         "motor.m4",         "pm.vbat",          "stateEstimate.qx",
+                                    "stateEstimate.qy", "stateEstimate.qz", "stateEstimate.qw"};
+static const float values[] = {0, 0, 0, 0, 0, 0, HOVER_PWM, HOVER_PWM, HOVER_PWM, HOVER_PWM, 3.8f, 0, 0, 0, 1};
 static const char *hidden = "";
 static unsigned int deck = 1;
 
@@ -360,8 +360,9 @@ static void tables(void) {
     printf("log %s.%s %d\n", logGroup, entry->name, entry->type);
   }
   for (const variableEntry_t *entry = params; entry->name != NULL; entry++) {
-    const double value = entry->type == PARAM_FLOAT ? (double)*(float *)entry->address
-                         : entry->type == PARAM_UINT8 ? *(uint8_t *)entry->address : *(uint16_t *)entry->address;
+    const double value = entry->type == PARAM_FLOAT   ? (double)*(float *)entry->address
+                         : entry->type == PARAM_UINT8 ? *(uint8_t *)entry->address
+                                                      : *(uint16_t *)entry->address;
     printf("param %s.%s %d %a\n", paramGroup, entry->name, entry->type, value);
   }
 }
@@ -372,13 +373,21 @@ typedef struct {
 } scenario_t;
 
 static const scenario_t scenarios[] = {
-    {"silent", silent}, {"missing-variable", missingVariable}, {"parameters", parameters},
-    {"write-between", writeBetween}, {"stalled", stalled}, {"late", late}, {"tables", tables},
+    {"silent", silent},
+    {"missing-variable", missingVariable},
+    {"parameters", parameters},
+    {"write-between", writeBetween},
+    {"stalled", stalled},
+    {"late", late},
+    {"tables", tables},
 #ifdef CONFIG_DECK_AI
-    {"gap8-on-request", gap8OnRequest}, {"no-deck", noDeck}, {"foreign", foreign},
+    {"gap8-on-request", gap8OnRequest},
+    {"no-deck", noDeck},
+    {"foreign", foreign},
 #endif
 #ifdef CONFIG_CONTROLLER_OOT
-    {"tap", tap}, {"tap-mean", tapMean},
+    {"tap", tap},
+    {"tap-mean", tapMean},
 #endif
 };
 

@@ -75,8 +75,8 @@ static inline float takeAnyFloat(bytes_t *bytes) {
 
 /** Mostly one byte: a value of a few times @p usual; now and then one of the values that break code, or any bits. */
 static inline float takeFloat(bytes_t *bytes, float usual) {
-  static const float rare[] = {NAN,   INFINITY, -INFINITY, 0.0f,  -0.0f,    1e-45f,   FLT_MIN,  FLT_MAX,
-                               -FLT_MAX, 1e15f, -1e15f,    1e16f, 65535.0f, 65536.0f, 1e-20f, -1.0f};
+  static const float rare[] = {NAN,      INFINITY, -INFINITY, 0.0f,  -0.0f,    1e-45f,   FLT_MIN, FLT_MAX,
+                               -FLT_MAX, 1e15f,    -1e15f,    1e16f, 65535.0f, 65536.0f, 1e-20f,  -1.0f};
   const uint8_t code = takeByte(bytes);
   if (code < 224) {
     return usual * ((float)code - 112.0f) * (1.0f / 32.0f);

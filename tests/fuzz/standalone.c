@@ -19,7 +19,7 @@ typedef struct {
 
 static input_t corpus[MAX_INPUTS];
 static size_t inputs;
-static input_t now;  // what the target is given
+static input_t now;         // what the target is given
 static const char *prefix;  // of a finding's path; NULL: none is written
 static unsigned long runs, seed = 1, longest = 4096, timeout = 20, executed;
 static uint64_t state;

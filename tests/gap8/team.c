@@ -19,9 +19,7 @@ typedef struct {
   int8_t outputs[AIRTOUCH_GOLDEN_COUNT][AIRTOUCH_GOLDEN_OUTPUTS];
 } core_t;
 
-static void wait(void *context) {
-  pthread_barrier_wait(context);
-}
+static void wait(void *context) { pthread_barrier_wait(context); }
 
 static void *run(void *argument) {
   core_t *core = argument;

@@ -185,8 +185,9 @@ static void feedStreamDetector(bytes_t bytes, bool wild) {
     take(&bytes, &settings, sizeof(settings));
   }
   streamDetector_t detector;
-  check(streamDetectorInit(&detector, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation,
-                           &settings, arena), "the shipped network is accepted");
+  check(streamDetectorInit(&detector, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation, &settings,
+                           arena),
+        "the shipped network is accepted");
   while (bytes.left > 0) {
     float sample[10];
     streamEvent_t event;

@@ -33,22 +33,22 @@
 typedef struct {
   int16_t gyro[2][3];  // samples of two milliseconds, the BMI088's own units
   int16_t acc[2][3];
-  uint16_t range;      // mm
-  int16_t flow[2];     // counts since the last block, the PMW3901's axes
+  uint16_t range;   // mm
+  int16_t flow[2];  // counts since the last block, the PMW3901's axes
 } block_t;
 
 enum { OPEN = 1, WRITE = 5, READ = 6, EXIT = 0x18 };  // semihosting
 
-static int input, output;      // of the desktop
-static uint8_t mode;           // FLYING, or rows of a recorded flight
+static int input, output;  // of the desktop
+static uint8_t mode;       // FLYING, or rows of a recorded flight
 static uint8_t appRuns;
 static uint8_t wholeMilliseconds;  // of the microseconds' clock
 static TaskHandle_t app;
 static block_t block;
-static int millisecond;        // of the block
-static int16_t counts[2];      // of the optical flow, since it was last read
-static bool ending;            // a task is to report the stacks and stop
-static bool sensing;           // the gyro's interrupt is set up
+static int millisecond;    // of the block
+static int16_t counts[2];  // of the optical flow, since it was last read
+static bool ending;        // a task is to report the stacks and stop
+static bool sensing;       // the gyro's interrupt is set up
 static logVarId_t watched[VARIABLES];
 static int watchedCount;
 static logVarId_t fed[ROW];
@@ -198,7 +198,10 @@ static void report(uint8_t kind) {
 /** Unused words of every task's stack: name, 10 bytes, and 2 of the count. */
 static void stacks(void) {
   static TaskStatus_t tasks[40];
-  static struct __attribute__((packed)) { char name[10]; uint16_t left; } row[40];
+  static struct __attribute__((packed)) {
+    char name[10];
+    uint16_t left;
+  } row[40];
   const UBaseType_t count = uxTaskGetSystemState(tasks, 40, NULL);
   for (UBaseType_t i = 0; i < count; i++) {
     strncpy(row[i].name, tasks[i].pcTaskName, 10);
@@ -296,7 +299,8 @@ static void listen(void) {
     switch (head[0]) {
       case 'G':  // go on
         return;
-      case 'B':  // begin: mode, whether the app runs, whether an AI-deck is there, whether time goes in whole milliseconds
+      case 'B':  // begin: mode, whether the app runs, whether an AI-deck is there, whether time goes in whole
+                 // milliseconds
         mode = frame[0];
         appRuns = frame[1];
         deckThere = frame[2];
@@ -317,28 +321,21 @@ static void listen(void) {
         names(frame, length, fed, &count);
         break;
       }
-      case 'P':
-        setParam(frame);
-        break;
+      case 'P': setParam(frame); break;
       case 'I':
         memcpy(&block, frame, sizeof block);
         counts[0] = (int16_t)(counts[0] + block.flow[0]);
         counts[1] = (int16_t)(counts[1] + block.flow[1]);
         millisecond = 0;
         break;
-      case 'L':
-        enqueue(radio, frame);
-        break;
+      case 'L': enqueue(radio, frame); break;
       case 'U':
         for (uint16_t i = 0; i < length; i++) {
           enqueue(deckQueue, &frame[i]);
         }
         break;
-      case 'E':
-        ending = true;
-        return;
-      default:
-        stop(6);
+      case 'E': ending = true; return;
+      default: stop(6);
     }
   }
 }
@@ -431,18 +428,40 @@ bool __wrap_eepromWriteBuffer(const uint8_t *buffer, uint16_t at, uint16_t lengt
 
 // ---- sensors
 
-uint16_t __wrap_bmi088_gyro_init(struct bmi088_dev *dev) { (void)dev; return BMI088_OK; }
-uint16_t __wrap_bmi088_accel_init(struct bmi088_dev *dev) { (void)dev; return BMI088_OK; }
-uint16_t __wrap_bmi088_set_gyro_power_mode(struct bmi088_dev *dev) { (void)dev; return BMI088_OK; }
-uint16_t __wrap_bmi088_set_gyro_meas_conf(struct bmi088_dev *dev) { (void)dev; return BMI088_OK; }
+uint16_t __wrap_bmi088_gyro_init(struct bmi088_dev *dev) {
+  (void)dev;
+  return BMI088_OK;
+}
+uint16_t __wrap_bmi088_accel_init(struct bmi088_dev *dev) {
+  (void)dev;
+  return BMI088_OK;
+}
+uint16_t __wrap_bmi088_set_gyro_power_mode(struct bmi088_dev *dev) {
+  (void)dev;
+  return BMI088_OK;
+}
+uint16_t __wrap_bmi088_set_gyro_meas_conf(struct bmi088_dev *dev) {
+  (void)dev;
+  return BMI088_OK;
+}
 uint16_t __wrap_bmi088_set_gyro_int_config(struct bmi088_int_cfg *config, struct bmi088_dev *dev) {
   (void)config;
   (void)dev;
   return BMI088_OK;
 }
-uint16_t __wrap_bmi088_accel_switch_control(struct bmi088_dev *dev, uint8_t on) { (void)dev; (void)on; return BMI088_OK; }
-uint16_t __wrap_bmi088_set_accel_power_mode(struct bmi088_dev *dev) { (void)dev; return BMI088_OK; }
-uint16_t __wrap_bmi088_set_accel_meas_conf(struct bmi088_dev *dev) { (void)dev; return BMI088_OK; }
+uint16_t __wrap_bmi088_accel_switch_control(struct bmi088_dev *dev, uint8_t on) {
+  (void)dev;
+  (void)on;
+  return BMI088_OK;
+}
+uint16_t __wrap_bmi088_set_accel_power_mode(struct bmi088_dev *dev) {
+  (void)dev;
+  return BMI088_OK;
+}
+uint16_t __wrap_bmi088_set_accel_meas_conf(struct bmi088_dev *dev) {
+  (void)dev;
+  return BMI088_OK;
+}
 uint16_t __wrap_bmi088_perform_gyro_selftest(int8_t *result, struct bmi088_dev *dev) {
   (void)dev;
   *result = BMI088_SELFTEST_PASS;
@@ -474,8 +493,15 @@ int8_t __wrap_bmp3_init(struct bmp3_dev *dev) {
   bmp3_chip_id = BMP388_CHIP_ID;
   return BMP3_OK;
 }
-int8_t __wrap_bmp3_set_sensor_settings(uint32_t wanted, struct bmp3_dev *dev) { (void)wanted; (void)dev; return BMP3_OK; }
-int8_t __wrap_bmp3_set_op_mode(struct bmp3_dev *dev) { (void)dev; return BMP3_OK; }
+int8_t __wrap_bmp3_set_sensor_settings(uint32_t wanted, struct bmp3_dev *dev) {
+  (void)wanted;
+  (void)dev;
+  return BMP3_OK;
+}
+int8_t __wrap_bmp3_set_op_mode(struct bmp3_dev *dev) {
+  (void)dev;
+  return BMP3_OK;
+}
 int8_t __wrap_bmp3_get_sensor_data(uint8_t which, struct bmp3_data *data, struct bmp3_dev *dev) {
   (void)which;
   (void)dev;
@@ -484,7 +510,10 @@ int8_t __wrap_bmp3_get_sensor_data(uint8_t which, struct bmp3_data *data, struct
   return BMP3_OK;
 }
 
-bool __wrap_pmw3901Init(const deckPin_t pin) { (void)pin; return true; }
+bool __wrap_pmw3901Init(const deckPin_t pin) {
+  (void)pin;
+  return true;
+}
 void __wrap_pmw3901ReadMotion(const deckPin_t pin, motionBurst_t *motion) {
   (void)pin;
   memset(motion, 0, sizeof *motion);
@@ -496,9 +525,19 @@ void __wrap_pmw3901ReadMotion(const deckPin_t pin, motionBurst_t *motion) {
   taskEXIT_CRITICAL();
 }
 
-bool __wrap_vl53l1xInit(VL53L1_Dev_t *dev, I2C_Dev *port) { (void)dev; (void)port; return true; }
-VL53L1_Error __wrap_VL53L1_StopMeasurement(VL53L1_DEV dev) { (void)dev; return VL53L1_ERROR_NONE; }
-VL53L1_Error __wrap_VL53L1_StartMeasurement(VL53L1_DEV dev) { (void)dev; return VL53L1_ERROR_NONE; }
+bool __wrap_vl53l1xInit(VL53L1_Dev_t *dev, I2C_Dev *port) {
+  (void)dev;
+  (void)port;
+  return true;
+}
+VL53L1_Error __wrap_VL53L1_StopMeasurement(VL53L1_DEV dev) {
+  (void)dev;
+  return VL53L1_ERROR_NONE;
+}
+VL53L1_Error __wrap_VL53L1_StartMeasurement(VL53L1_DEV dev) {
+  (void)dev;
+  return VL53L1_ERROR_NONE;
+}
 VL53L1_Error __wrap_VL53L1_SetDistanceMode(VL53L1_DEV dev, VL53L1_DistanceModes far) {
   (void)dev;
   (void)far;

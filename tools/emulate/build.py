@@ -62,7 +62,8 @@ def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf
         raise AirTouchError(f"{base} is {found}, the board is written for {RELEASE}: git -C {base} checkout {RELEASE}")
     networks = "" if platform == "cf2" else "no"
     run = subprocess.run(["make", "-C", ROOT, "--no-print-directory", "firmware", f"CRAZYFLIE_BASE={base}",
-                          f"CONFIG={config}", f"PLATFORM={platform}", f"NETWORKS={networks}"], capture_output=True, text=True)
+                          f"CONFIG={config}", f"PLATFORM={platform}", f"NETWORKS={networks}"],
+                         capture_output=True, text=True)
     if run.returncode:
         said = [line for line in run.stderr.splitlines() if line.startswith("make firmware: ")]
         raise AirTouchError(said[0] if said else run.stderr[-2000:])

@@ -53,8 +53,7 @@ static void beginLink(appCore_t *core) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
   const appPaper_t *paper = appPaperOf(core->detector);
   edgeLinkDigest(paper ? paper->sha256 : AIRTOUCH_STREAM_SHA256, digest);
-  const uint16_t refill =
-      paper ? paper->refill : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
+  const uint16_t refill = paper ? paper->refill : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
   const uint8_t session = (uint8_t)(core->link.session == 255 ? 1 : core->link.session + 1);
   const linkCounters_t counters = core->link.counters;
   linkSenderInit(&core->link, paper ? paper->algorithm : EDGE_LINK_BEST, digest, refill, core->nonce, session);
@@ -267,9 +266,7 @@ static void stepCfar(appCore_t *core, const edgeEvent_t *event) {
 
 static void runDetector(appCore_t *core, const edgeEvent_t *event) {
   switch (core->detector) {
-    case APP_BEST:
-      stepBest(core);
-      break;
+    case APP_BEST: stepBest(core); break;
     case APP_BEST_GAP8:
       sendChannels(core);
       runLocal(core);
@@ -283,9 +280,7 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
         report(core, event->edge);
       }
       break;
-    default:
-      stepCfar(core, event);
-      break;
+    default: stepCfar(core, event); break;
   }
 }
 

@@ -18,18 +18,18 @@
 
 #include "airtouch_stream.h"
 
-#define APP_PACKETS 2            ///< a step, at most: the CPX queue is two deep
-#define APP_RECENT_STEPS 100     ///< health flags of single events stay up for so long
-#define APP_ANSWER_STEPS 50      ///< an answer of the GAP8 that is older says nothing of now
-#define APP_EVENTS 4             ///< kinds of them
-#define APP_STILL_STEPS 100      ///< of flight without a change of the horizontal acceleration, until that is a fault
+#define APP_PACKETS 2         ///< a step, at most: the CPX queue is two deep
+#define APP_RECENT_STEPS 100  ///< health flags of single events stay up for so long
+#define APP_ANSWER_STEPS 50   ///< an answer of the GAP8 that is older says nothing of now
+#define APP_EVENTS 4          ///< kinds of them
+#define APP_STILL_STEPS 100   ///< of flight without a change of the horizontal acceleration, until that is a fault
 
 /** appParams_t.detector. */
 typedef enum {
-  APP_CFAR = 0,        ///< FR-CFAR alone, on the STM32: edges of unknown kind
-  APP_BEST = 1,        ///< the streaming network, on the STM32
-  APP_BEST_GAP8 = 2,   ///< the same network on the GAP8; on the STM32 while that is silent
-  APP_PAPER_GAP8 = 3,  ///< the paper's network on the GAP8
+  APP_CFAR = 0,               ///< FR-CFAR alone, on the STM32: edges of unknown kind
+  APP_BEST = 1,               ///< the streaming network, on the STM32
+  APP_BEST_GAP8 = 2,          ///< the same network on the GAP8; on the STM32 while that is silent
+  APP_PAPER_GAP8 = 3,         ///< the paper's network on the GAP8
   APP_PAPER_STREAM_GAP8 = 4,  ///< the same as a stream, on the GAP8
 } appDetector_t;
 
@@ -42,17 +42,18 @@ typedef enum {
 
 /** appLog_t.health; 0 is good. */
 typedef enum {
-  APP_NON_FINITE = 1,     ///< a value was not finite within the last second
-  APP_LINK_DOWN = 2,      ///< the GAP8 does not answer
-  APP_LINK_FILLING = 4,   ///< it does, but has not seen a whole window yet
-  APP_MODEL_REFUSED = 8,  ///< it has another model
-  APP_PARAM_CLAMPED = 16, ///< a setting was out of range within the last second
-  APP_NO_GAP8 = 32,       ///< no AI-deck, or it is silent: another detector runs than the wanted one
-  APP_DROPPED = 64,       ///< the CPX queue was full within the last second
-  APP_LATE = 128,         ///< a step began late within the last second
-  APP_STALLED = 256,      ///< no step for 50 ms (set by whoever reads the log)
-  APP_NO_SENSOR = 512,    ///< the firmware lacks a log variable that the app needs
-  APP_NO_HORIZONTAL = 1024, ///< horizontal acceleration stood still for a second of flight: another estimator is needed
+  APP_NON_FINITE = 1,      ///< a value was not finite within the last second
+  APP_LINK_DOWN = 2,       ///< the GAP8 does not answer
+  APP_LINK_FILLING = 4,    ///< it does, but has not seen a whole window yet
+  APP_MODEL_REFUSED = 8,   ///< it has another model
+  APP_PARAM_CLAMPED = 16,  ///< a setting was out of range within the last second
+  APP_NO_GAP8 = 32,        ///< no AI-deck, or it is silent: another detector runs than the wanted one
+  APP_DROPPED = 64,        ///< the CPX queue was full within the last second
+  APP_LATE = 128,          ///< a step began late within the last second
+  APP_STALLED = 256,       ///< no step for 50 ms (set by whoever reads the log)
+  APP_NO_SENSOR = 512,     ///< the firmware lacks a log variable that the app needs
+  APP_NO_HORIZONTAL =
+      1024,  ///< horizontal acceleration stood still for a second of flight: another estimator is needed
   APP_OTHER_VEHICLE = 2048,  ///< the wanted network was trained for another vehicle: FR-CFAR runs alone
 } appHealth_t;
 
@@ -67,14 +68,14 @@ typedef struct {
   bool networksFit;  ///< the networks were trained for such a vehicle
   uint32_t nonce;
   uint16_t since[APP_EVENTS];  ///< steps since the last event of each kind
-  uint16_t sinceEdge;  ///< FR-CFAR alone: steps since its last edge
-  uint16_t still;      ///< steps of flight in which the horizontal acceleration has not changed
-  float horizontal[2]; ///< the last one, world axes, m/s^2
+  uint16_t sinceEdge;          ///< FR-CFAR alone: steps since its last edge
+  uint16_t still;              ///< steps of flight in which the horizontal acceleration has not changed
+  float horizontal[2];         ///< the last one, world axes, m/s^2
   bool wasAlert;
   bool noSensor;
-  bool reported;       ///< an edge, since the last step
-  uint32_t nonFinite;  ///< the pipeline's count
-  float probability;   ///< the paper's network's last one, NaN while it is silent
+  bool reported;                                    ///< an edge, since the last step
+  uint32_t nonFinite;                               ///< the pipeline's count
+  float probability;                                ///< the paper's network's last one, NaN while it is silent
   uint32_t airborneBits[(LINK_HISTORY + 31) / 32];  ///< whether the drone flew, sample by sample
   edgePipeline_t pipeline;
   streamDetector_t best;

@@ -13,16 +13,16 @@
 /** Of an appParams_t. */
 #define APP_PARAMS_DEFAULTS                                             \
   {                                                                     \
-    .enable = 1,                                                        \
-    .detector = APP_BEST,                                               \
-    .filter = APP_FILTER_AS_TRAINED,                                    \
-    .bandMid = 0.5f * (AIRTOUCH_BAND_LOW_HZ + AIRTOUCH_BAND_HIGH_HZ),   \
-    .bandWidth = AIRTOUCH_BAND_HIGH_HZ - AIRTOUCH_BAND_LOW_HZ,          \
-    .pFa = AIRTOUCH_P_FA,                                               \
-    .probabilityIn = AIRTOUCH_MODEL_PROBABILITY_ENTRY,                  \
-    .probabilityOut = AIRTOUCH_MODEL_PROBABILITY_EXIT,                  \
-    .scoreIn = AIRTOUCH_STREAM_ENTRY_SCORE,                             \
-    .scoreOut = AIRTOUCH_STREAM_EXIT_SCORE,                             \
-    .probabilityDwell = AIRTOUCH_MODEL_DWELL_SAMPLES,                   \
-    .alertHold = AIRTOUCH_MODEL_ALERT_HOLD,                             \
+      .enable = 1,                                                      \
+      .detector = APP_BEST,                                             \
+      .filter = APP_FILTER_AS_TRAINED,                                  \
+      .bandMid = 0.5f * (AIRTOUCH_BAND_LOW_HZ + AIRTOUCH_BAND_HIGH_HZ), \
+      .bandWidth = AIRTOUCH_BAND_HIGH_HZ - AIRTOUCH_BAND_LOW_HZ,        \
+      .pFa = AIRTOUCH_P_FA,                                             \
+      .probabilityIn = AIRTOUCH_MODEL_PROBABILITY_ENTRY,                \
+      .probabilityOut = AIRTOUCH_MODEL_PROBABILITY_EXIT,                \
+      .scoreIn = AIRTOUCH_STREAM_ENTRY_SCORE,                           \
+      .scoreOut = AIRTOUCH_STREAM_EXIT_SCORE,                           \
+      .probabilityDwell = AIRTOUCH_MODEL_DWELL_SAMPLES,                 \
+      .alertHold = AIRTOUCH_MODEL_ALERT_HOLD,                           \
   }

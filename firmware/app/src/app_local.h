@@ -9,13 +9,13 @@
 #include "link_sender.h"
 #include "stream_detector.h"
 
-#define APP_LOCAL_AFTER 25    ///< steps of silence until the network runs here
-#define APP_LOCAL_SAMPLES 8   ///< a step, at most, while it catches up: about 2 ms
+#define APP_LOCAL_AFTER 25   ///< steps of silence until the network runs here
+#define APP_LOCAL_SAMPLES 8  ///< a step, at most, while it catches up: about 2 ms
 
 /** Where it stands; plain values. */
 typedef struct {
-  uint32_t next;    ///< sequence of the next sample to use
-  uint32_t filled;  ///< samples used since it began
+  uint32_t next;     ///< sequence of the next sample to use
+  uint32_t filled;   ///< samples used since it began
   uint16_t missing;  ///< steps since the GAP8 last gave answers
   bool runs;
 } appLocal_t;

@@ -3,9 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-bool appUsesGap8(const appCore_t *core) {
-  return core->detector >= APP_BEST_GAP8;
-}
+bool appUsesGap8(const appCore_t *core) { return core->detector >= APP_BEST_GAP8; }
 
 void appHappened(appCore_t *core, appEvent_t event) { core->since[event] = 0; }
 
@@ -42,14 +40,10 @@ void appLogLink(appCore_t *core) {
 
 static uint16_t linkHealth(const appCore_t *core) {
   switch (core->link.state) {
-    case LINK_UP:
-      return 0;
-    case LINK_FILLING:
-      return APP_LINK_FILLING;
-    case LINK_REFUSED:
-      return APP_MODEL_REFUSED;
-    default:
-      return APP_LINK_DOWN;
+    case LINK_UP: return 0;
+    case LINK_FILLING: return APP_LINK_FILLING;
+    case LINK_REFUSED: return APP_MODEL_REFUSED;
+    default: return APP_LINK_DOWN;
   }
 }
 

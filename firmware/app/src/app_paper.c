@@ -28,12 +28,9 @@ const appPaper_t *appPaperOf(uint8_t detector) {
       .algorithm = EDGE_LINK_PAPER_STREAM,
   };
   switch (detector) {
-    case APP_PAPER_GAP8:
-      return &paper;
-    case APP_PAPER_STREAM_GAP8:
-      return &paperStream;
-    default:
-      return NULL;
+    case APP_PAPER_GAP8: return &paper;
+    case APP_PAPER_STREAM_GAP8: return &paperStream;
+    default: return NULL;
   }
 }
 

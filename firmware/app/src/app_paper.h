@@ -10,14 +10,14 @@
 
 /** One of the two. */
 typedef struct {
-  const char *sha256;      ///< of the model
-  float outputScale;       ///< of its two logits; the probability is their softmax
-  float probabilityIn;     ///< as it was tuned, like the three below
+  const char *sha256;   ///< of the model
+  float outputScale;    ///< of its two logits; the probability is their softmax
+  float probabilityIn;  ///< as it was tuned, like the three below
   float probabilityOut;
   uint16_t probabilityDwell;
   uint16_t alertHold;
-  uint16_t refill;         ///< samples of the past that the network needs before it answers
-  uint8_t algorithm;       ///< an edgeLinkAlgorithm_t
+  uint16_t refill;    ///< samples of the past that the network needs before it answers
+  uint8_t algorithm;  ///< an edgeLinkAlgorithm_t
 } appPaper_t;
 
 /** @return what belongs to a detector (an appDetector_t), NULL where it is none of the two */

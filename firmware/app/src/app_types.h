@@ -18,18 +18,18 @@ typedef struct {
 
 /** Settings that may change in flight; the PARAM group `airtouch`. */
 typedef struct {
-  uint8_t enable;        ///< 0: nothing is computed, nothing is sent
-  uint8_t detector;      ///< appDetector_t
-  uint8_t filter;        ///< appFilter_t
-  float bandMid;         ///< Hz, FC-FE: middle of the band
-  float bandWidth;       ///< Hz, both edges included
-  float pFa;             ///< FR-CFAR: probability of false alarm
-  float probabilityIn;   ///< `paper`: over a platform from here up
-  float probabilityOut;  ///< `paper`: off it from here down
-  float scoreIn;         ///< `best`: an entry fires above this logit
-  float scoreOut;        ///< `best`: an exit fires above this logit
+  uint8_t enable;             ///< 0: nothing is computed, nothing is sent
+  uint8_t detector;           ///< appDetector_t
+  uint8_t filter;             ///< appFilter_t
+  float bandMid;              ///< Hz, FC-FE: middle of the band
+  float bandWidth;            ///< Hz, both edges included
+  float pFa;                  ///< FR-CFAR: probability of false alarm
+  float probabilityIn;        ///< `paper`: over a platform from here up
+  float probabilityOut;       ///< `paper`: off it from here down
+  float scoreIn;              ///< `best`: an entry fires above this logit
+  float scoreOut;             ///< `best`: an exit fires above this logit
   uint16_t probabilityDwell;  ///< `paper`: at least so many steps between two edges
-  uint16_t alertHold;    ///< filter: an FR-CFAR alert vouches for the edges of so many steps
+  uint16_t alertHold;         ///< filter: an FR-CFAR alert vouches for the edges of so many steps
 } appParams_t;
 
 /** What the app says; the LOG group `airtouch`. */

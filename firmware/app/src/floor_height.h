@@ -10,23 +10,23 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define FLOOR_STEP_M 0.06f      ///< least jump of a reading that is the floor's; slower is a ramp, which is followed
-#define FLOOR_TILT_SHARE 0.5f   ///< of the range times (1 - cosine of the tilt), by which that grows
-#define FLOOR_TILT_COSINE 0.87f ///< tilted more than 30 degrees no step is learnt
-#define FLOOR_GAP_MS 150u       ///< after a longer gap a reading is compared with the height instead
-#define FLOOR_TRUST_M 0.15f     ///< and the floor kept where it explains it so closely
-#define FLOOR_HOME_M 0.08f      ///< the first floor again; what is left of the sum of steps fades
+#define FLOOR_STEP_M 0.06f       ///< least jump of a reading that is the floor's; slower is a ramp, which is followed
+#define FLOOR_TILT_SHARE 0.5f    ///< of the range times (1 - cosine of the tilt), by which that grows
+#define FLOOR_TILT_COSINE 0.87f  ///< tilted more than 30 degrees no step is learnt
+#define FLOOR_GAP_MS 150u        ///< after a longer gap a reading is compared with the height instead
+#define FLOOR_TRUST_M 0.15f      ///< and the floor kept where it explains it so closely
+#define FLOOR_HOME_M 0.08f       ///< the first floor again; what is left of the sum of steps fades
 #define FLOOR_FADE_MPS 0.05f
-#define FLOOR_MOST_M 2.5f       ///< beyond it nothing is believed
+#define FLOOR_MOST_M 2.5f           ///< beyond it nothing is believed
 #define FLOOR_FLOW_NEAREST_M 0.08f  ///< the flow sensor's picture scales no further
 
 /** All zero at the start, and while the drone does not fly. */
 typedef struct {
-  float floor;      ///< m, of what is below over where it took off
-  float range;      ///< m, last reading, plumb
-  uint32_t time;    ///< ms, of that
-  uint16_t steps;   ///< of the floor so far
-  bool known;       ///< there was a reading
+  float floor;     ///< m, of what is below over where it took off
+  float range;     ///< m, last reading, plumb
+  uint32_t time;   ///< ms, of that
+  uint16_t steps;  ///< of the floor so far
+  bool known;      ///< there was a reading
 } floorHeight_t;
 
 /**

@@ -12,13 +12,14 @@
 
 #include "floor_height.h"
 
-#define HALF_CONE 0.1308997f     // rad, of the range sensor: mm_tof.c takes so much off the tilt
+#define HALF_CONE 0.1308997f       // rad, of the range sensor: mm_tof.c takes so much off the tilt
 #define COUNTS_PER_RADIAN 488.32f  // 10 counts a pixel, 35 pixels over 0.71674 rad: mm_flow.c
 #define RADIANS_PER_DEGREE 0.01745329252f
 
 enum { HEIGHT, CLIMB, QX, QY, RATE_X, RATE_Y, VARIABLES };
-static const char *const names[VARIABLES][2] = {{"stateEstimate", "z"},  {"stateEstimate", "vz"}, {"stateEstimate", "qx"},
-                                                {"stateEstimate", "qy"}, {"gyro", "x"},           {"gyro", "y"}};
+static const char *const names[VARIABLES][2] = {{"stateEstimate", "z"},  {"stateEstimate", "vz"},
+                                                {"stateEstimate", "qx"}, {"stateEstimate", "qy"},
+                                                {"gyro", "x"},           {"gyro", "y"}};
 static logVarId_t ids[VARIABLES];
 static bool found;
 static uint8_t enable;

@@ -46,8 +46,8 @@ typedef struct {
 
 /** The last features, and what the network of `paper` needs for a window of them. */
 typedef struct {
-  const int8_t *logits;  ///< of the last run, in the arena
-  float ring[GAP8_VALUES];  ///< rows of features, the oldest at `oldest`
+  const int8_t *logits;       ///< of the last run, in the arena
+  float ring[GAP8_VALUES];    ///< rows of features, the oldest at `oldest`
   float window[GAP8_VALUES];  ///< normalised
   float column[AIRTOUCH_MODEL_COLUMNS][AIRTOUCH_MODEL_ROWS];
   int32_t oldest;

@@ -5,8 +5,7 @@
 #include "band_power.h"
 
 static int inRange(int32_t window, int32_t hop, int32_t channels) {
-  return window > 0 && window <= UINT16_MAX && hop > 0 && hop <= UINT16_MAX && channels > 0 &&
-         channels <= UINT16_MAX;
+  return window > 0 && window <= UINT16_MAX && hop > 0 && hop <= UINT16_MAX && channels > 0 && channels <= UINT16_MAX;
 }
 
 int64_t bandPowerStateSize(void) { return (int64_t)sizeof(bandPower_t); }
@@ -20,12 +19,12 @@ int64_t bandPowerWork(float sampleRateHz, int32_t window, float lowHz, float hig
 }
 
 int64_t bandPowerBatch(const float *x, int64_t samples, int32_t channels, float sampleRateHz, int32_t window,
-                       float lowHz, float highHz, int32_t hop, void *state, float *work, int64_t floats,
-                       int32_t reset, float *power) {
+                       float lowHz, float highHz, int32_t hop, void *state, float *work, int64_t floats, int32_t reset,
+                       float *power) {
   bandPower_t *bank = state;
-  if (reset && (!inRange(window, hop, channels) ||
-                !bandPowerInit(bank, sampleRateHz, (uint16_t)window, lowHz, highHz, (uint16_t)hop,
-                               (uint16_t)channels, work, (size_t)floats))) {
+  if (reset &&
+      (!inRange(window, hop, channels) || !bandPowerInit(bank, sampleRateHz, (uint16_t)window, lowHz, highHz,
+                                                         (uint16_t)hop, (uint16_t)channels, work, (size_t)floats))) {
     return -1;
   }
   int64_t rows = 0;

@@ -9,9 +9,7 @@
 
 enum { SHAPE_COLUMNS = 12 };
 
-static int32_t inputs(const int32_t *shape) {
-  return shape[1] * shape[2] * shape[3];
-}
+static int32_t inputs(const int32_t *shape) { return shape[1] * shape[2] * shape[3]; }
 
 // Weights of a layer that keeps all of them; 0 for a pool. `multiple`: what a filter is filled up to.
 static int32_t weights(const int32_t *shape, int32_t multiple) {
@@ -28,12 +26,22 @@ int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
   }
   for (int32_t i = 0; i < flat->layerCount; i++) {
     const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
-    layers[i] = (layerInt8_t){.kind = s[0], .inRows = s[1], .inColumns = s[2], .inChannels = s[3],
-                              .outRows = s[4], .outColumns = s[5], .outChannels = s[6],
-                              .kernelRows = s[7], .kernelColumns = s[8], .outputZeroPoint = s[9],
-                              .outputMin = s[10], .outputMax = s[11],
-                              .weights = flat->weights + weight, .bias = flat->bias + channel,
-                              .multiplier = flat->multiplier + channel, .shift = flat->shift + channel,
+    layers[i] = (layerInt8_t){.kind = s[0],
+                              .inRows = s[1],
+                              .inColumns = s[2],
+                              .inChannels = s[3],
+                              .outRows = s[4],
+                              .outColumns = s[5],
+                              .outChannels = s[6],
+                              .kernelRows = s[7],
+                              .kernelColumns = s[8],
+                              .outputZeroPoint = s[9],
+                              .outputMin = s[10],
+                              .outputMax = s[11],
+                              .weights = flat->weights + weight,
+                              .bias = flat->bias + channel,
+                              .multiplier = flat->multiplier + channel,
+                              .shift = flat->shift + channel,
                               .blockCounts = flat->blockCounts + sparseChannel,
                               .blockSkips = flat->blockSkips + block};
     if (s[0] != LAYER_MAX_POOL) {
@@ -69,8 +77,10 @@ int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
 // The network with pointers into the flat arrays; -1, or the first layer that does not fit.
 static int32_t unpackInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers, networkInt8_t *network) {
   const int32_t wrong = unpackLayersInt8(flat, layers);
-  *network = (networkInt8_t){.layers = layers, .layerCount = flat->layerCount,
-                             .inputScale = flat->inputScale, .inputZeroPoint = flat->inputZeroPoint};
+  *network = (networkInt8_t){.layers = layers,
+                             .layerCount = flat->layerCount,
+                             .inputScale = flat->inputScale,
+                             .inputZeroPoint = flat->inputZeroPoint};
   return wrong >= 0 ? wrong : networkInt8Check(network);
 }
 
@@ -79,10 +89,18 @@ static void unpackFloat(const flatNetworkFloat_t *flat, layerFloat_t *layers, ne
   const float *bias = flat->bias;
   for (int32_t i = 0; i < flat->layerCount; i++) {
     const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
-    layers[i] = (layerFloat_t){.kind = s[0], .inRows = s[1], .inColumns = s[2], .inChannels = s[3],
-                               .outRows = s[4], .outColumns = s[5], .outChannels = s[6],
-                               .kernelRows = s[7], .kernelColumns = s[8], .relu = s[9],
-                               .weights = weight, .bias = bias};
+    layers[i] = (layerFloat_t){.kind = s[0],
+                               .inRows = s[1],
+                               .inColumns = s[2],
+                               .inChannels = s[3],
+                               .outRows = s[4],
+                               .outColumns = s[5],
+                               .outChannels = s[6],
+                               .kernelRows = s[7],
+                               .kernelColumns = s[8],
+                               .relu = s[9],
+                               .weights = weight,
+                               .bias = bias};
     weight += weights(s, 1);
     bias += s[0] == LAYER_MAX_POOL ? 0 : s[6];
   }
@@ -115,8 +133,8 @@ int32_t networkFloatBatchArena(const flatNetworkFloat_t *flat) {
   return networkFloatArenaSize(&network);
 }
 
-void networkInt8Batch(const flatNetworkInt8_t *flat, const int8_t *rows, int32_t count,
-                      int8_t *arena, int8_t *outputs) {
+void networkInt8Batch(const flatNetworkInt8_t *flat, const int8_t *rows, int32_t count, int8_t *arena,
+                      int8_t *outputs) {
   layerInt8_t layers[MAX_LAYERS];
   networkInt8_t network;
   if (unpackInt8(flat, layers, &network) >= 0) {
@@ -133,8 +151,7 @@ void networkInt8Batch(const flatNetworkInt8_t *flat, const int8_t *rows, int32_t
   }
 }
 
-void networkFloatBatch(const flatNetworkFloat_t *flat, const float *rows, int32_t count,
-                       float *arena, float *outputs) {
+void networkFloatBatch(const flatNetworkFloat_t *flat, const float *rows, int32_t count, float *arena, float *outputs) {
   layerFloat_t layers[MAX_LAYERS];
   networkFloat_t network;
   unpackFloat(flat, layers, &network);
@@ -154,9 +171,8 @@ void networkInt8BatchQuantise(const flatNetworkInt8_t *flat, const float *x, int
   networkInt8Quantise(&network, x, count, q);
 }
 
-void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int32_t samples,
-                       int32_t columns, int32_t rows, float *window, int8_t *quantised,
-                       int8_t *arena, int8_t *outputs, uint8_t *valid) {
+void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int32_t samples, int32_t columns,
+                       int32_t rows, float *window, int8_t *quantised, int8_t *arena, int8_t *outputs, uint8_t *valid) {
   layerInt8_t layers[MAX_LAYERS];
   networkInt8_t network;
   if (unpackInt8(flat, layers, &network) >= 0) {

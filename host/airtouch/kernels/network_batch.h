@@ -39,10 +39,10 @@ int32_t networkInt8BatchArena(const flatNetworkInt8_t *flat);
 int32_t networkFloatBatchArena(const flatNetworkFloat_t *flat);
 
 // inputs: count rows of quantised input; outputs: count rows of the last layer's output.
-void networkInt8Batch(const flatNetworkInt8_t *flat, const int8_t *inputs, int32_t count,
-                      int8_t *arena, int8_t *outputs);
-void networkFloatBatch(const flatNetworkFloat_t *flat, const float *inputs, int32_t count,
-                       float *arena, float *outputs);
+void networkInt8Batch(const flatNetworkInt8_t *flat, const int8_t *inputs, int32_t count, int8_t *arena,
+                      int8_t *outputs);
+void networkFloatBatch(const flatNetworkFloat_t *flat, const float *inputs, int32_t count, float *arena,
+                       float *outputs);
 
 // Quantise count values of input.
 void networkInt8BatchQuantise(const flatNetworkInt8_t *flat, const float *x, int32_t count, int8_t *q);
@@ -50,6 +50,5 @@ void networkInt8BatchQuantise(const flatNetworkInt8_t *flat, const float *x, int
 // A flight: at each sample the window that ends there, normalised and quantised, through the
 // network. features: samples x columns. window: rows * columns floats, quantised: as many bytes, both
 // scratch. valid[i] is 0 and outputs[i] untouched where the window is not full or not finite.
-void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int32_t samples,
-                       int32_t columns, int32_t rows, float *window, int8_t *quantised,
-                       int8_t *arena, int8_t *outputs, uint8_t *valid);
+void networkInt8Flight(const flatNetworkInt8_t *flat, const float *features, int32_t samples, int32_t columns,
+                       int32_t rows, float *window, int8_t *quantised, int8_t *arena, int8_t *outputs, uint8_t *valid);

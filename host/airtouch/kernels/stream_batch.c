@@ -11,11 +11,14 @@ int32_t unpackStream(const flatStreamInt8_t *flat, unpackedStream_t *to) {
     return wrong >= 0 ? wrong : 0;
   }
   for (int32_t i = 0; i < convs; i++) {
-    to->convs[i] = (streamConv_t){.layer = to->layers[i], .dilation = flat->dilations[i],
-                                  .zeroPoint = flat->zeroPoints[i]};
+    to->convs[i] =
+        (streamConv_t){.layer = to->layers[i], .dilation = flat->dilations[i], .zeroPoint = flat->zeroPoints[i]};
   }
-  to->network = (streamInt8_t){.convs = to->convs, .convCount = convs, .stride = flat->stride,
-                               .firstSkip = flat->firstSkip, .head = &to->layers[convs]};
+  to->network = (streamInt8_t){.convs = to->convs,
+                               .convCount = convs,
+                               .stride = flat->stride,
+                               .firstSkip = flat->firstSkip,
+                               .head = &to->layers[convs]};
   return streamInt8Check(&to->network);
 }
 
@@ -25,8 +28,8 @@ int32_t streamInt8BatchArena(const flatStreamInt8_t *flat) {
   return wrong < 0 ? streamInt8ArenaBytes(&to.network) : -1 - wrong;
 }
 
-void streamInt8Flight(const flatStreamInt8_t *flat, const int8_t *inputs, int32_t samples,
-                      int8_t *arena, int8_t *outputs) {
+void streamInt8Flight(const flatStreamInt8_t *flat, const int8_t *inputs, int32_t samples, int8_t *arena,
+                      int8_t *outputs) {
   unpackedStream_t to;
   streamState_t state;
   if (unpackStream(flat, &to) >= 0) {

@@ -18,5 +18,5 @@ int32_t streamInt8BatchArena(const flatStreamInt8_t *flat);
 
 // A flight: samples rows of quantised input; outputs: one row of the head for every stride-th sample,
 // the first one included. Starts from a past of zeros.
-void streamInt8Flight(const flatStreamInt8_t *flat, const int8_t *inputs, int32_t samples,
-                      int8_t *arena, int8_t *outputs);
+void streamInt8Flight(const flatStreamInt8_t *flat, const int8_t *inputs, int32_t samples, int8_t *arena,
+                      int8_t *outputs);

@@ -13,5 +13,5 @@ void edgeDecoderBatch(const float *logits, const uint8_t *airborne, int64_t step
 /** One event a sample. arena: streamInt8BatchArena(network) bytes. Returns 0 for a network that does not fit. */
 int32_t streamDetectorFlight(const float *acc, const float *gyro, const float *pwm, int64_t samples,
                              const motionConfig_t *motion, const flatStreamInt8_t *network,
-                             const streamQuantisation_t *quantisation, const decoderConfig_t *decoder,
-                             int8_t *arena, streamEvent_t *events);
+                             const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena,
+                             streamEvent_t *events);

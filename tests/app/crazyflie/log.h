@@ -20,7 +20,14 @@ logVarId_t logGetVarId(const char *group, const char *name);
 static inline bool logVarIdIsValid(logVarId_t id) { return id != 0xffffu; }
 float logGetFloat(logVarId_t id);
 
-#define LOG_GROUP_START(NAME) static const char *const logGroup = #NAME; static const variableEntry_t logs[] = {
+#define LOG_GROUP_START(NAME)                \
+  static const char *const logGroup = #NAME; \
+  static const variableEntry_t logs[] = {
 #define LOG_ADD(TYPE, NAME, ADDRESS) {TYPE, #NAME, (void *)(ADDRESS)},
 #define LOG_ADD_BY_FUNCTION(TYPE, NAME, ADDRESS) {TYPE | LOG_BY_FUNCTION, #NAME, (void *)(ADDRESS)},
-#define LOG_GROUP_STOP(NAME) {0, NULL, NULL}};
+#define LOG_GROUP_STOP(NAME) \
+  {                          \
+    0, NULL, NULL            \
+  }                          \
+  }                          \
+  ;

@@ -14,6 +14,13 @@ enum { PARAM_FLOAT = 6, PARAM_UINT8 = 8, PARAM_UINT16 = 9, PARAM_UINT32 = 10 };
 paramVarId_t paramGetVarId(const char *group, const char *name);
 unsigned int paramGetUint(paramVarId_t varId);
 
-#define PARAM_GROUP_START(NAME) static const char *const paramGroup = #NAME; static const variableEntry_t params[] = {
+#define PARAM_GROUP_START(NAME)                \
+  static const char *const paramGroup = #NAME; \
+  static const variableEntry_t params[] = {
 #define PARAM_ADD(TYPE, NAME, ADDRESS) {TYPE, #NAME, (void *)(ADDRESS)},
-#define PARAM_GROUP_STOP(NAME) {0, NULL, NULL}};
+#define PARAM_GROUP_STOP(NAME) \
+  {                            \
+    0, NULL, NULL              \
+  }                            \
+  }                            \
+  ;

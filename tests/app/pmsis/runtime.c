@@ -2,7 +2,8 @@
 // Usage: app [FAULT...]; faults: clock (the cluster's above 50 MHz), controller (its clock), open, task, later (tasks
 // after the first). Reads records of 1 byte source, 2 bytes length and the bytes: a packet, or with source 0 half a
 // second. Writes a record of 1 byte function, 2 bytes length and the bytes for each packet that the app sends, and an
-// empty one of function 0 after each half second. Ends with the input. The cluster's eight cores are threads; a task that is told to wait waits for its record.
+// empty one of function 0 after each half second. Ends with the input. The cluster's eight cores are threads; a task
+// that is told to wait waits for its record.
 #include "pmsis.h"
 
 #include <pthread.h>

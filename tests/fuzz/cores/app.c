@@ -53,10 +53,10 @@ static void hover(appSample_t *sample) {
 static void takeSample(bytes_t *bytes, appSample_t *sample) {
   hover(sample);
   for (uint8_t i = takeByte(bytes); i < 64; i = (uint8_t)(i + 1 + takeByte(bytes) % 64)) {
-    float *const value[16] = {sample->acc, sample->acc + 1, sample->acc + 2, sample->gyro, sample->gyro + 1,
-                              sample->gyro + 2, sample->pwm, sample->pwm + 1, sample->pwm + 2, sample->pwm + 3,
-                              &sample->vbat, sample->attitude, sample->attitude + 1, sample->attitude + 2,
-                              sample->attitude + 3, sample->acc};
+    float *const value[16] = {sample->acc,          sample->acc + 1,      sample->acc + 2,      sample->gyro,
+                              sample->gyro + 1,     sample->gyro + 2,     sample->pwm,          sample->pwm + 1,
+                              sample->pwm + 2,      sample->pwm + 3,      &sample->vbat,        sample->attitude,
+                              sample->attitude + 1, sample->attitude + 2, sample->attitude + 3, sample->acc};
     const float usual[16] = {10, 10, 10, 3, 3, 3, 2e4f, 2e4f, 2e4f, 2e4f, 4, 0.5f, 0.5f, 0.5f, 0.5f, 1e3f};
     *value[i % 16] = takeFloat(bytes, usual[i % 16]);
   }
@@ -68,21 +68,26 @@ static bool numberOrNan(float x) { return !isinf(x); }
 static void checkLog(void) {
   const appLog_t *log = &core->log;
   for (int i = 0; i < 3; i++) {
-    CHECK(isnan(log->feature[i]) || (isfinite(log->feature[i]) && log->feature[i] >= 0.0f), "a feature is a number from 0 up");
+    CHECK(isnan(log->feature[i]) || (isfinite(log->feature[i]) && log->feature[i] >= 0.0f),
+          "a feature is a number from 0 up");
     CHECK(isfinite(log->force[i]) && isfinite(log->logit[i]), "force and logits are numbers");
   }
   CHECK(isfinite(log->cfarPower) && log->cfarPower >= 0.0f, "the cell under test is a number from 0 up");
   CHECK(numberOrNan(log->threshold) && !(log->threshold < 0.0f), "a threshold is a number from 0 up, or NaN");
-  CHECK(isnan(log->probability) || (log->probability >= 0.0f && log->probability <= 1.0f), "a probability is one, or NaN");
-  CHECK(log->edge <= 3 && log->alert <= 1 && log->over <= 1 && log->detector <= APP_PAPER_STREAM_GAP8 && log->link <= LINK_REFUSED,
+  CHECK(isnan(log->probability) || (log->probability >= 0.0f && log->probability <= 1.0f),
+        "a probability is one, or NaN");
+  CHECK(log->edge <= 3 && log->alert <= 1 && log->over <= 1 && log->detector <= APP_PAPER_STREAM_GAP8 &&
+            log->link <= LINK_REFUSED,
         "codes are those that there are");
-  CHECK(log->health < 2 * APP_OTHER_VEHICLE && log->edgeSample <= log->samples && log->load <= log->loadMax, "health and times fit");
+  CHECK(log->health < 2 * APP_OTHER_VEHICLE && log->edgeSample <= log->samples && log->load <= log->loadMax,
+        "health and times fit");
 }
 
 static void checkGrowth(const appLog_t *before) {
   const appLog_t *log = &core->log;
   CHECK(log->nonFinite >= before->nonFinite && log->dropped >= before->dropped && log->lost >= before->lost &&
-            log->timeouts >= before->timeouts && log->gap8Resets >= before->gap8Resets && log->answers >= before->answers,
+            log->timeouts >= before->timeouts && log->gap8Resets >= before->gap8Resets &&
+            log->answers >= before->answers,
         "counters only grow");
   CHECK((uint16_t)(log->edges - before->edges) < 100 && (uint16_t)(log->paramErrors - before->paramErrors) < 100,
         "counters that wrap only grow");
@@ -120,7 +125,8 @@ static void doStep(const appSample_t *sample) {
   steps++;
   checkLog();
   checkGrowth(&before);
-  CHECK(core->log.samples == before.samples + 1 && core->log.nonFinite - before.nonFinite <= 10, "a step counts as one");
+  CHECK(core->log.samples == before.samples + 1 && core->log.nonFinite - before.nonFinite <= 10,
+        "a step counts as one");
   CHECK(reported || core->log.edges == before.edges, "an edge of this step is reported at it");
   exchange();
   if (steps % 50 == 0 && gap8Lives) {
@@ -181,9 +187,7 @@ static void doOne(bytes_t *bytes) {
       receive(packed, forge(bytes, what < 200 ? EDGE_LINK_RESULT - 1 : what, core->link.session, core->link.samples,
                             core->link.digest, packed));
       break;
-    case 6:
-      changeParams(bytes);
-      break;
+    case 6: changeParams(bytes); break;
     default:
       gap8Lives = what & 8;
       transportTakes = what & 16 || what & 32;
@@ -229,7 +233,8 @@ static void flyQuietly(uint8_t detector, bool live) {
     good = i % LONGEST_STRIDE < LONGEST_STRIDE - 1 ? good : (works(detector, answers) ? good + 1 : 0);
     CHECK(i < QUIET, "in a quiet flight the chosen detector works again");
   }
-  CHECK(core->log.nonFinite == before.nonFinite && core->log.paramErrors == before.paramErrors, "nothing was put right");
+  CHECK(core->log.nonFinite == before.nonFinite && core->log.paramErrors == before.paramErrors,
+        "nothing was put right");
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

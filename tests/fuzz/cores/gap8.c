@@ -1,6 +1,6 @@
-// gap8_core.h: everything that the GAP8 app does, with the shipped networks. Raw bytes and packets with a right CRC that
-// say anything; samples of any bytes, NaN and infinite features too. Promised: every reply is a packet, and the newest
-// answer is what the kernels say of the last window of samples, run without a link.
+// gap8_core.h: everything that the GAP8 app does, with the shipped networks. Raw bytes and packets with a right CRC
+// that say anything; samples of any bytes, NaN and infinite features too. Promised: every reply is a packet, and the
+// newest answer is what the kernels say of the last window of samples, run without a link.
 #include "feature_window.h"
 #include "forge.h"
 #include "gap8_core.h"
@@ -69,7 +69,8 @@ static bool paperStreamSays(uint32_t sequence, int8_t *output) {
   static _Alignas(4) int8_t arena[AIRTOUCH_ROLLING_ARENA_BYTES];
   rollingInt8_t rolling;
   rollingInt8Init(&rolling, &airtouchRolling, AIRTOUCH_ROLLING_STRIDE, arena);
-  const uint32_t span = (uint32_t)(rolling.receptive + rolling.stride - 1) / (uint32_t)rolling.stride * (uint32_t)rolling.stride;
+  const uint32_t span =
+      (uint32_t)(rolling.receptive + rolling.stride - 1) / (uint32_t)rolling.stride * (uint32_t)rolling.stride;
   for (uint32_t i = 0; i < span; i++) {
     uint8_t sample[EDGE_LINK_SAMPLE_BYTES];
     float x[AIRTOUCH_ROLLING_COLUMNS];
@@ -112,7 +113,8 @@ static void deliver(const uint8_t *packet, uint16_t length) {
   uint8_t *reply = rubbish(EDGE_LINK_MAX_BYTES, 0x5a);
   const uint32_t refused = core->receiver.refused, taken = core->receiver.taken;
   const uint16_t size = gap8CoreTake(core, exact, length, reply);
-  CHECK(size == 0 ? core->receiver.refused == refused + 1 : inTable(reply, size), "a packet is refused, or answered by one");
+  CHECK(size == 0 ? core->receiver.refused == refused + 1 : inTable(reply, size),
+        "a packet is refused, or answered by one");
   CHECK(core->receiver.taken - taken <= EDGE_LINK_SAMPLES, "a packet costs seven runs of a network at most");
   free(reply);
   free(exact);
@@ -139,13 +141,14 @@ static void doOne(bytes_t *bytes) {
       deliver(packed, withSamples(packed, length, sampleOf));
       break;
     case 3:
-      length = packReset(takeByte(bytes), what, core->networks[what / 8 % 3].algorithm, digests[what / 8 % 4 % 3], packed);
+      length =
+          packReset(takeByte(bytes), what, core->networks[what / 8 % 3].algorithm, digests[what / 8 % 4 % 3], packed);
       deliver(packed, length);
       break;
     default:  // a run of samples as the sender would send them
       for (int i = what / 8; i >= 0 && core->receiver.taken < most; i--) {
-        deliver(packed, packSamples(receiver->session, receiver->expected, 7, receiver->empty ? 0 : takeByte(bytes) / 128,
-                                    sampleOf, packed));
+        deliver(packed, packSamples(receiver->session, receiver->expected, 7,
+                                    receiver->empty ? 0 : takeByte(bytes) / 128, sampleOf, packed));
       }
       break;
   }

@@ -74,8 +74,9 @@ static void scale(bytes_t *bytes) {
     const double value = feature[i] > least ? fmin(feature[i], 3e38) : least;
     const double right = (log2(value) - settings.mean[i]) * settings.inverseDeviation[i];
     const double limited = fmax(-FIXED_SCALE_LIMIT, fmin(right, FIXED_SCALE_LIMIT));
-    const double allowed = (3e-7 + FLT_EPSILON * (fabs(log2(value)) + fabs(settings.mean[i]))) *
-                               fabs(settings.inverseDeviation[i]) + FLT_EPSILON * FIXED_SCALE_LIMIT;
+    const double allowed =
+        (3e-7 + FLT_EPSILON * (fabs(log2(value)) + fabs(settings.mean[i]))) * fabs(settings.inverseDeviation[i]) +
+        FLT_EPSILON * FIXED_SCALE_LIMIT;
     CHECK(fabs(x[i] - limited) <= allowed, "an input is the feature's logarithm, scaled and clamped");
   }
 }

@@ -10,9 +10,9 @@
 
 typedef struct {
   edgeDecoder_t *decoder;
-  uint8_t last;        // kind reported last in this flight
-  uint32_t airborne;   // steps in the air
-  uint32_t reports;    // in this flight
+  uint8_t last;       // kind reported last in this flight
+  uint32_t airborne;  // steps in the air
+  uint32_t reports;   // in this flight
 } flight_t;
 
 static uint8_t step(flight_t *flight, const float logits[3], bool airborne) {
@@ -62,7 +62,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   bytes_t bytes = {data, size};
   const uint8_t kind = takeByte(&bytes);
   const decoderConfig_t config = takeConfig(&bytes, kind);
-  flight_t flight = {.decoder = rubbish(sizeof(edgeDecoder_t), 0xff)}, fresh = {.decoder = rubbish(sizeof(edgeDecoder_t), 0)};
+  flight_t flight = {.decoder = rubbish(sizeof(edgeDecoder_t), 0xff)},
+           fresh = {.decoder = rubbish(sizeof(edgeDecoder_t), 0)};
   uint32_t seed = kind;
   bool landed = false;
   edgeDecoderInit(flight.decoder, &config);

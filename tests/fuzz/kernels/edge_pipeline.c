@@ -50,10 +50,11 @@ static void quiet(edgeSample_t *sample, uint32_t *seed) {
 
 static void odd(bytes_t *bytes, edgeSample_t *sample, uint32_t *seed) {
   quiet(sample, seed);
-  float *const value[16] = {sample->acc, sample->acc + 1, sample->acc + 2, sample->gyro, sample->gyro + 1,
-                            sample->gyro + 2, sample->pwm, sample->pwm + 1, sample->pwm + 2, sample->pwm + 3,
-                            &sample->vbat, sample->thrustAxis, sample->thrustAxis + 1, sample->thrustAxis + 2,
-                            &sample->probability, &sample->probability};
+  float *const value[16] = {
+      sample->acc,         sample->acc + 1,    sample->acc + 2,        sample->gyro,           sample->gyro + 1,
+      sample->gyro + 2,    sample->pwm,        sample->pwm + 1,        sample->pwm + 2,        sample->pwm + 3,
+      &sample->vbat,       sample->thrustAxis, sample->thrustAxis + 1, sample->thrustAxis + 2, &sample->probability,
+      &sample->probability};
   for (uint8_t i = takeByte(bytes) % 32; i < 16; i = (uint8_t)(i + 1 + takeByte(bytes) % 16)) {
     *value[i] = takeFloat(bytes, i < 6 ? 10.0f : (i < 10 ? 3e4f : 0.5f));
   }
@@ -79,10 +80,12 @@ static void checkEvent(const edgePipelineConfig_t *config, const edgeEvent_t *ev
   CHECK(event->edge == EDGE_NONE || event->armed, "no edge before the drone is armed");
   CHECK(event->edge == EDGE_NONE || !config->physicalFilter || event->alertRecent, "an edge has its alert");
   for (int i = 0; i < EDGE_PIPELINE_CHANNELS; i++) {
-    CHECK(isnan(event->bandPower[i]) || (isfinite(event->bandPower[i]) && event->bandPower[i] >= 0.0f), "a power is a number");
+    CHECK(isnan(event->bandPower[i]) || (isfinite(event->bandPower[i]) && event->bandPower[i] >= 0.0f),
+          "a power is a number");
   }
   for (int i = 0; i < EDGE_PIPELINE_SENSORS; i++) {
-    CHECK(isnan(event->features[i]) == isnan(event->bandPower[3 * i]) && !isinf(event->features[i]), "a feature is a number");
+    CHECK(isnan(event->features[i]) == isnan(event->bandPower[3 * i]) && !isinf(event->features[i]),
+          "a feature is a number");
   }
 }
 
@@ -128,7 +131,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   const edgePipelineConfig_t config = takeConfig(&bytes, kind);
   edgePipeline_t *pipeline[2] = {rubbish(sizeof **pipeline, 0xff), rubbish(sizeof **pipeline, 0)};
   const bool ready = edgePipelineInit(pipeline[0], &config);
-  CHECK(edgePipelineInit(pipeline[1], &config) == ready && (ready || kind & 1), "settings are accepted where they are right");
+  CHECK(edgePipelineInit(pipeline[1], &config) == ready && (ready || kind & 1),
+        "settings are accepted where they are right");
   uint32_t seed = kind;
   const int most = oneIn(4, data, size) ? MANY_SAMPLES : FEW_SAMPLES;
   for (int count = 0; ready && (count == 0 || (count < most && bytes.left > 0));) {

@@ -9,7 +9,8 @@
 #define STREAM 200
 
 static float takeFeature(bytes_t *bytes, uint8_t kind, uint32_t *seed) {
-  return kind & 1 ? takeFloat(bytes, 3.0f) : (kind & 2 ? 1e6f : 1.0f) * (1.0f + noise(seed) * (kind & 4 ? 1e-6f : 1.0f));
+  return kind & 1 ? takeFloat(bytes, 3.0f)
+                  : (kind & 2 ? 1e6f : 1.0f) * (1.0f + noise(seed) * (kind & 4 ? 1e-6f : 1.0f));
 }
 
 static void checkColumn(const float *features, const float *out, int rows, int columns) {
@@ -27,7 +28,8 @@ static void checkColumn(const float *features, const float *out, int rows, int c
   for (int i = 0; i < rows; i++) {
     // Before it divides, the kernel rounds in units of the span; the smallest spans are denormal.
     const double right = std > 0.0 ? (x[i] - x[0] - mean) / std : 0.0;
-    const double allowed = std > 0.0 ? 1e-6 * rows * (1.0 + fabs(right)) + (span < 1e-36 ? 1.0 + fabs(right) : 0.0) : 0.0;
+    const double allowed =
+        std > 0.0 ? 1e-6 * rows * (1.0 + fabs(right)) + (span < 1e-36 ? 1.0 + fabs(right) : 0.0) : 0.0;
     CHECK(isfinite(out[i * columns]), "a z-score is a number");
     CHECK(fabs(out[i * columns] - right) <= allowed, "a z-score is the deviation over the standard deviation");
   }

@@ -9,7 +9,8 @@ static double cells[CELLS];
 
 static bool begin(bytes_t *bytes, frCfar_t *cfar, uint16_t leading, uint16_t guard, float *storage, size_t floats) {
   const float pFa = takeByte(bytes) < 128 ? powf(10.0f, -(float)(takeByte(bytes) % 38)) : takeFloat(bytes, 0.2f);
-  const bool right = leading > 0 && leading + guard <= 32767 && floats >= (size_t)leading + guard && pFa >= FLT_MIN && pFa < 1.0f;
+  const bool right =
+      leading > 0 && leading + guard <= 32767 && floats >= (size_t)leading + guard && pFa >= FLT_MIN && pFa < 1.0f;
   CHECK(frCfarInit(cfar, leading, guard, pFa, storage, floats) == right, "settings are accepted where they are right");
   if (right) {
     const double factor = expm1(-log((double)pFa) / leading);
@@ -30,7 +31,8 @@ static void checkCell(const frCfar_t *cfar, int count, bool alert, float thresho
     sum += cells[i];
   }
   const double right = fmin(sum * cfar->factor, FLT_MAX);
-  CHECK(fabs(threshold - right) <= (leading + 4) * FLT_EPSILON * right + 1e-44, "the threshold is alpha times the mean");
+  CHECK(fabs(threshold - right) <= (leading + 4) * FLT_EPSILON * right + 1e-44,
+        "the threshold is alpha times the mean");
   CHECK(alert == (cells[count - 1] > threshold), "an alert is a cell above its threshold");
 }
 

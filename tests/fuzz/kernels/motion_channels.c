@@ -40,7 +40,8 @@ static void follow(truth_t *truth, const motionConfig_t *config, const double mo
   truth->slowThrust += gain * (truth->lagged - truth->slowThrust);
 }
 
-static void checkChannels(const truth_t *truth, const motionConfig_t *config, const double motors[4], const float *channels) {
+static void checkChannels(const truth_t *truth, const motionConfig_t *config, const double motors[4],
+                          const float *channels) {
   double right[MOTION_CHANNELS - 1];
   const double usual = fmax(truth->slowThrust, config->leastThrust);
   for (int i = 0; i < 6; i++) {
@@ -54,7 +55,8 @@ static void checkChannels(const truth_t *truth, const motionConfig_t *config, co
     const double scaled = right[i] * config->inverseScale[i];
     const double limited = fmax(-config->limit, fmin(scaled, config->limit));
     // Sums of PWM round in units of 4 x 65535, what gravity is taken off in those of the sample.
-    const double magnitude = i >= 6 && i < 10 ? 262140.0 : fabs(truth->held[i < 6 ? i : 2]) + 20.0 * (1.0 + truth->lagged / usual);
+    const double magnitude =
+        i >= 6 && i < 10 ? 262140.0 : fabs(truth->held[i < 6 ? i : 2]) + 20.0 * (1.0 + truth->lagged / usual);
     CHECK(fabsf(channels[i]) <= config->limit, "a channel is within the limit");
     CHECK(fabs(channels[i] - limited) <= 64.0 * FLT_EPSILON * (magnitude * config->inverseScale[i] + fabs(limited)),
           "a channel is that of the definition");
@@ -103,7 +105,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     float sample[10];
     for (int run = what & 1 ? 0 : what / 2; run >= 0 && count < SAMPLES; run--, count++) {
       for (int i = 0; i < 10; i++) {
-        sample[i] = what & 1 ? takeFloat(&bytes, i < 6 ? 10.0f : 3e4f) : (i < 6 ? noise(&seed) : 4e4f + 4e3f * noise(&seed));
+        sample[i] =
+            what & 1 ? takeFloat(&bytes, i < 6 ? 10.0f : 3e4f) : (i < 6 ? noise(&seed) : 4e4f + 4e3f * noise(&seed));
       }
       step(motion, &truth, &config, sample);
     }

@@ -17,8 +17,10 @@ typedef struct {
 
 static one_t begin(const decoderConfig_t *decoder, uint8_t filling) {
   one_t one = {rubbish(sizeof(streamDetector_t), filling), rubbish(AIRTOUCH_STREAM_ARENA_BYTES, filling)};
-  CHECK(streamInt8ArenaBytes(&airtouchStream) == AIRTOUCH_STREAM_ARENA_BYTES, "the arena is as large as the header says");
-  CHECK(streamDetectorInit(one.detector, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation, decoder, one.arena),
+  CHECK(streamInt8ArenaBytes(&airtouchStream) == AIRTOUCH_STREAM_ARENA_BYTES,
+        "the arena is as large as the header says");
+  CHECK(streamDetectorInit(one.detector, &airtouchStreamMotion, &airtouchStream, &airtouchStreamQuantisation, decoder,
+                           one.arena),
         "the shipped network is accepted");
   return one;
 }

@@ -6,8 +6,8 @@
 #include "packet_table.h"
 #include "toy_network.h"
 
-#define STEPS 1500        // of an input, at most
-#define STORM 600         // of them with faults
+#define STEPS 1500  // of an input, at most
+#define STORM 600   // of them with faults
 #define PIPE 24
 // After forged packets, whatever they said, the longest wait for the next try and a few more.
 #define HOSTILE_STEPS (LINK_RETRY_MOST + LINK_REFUSED_STEPS + 4 * LINK_RETRY_STEPS)
@@ -56,29 +56,20 @@ static void transmit(pipe_t *pipe, const uint8_t *packet, uint16_t length, bytes
   memcpy(raw, packet, length);
   switch (fault % 16) {
     case 8:
-    case 9:
-      return;
+    case 9: return;
     case 10:
       push(pipe, raw, length, step);
       push(pipe, raw, length, step + takeByte(bytes) % 64);
       return;
-    case 11:
-      push(pipe, raw, (uint16_t)(takeByte(bytes) % length), step);
-      return;
+    case 11: push(pipe, raw, (uint16_t)(takeByte(bytes) % length), step); return;
     case 12:
       raw[takeByte(bytes) % length] ^= (uint8_t)(1 + takeByte(bytes) % 255);
       push(pipe, raw, length, step);
       return;
     case 13:
-    case 14:
-      push(pipe, raw, length, step + takeByte(bytes) % 64);
-      return;
-    case 15:
-      push(pipe, raw, (uint16_t)(length + 1 + takeByte(bytes) % 15), step);
-      return;
-    default:
-      push(pipe, raw, length, step);
-      return;
+    case 14: push(pipe, raw, length, step + takeByte(bytes) % 64); return;
+    case 15: push(pipe, raw, (uint16_t)(length + 1 + takeByte(bytes) % 15), step); return;
+    default: push(pipe, raw, length, step); return;
   }
 }
 
@@ -249,7 +240,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     sums[i + 1] = sums[i] * TOY_BASE + toyHash(samples[i]);
   }
   wakeReceiver();
-  linkSenderInit(&sender, EDGE_LINK_BEST, digest, (uint16_t)(toy.window + toy.stride - 1), 7, (uint8_t)(250 + mode / 16));
+  linkSenderInit(&sender, EDGE_LINK_BEST, digest, (uint16_t)(toy.window + toy.stride - 1), 7,
+                 (uint8_t)(250 + mode / 16));
   if (mode & 128) {  // the faults meet a link that is up
     for (int i = 0; i < toy.window + 20; i++) {
       stepLink(&none);

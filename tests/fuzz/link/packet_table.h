@@ -35,8 +35,7 @@ static inline int tableBody(uint8_t type, const uint8_t *body, int room) {
       return room >= 6 && body[5] <= 7 ? 4 + 1 + 1 + 4 * body[5] : -1;
     case 4:  // uptime, expected, used, lost, refused, detector, flags, digest
       return 4 + 4 + 4 + 4 + 4 + 1 + 1 + 8;
-    default:
-      return -1;
+    default: return -1;
   }
 }
 

@@ -65,7 +65,8 @@ static void writePacket(bytes_t *bytes) {
                      (!result || packet.result.count <= EDGE_LINK_ANSWERS);
   uint8_t *written = rubbish(EDGE_LINK_MAX_BYTES, 0x5a);
   const uint16_t length = edgeLinkPack(&packet, written);
-  CHECK((length > 0) == right && length <= EDGE_LINK_MAX_BYTES, "a packet of a known type with a right count is written");
+  CHECK((length > 0) == right && length <= EDGE_LINK_MAX_BYTES,
+        "a packet of a known type with a right count is written");
   if (length > 0) {
     uint8_t *exact = exactCopy(written, length);
     CHECK(inTable(exact, length), "what is written is in the table");

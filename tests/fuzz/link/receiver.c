@@ -71,13 +71,15 @@ static void checkReply(const edgeLinkPacket_t *asked, const uint8_t *reply, uint
   CHECK(said.session == asked->session && said.sequence == asked->sequence, "it names what it answers");
   const edgeLinkResult_t *result = &said.result;
   const bool known = asked->session != 0 && asked->session == receiver->session;
-  CHECK(((result->flags & EDGE_LINK_UNKNOWN) != 0) == !known || receiver->network == NULL, "an unknown session is called so");
+  CHECK(((result->flags & EDGE_LINK_UNKNOWN) != 0) == !known || receiver->network == NULL,
+        "an unknown session is called so");
   if (!known || receiver->network == NULL) {
     CHECK(result->count == 0, "no answers without a network");
     return;
   }
   CHECK(result->expected == receiver->expected, "it says what is expected");
-  CHECK(!(result->flags & EDGE_LINK_GAP) || receiver->expected == expected || edgeLinkAfter(asked->sequence, result->expected) > 0,
+  CHECK(!(result->flags & EDGE_LINK_GAP) || receiver->expected == expected ||
+            edgeLinkAfter(asked->sequence, result->expected) > 0,
         "nothing is taken behind a gap");
   const bool behind = asked->type == EDGE_LINK_FEATURES && edgeLinkAfter(asked->sequence, result->expected) > 0;
   CHECK(((result->flags & EDGE_LINK_GAP) != 0) == behind, "samples behind a gap are asked for");
@@ -92,13 +94,14 @@ static void deliver(const uint8_t *packet, uint16_t length) {
   const uint32_t steps = watched[0].toy.steps + watched[1].toy.steps;
   const uint16_t size = linkReceiverTake(receiver, exact, length, reply);
   edgeLinkPacket_t asked;
-  const bool known = edgeLinkParse(exact, length, &asked) &&
-                     (asked.type == EDGE_LINK_RESET || asked.type == EDGE_LINK_FEATURES);
+  const bool known =
+      edgeLinkParse(exact, length, &asked) && (asked.type == EDGE_LINK_RESET || asked.type == EDGE_LINK_FEATURES);
   CHECK((size > 0) == known && receiver->refused - before.refused == !known, "every packet is answered or refused");
   CHECK(receiver->taken >= before.taken && receiver->lost >= before.lost && receiver->repeated >= before.repeated,
         "counters only grow");
   CHECK(receiver->taken - before.taken <= EDGE_LINK_SAMPLES, "a packet holds seven samples at most");
-  CHECK(watched[0].toy.steps + watched[1].toy.steps - steps <= receiver->taken - before.taken, "no sample is used twice");
+  CHECK(watched[0].toy.steps + watched[1].toy.steps - steps <= receiver->taken - before.taken,
+        "no sample is used twice");
   if (known) {
     checkReply(&asked, reply, size, before.expected);
   }
@@ -149,7 +152,8 @@ static void streamAnew(uint32_t from) {
   const toyNetwork_t *toy = &watched[1].toy;
   const uint8_t session = (uint8_t)(receiver->session % 255 + 1);
   deliver(packed, packReset(session, 0xfeedbeef, EDGE_LINK_PAPER, digests[1], packed));
-  CHECK(receiver->network == &receiver->networks[1] && receiver->empty, "a new session begins, whatever was said before");
+  CHECK(receiver->network == &receiver->networks[1] && receiver->empty,
+        "a new session begins, whatever was said before");
   // The network begins on a multiple of its stride, and answers on one.
   const uint32_t count = 1 + from % EDGE_LINK_SAMPLES;
   for (uint32_t i = 0; i < toy->window + 2u * (toy->stride - 1u); i += count) {

@@ -1,13 +1,14 @@
 // link_sender.h alone: samples, polls, a transport that refuses, and packets from the other side that are raw bytes or
-// forged with a right CRC. Whatever was said, counters only grow, what is sent is true, and a GAP8 that starts then gets
-// a stream and its answers are accepted.
+// forged with a right CRC. Whatever was said, counters only grow, what is sent is true, and a GAP8 that starts then
+// gets a stream and its answers are accepted.
 #include "forge.h"
 #include "link_sender.h"
 #include "packet_table.h"
 #include "toy_network.h"
 
 #define STEPS 1200
-#define SETTLE (LINK_RETRY_MOST + LINK_REFUSED_STEPS + 2 * LINK_DOWN_STEPS)  // steps until a GAP8 that starts is taken up
+#define SETTLE \
+  (LINK_RETRY_MOST + LINK_REFUSED_STEPS + 2 * LINK_DOWN_STEPS)  // steps until a GAP8 that starts is taken up
 
 static const uint8_t digest[EDGE_LINK_DIGEST_BYTES] = {9, 8, 7, 6, 5, 4, 3, 2};
 static linkSender_t *sender;
@@ -68,8 +69,8 @@ static int take(const uint8_t *packet, uint16_t length) {
   const linkCounters_t before = sender->counters;
   const int count = linkSenderTake(sender, exact, length, answers);
   edgeLinkPacket_t read;
-  const bool known = edgeLinkParse(exact, length, &read) &&
-                     (read.type == EDGE_LINK_RESULT || read.type == EDGE_LINK_HEARTBEAT);
+  const bool known =
+      edgeLinkParse(exact, length, &read) && (read.type == EDGE_LINK_RESULT || read.type == EDGE_LINK_HEARTBEAT);
   CHECK(sender->counters.refused - before.refused == !known && sender->counters.received - before.received == known,
         "a packet is taken or refused, and counted");
   CHECK(count >= 0 && count <= EDGE_LINK_ANSWERS, "answers fit their room");
@@ -110,9 +111,7 @@ static void doOne(bytes_t *bytes) {
       }
       break;
     }
-    case 5:
-      take(packed, forge(bytes, what / 8, sender->session, pushed, digest, packed));
-      break;
+    case 5: take(packed, forge(bytes, what / 8, sender->session, pushed, digest, packed)); break;
     default:  // results most of all
       take(packed, forge(bytes, EDGE_LINK_RESULT - 1, sender->session, pushed, digest, packed));
       break;

@@ -74,8 +74,12 @@ static inline bool toyStep(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_
 
 /** The link's view of a toy; the two must outlive the receiver. */
 static inline linkNetwork_t toyAsNetwork(toyNetwork_t *toy, uint8_t algorithm, const uint8_t *digest) {
-  linkNetwork_t network = {.context = toy, .reset = toyReset, .step = toyStep, .window = toy->window,
-                           .stride = toy->stride, .algorithm = algorithm};
+  linkNetwork_t network = {.context = toy,
+                           .reset = toyReset,
+                           .step = toyStep,
+                           .window = toy->window,
+                           .stride = toy->stride,
+                           .algorithm = algorithm};
   memcpy(network.digest, digest, EDGE_LINK_DIGEST_BYTES);
   return network;
 }

@@ -9,23 +9,29 @@
 #include "fuzz.h"
 #include "layer_int8.h"
 
-#define MADE_OUTPUTS 12  ///< channels of a layer, at most
-#define MADE_VALUES 1200 ///< of an input or output, at most
+#define MADE_OUTPUTS 12   ///< channels of a layer, at most
+#define MADE_VALUES 1200  ///< of an input or output, at most
 
 /** A layer and the memory that it points to. */
 typedef struct {
   layerInt8_t layer;
-  int8_t *dense;  ///< weights one by one, [output][input], also of a sparse layer
-  int32_t inputs; ///< of one output
+  int8_t *dense;   ///< weights one by one, [output][input], also of a sparse layer
+  int32_t inputs;  ///< of one output
 } made_t;
 
 static inline int32_t sizeIn(const layerInt8_t *layer) { return layer->inRows * layer->inColumns * layer->inChannels; }
 
-static inline int32_t sizeOut(const layerInt8_t *layer) { return layer->outRows * layer->outColumns * layer->outChannels; }
+static inline int32_t sizeOut(const layerInt8_t *layer) {
+  return layer->outRows * layer->outColumns * layer->outChannels;
+}
 
-static inline bool isConvLayer(const layerInt8_t *layer) { return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV; }
+static inline bool isConvLayer(const layerInt8_t *layer) {
+  return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV;
+}
 
-static inline bool isSparse(const layerInt8_t *layer) { return layer->kind == LAYER_SPARSE_DENSE || layer->kind == LAYER_SPARSE_CONV; }
+static inline bool isSparse(const layerInt8_t *layer) {
+  return layer->kind == LAYER_SPARSE_DENSE || layer->kind == LAYER_SPARSE_CONV;
+}
 
 /** gemmlowp's SaturatingRoundingDoublingHighMul(), then RoundingDivideByPOT(). */
 static inline int32_t gemmlowp(int32_t x, int32_t multiplier, int32_t shift) {
@@ -131,7 +137,8 @@ static inline int8_t defineOutput(const made_t *made, int32_t channel, const int
   for (int32_t i = 0; i < made->inputs; i++) {
     sum += (int64_t)values[i] * made->dense[channel * made->inputs + i];
   }
-  const int32_t value = gemmlowp((int32_t)sum, layer->multiplier[channel], layer->shift[channel]) + layer->outputZeroPoint;
+  const int32_t value =
+      gemmlowp((int32_t)sum, layer->multiplier[channel], layer->shift[channel]) + layer->outputZeroPoint;
   return (int8_t)(value < layer->outputMin ? layer->outputMin : (value > layer->outputMax ? layer->outputMax : value));
 }
 
@@ -160,11 +167,18 @@ static inline void defineLayer(const made_t *made, const int8_t *input, int8_t *
 }
 
 /** A convolution, pool or dense layer over the given input; false where none of the wanted kind fits. */
-static inline bool takeLayer(bytes_t *bytes, made_t *made, int32_t rows, int32_t columns, int32_t channels, uint32_t *seed) {
+static inline bool takeLayer(bytes_t *bytes, made_t *made, int32_t rows, int32_t columns, int32_t channels,
+                             uint32_t *seed) {
   layerInt8_t *layer = &made->layer;
   const int32_t kind = takeByte(bytes) % 5;
-  *made = (made_t){.layer = {.kind = kind, .inRows = rows, .inColumns = columns, .inChannels = channels,
-                             .kernelRows = 1, .kernelColumns = 1, .outRows = 1, .outColumns = 1,
+  *made = (made_t){.layer = {.kind = kind,
+                             .inRows = rows,
+                             .inColumns = columns,
+                             .inChannels = channels,
+                             .kernelRows = 1,
+                             .kernelColumns = 1,
+                             .outRows = 1,
+                             .outColumns = 1,
                              .outChannels = 1 + takeByte(bytes) % MADE_OUTPUTS}};
   if (isConvLayer(layer) || kind == LAYER_MAX_POOL) {
     layer->kernelRows = 1 + takeByte(bytes) % (rows < 6 ? rows : 6);

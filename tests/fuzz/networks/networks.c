@@ -53,21 +53,23 @@ static void runAll(bytes_t *bytes, const networkInt8_t *network, uint32_t *seed)
     free(exact);
     memcpy(in, out, (size_t)sizeOut(&layers[i]));
   }
-  CHECK(memcmp(said, in, (size_t)sizeOut(&layers[network->layerCount - 1])) == 0, "the network gives the definition's outputs");
+  CHECK(memcmp(said, in, (size_t)sizeOut(&layers[network->layerCount - 1])) == 0,
+        "the network gives the definition's outputs");
   free(arena);
   free(input);
 }
 
 /** A shape of any numbers: the check says so, and never fails. */
 static void distort(bytes_t *bytes, const networkInt8_t *network) {
-  int32_t *const shape[] = {&layers[0].kind, &layers[0].inRows, &layers[0].inColumns, &layers[0].inChannels,
-                            &layers[0].outRows, &layers[0].outColumns, &layers[0].outChannels,
-                            &layers[0].kernelRows, &layers[0].kernelColumns};
+  int32_t *const shape[] = {&layers[0].kind,        &layers[0].inRows,     &layers[0].inColumns,
+                            &layers[0].inChannels,  &layers[0].outRows,    &layers[0].outColumns,
+                            &layers[0].outChannels, &layers[0].kernelRows, &layers[0].kernelColumns};
   for (int32_t i = 1 + takeByte(bytes) % 4; i > 0; i--) {
     const int32_t layer = takeByte(bytes) % network->layerCount, field = takeByte(bytes) % 9;
     int32_t *const value = shape[field] + layer * (int32_t)(sizeof layers[0] / sizeof(int32_t));
     const uint8_t how = takeByte(bytes);
-    *value = how & 1 ? (int32_t)takeWord(bytes) : (how & 2 ? *value + (int8_t)takeByte(bytes) : (int32_t)(1u << how % 31));
+    *value =
+        how & 1 ? (int32_t)takeWord(bytes) : (how & 2 ? *value + (int8_t)takeByte(bytes) : (int32_t)(1u << how % 31));
   }
   const int32_t first = networkInt8Check(network);
   CHECK(first >= -1 && first < network->layerCount, "the check names a layer, or none");
@@ -80,7 +82,8 @@ static void distort(bytes_t *bytes, const networkInt8_t *network) {
 }
 
 static void quantise(bytes_t *bytes) {
-  const networkInt8_t network = {.inputScale = fabsf(takeFinite(bytes, 0.05f, 1e3f)) + 1e-6f, .inputZeroPoint = (int8_t)takeByte(bytes)};
+  const networkInt8_t network = {.inputScale = fabsf(takeFinite(bytes, 0.05f, 1e3f)) + 1e-6f,
+                                 .inputZeroPoint = (int8_t)takeByte(bytes)};
   float x[8];
   int8_t q[8];
   for (int i = 0; i < 8; i++) {
@@ -88,7 +91,8 @@ static void quantise(bytes_t *bytes) {
   }
   networkInt8Quantise(&network, x, 8, q);
   for (int i = 0; i < 8; i++) {
-    const double right = isnan(x[i]) ? network.inputZeroPoint : floor((double)x[i] / network.inputScale + 0.5) + network.inputZeroPoint;
+    const double right =
+        isnan(x[i]) ? network.inputZeroPoint : floor((double)x[i] / network.inputScale + 0.5) + network.inputZeroPoint;
     const double limited = fmax(-128.0, fmin(right, 127.0));
     CHECK(fabs(q[i] - limited) <= 1.0, "an input is quantised to the nearest step");
   }
@@ -99,7 +103,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   const uint8_t kind = takeByte(&bytes);
   uint32_t seed = kind;
   quantise(&bytes);
-  const networkInt8_t network = {.layers = layers, .layerCount = build(&bytes, &seed), .inputScale = 1.0f, .outputScale = 1.0f};
+  const networkInt8_t network = {
+      .layers = layers, .layerCount = build(&bytes, &seed), .inputScale = 1.0f, .outputScale = 1.0f};
   if (network.layerCount > 0) {
     CHECK(networkInt8Check(&network) == -1, "layers that fit are accepted");
     if (kind & 1) {

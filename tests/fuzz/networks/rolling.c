@@ -52,7 +52,8 @@ static void run(bytes_t *bytes, const networkInt8_t *network, rollingInt8_t *rol
       defineLayer(&made[k], in, out);
       memcpy(in, out, (size_t)sizeOut(&layers[k]));
     }
-    CHECK(memcmp(said, in, (size_t)sizeOut(&layers[network->layerCount - 1])) == 0, "an output is that of the whole window");
+    CHECK(memcmp(said, in, (size_t)sizeOut(&layers[network->layerCount - 1])) == 0,
+          "an output is that of the whole window");
   }
 }
 
@@ -60,7 +61,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   bytes_t bytes = {data, size};
   const uint8_t kind = takeByte(&bytes);
   uint32_t seed = kind;
-  const networkInt8_t network = {.layers = layers, .layerCount = build(&bytes, &seed), .inputScale = 1.0f, .outputScale = 1.0f};
+  const networkInt8_t network = {
+      .layers = layers, .layerCount = build(&bytes, &seed), .inputScale = 1.0f, .outputScale = 1.0f};
   const int32_t stride = kind & 1 ? 1 << kind / 2 % 5 : takeByte(&bytes) % (ROLLING_MAX_STRIDE + 2);
   rollingInt8_t rolling;
   const int32_t room = network.layerCount > 0 ? rollingInt8ArenaBytes(&network, stride) : 0;

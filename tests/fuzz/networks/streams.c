@@ -13,8 +13,15 @@ static int8_t rows[CONVS + 1][SAMPLES][MADE_OUTPUTS];  // inputs of each conv, t
 static int32_t steps;                                  // that were computed
 
 static made_t takeDense(bytes_t *bytes, int32_t taps, int32_t channels, int32_t outputs, uint32_t *seed) {
-  made_t one = {.layer = {.kind = LAYER_DENSE, .inRows = taps, .inColumns = 1, .inChannels = channels, .outRows = 1,
-                          .outColumns = 1, .outChannels = outputs, .kernelRows = 1, .kernelColumns = 1}};
+  made_t one = {.layer = {.kind = LAYER_DENSE,
+                          .inRows = taps,
+                          .inColumns = 1,
+                          .inChannels = channels,
+                          .outRows = 1,
+                          .outColumns = 1,
+                          .outChannels = outputs,
+                          .kernelRows = 1,
+                          .kernelColumns = 1}};
   if (takeByte(bytes) & 1 && taps * channels % 4 == 0) {
     one.layer.kind = LAYER_SPARSE_DENSE;
   }
@@ -31,8 +38,8 @@ static streamInt8_t build(bytes_t *bytes, uint32_t *seed) {
     const int32_t taps = 1 + takeByte(bytes) % 4;
     const int32_t outputs = i >= network.firstSkip ? width : 1 + takeByte(bytes) % CHANNELS;
     made[i] = takeDense(bytes, taps, channels, outputs, seed);
-    convs[i] = (streamConv_t){.layer = made[i].layer, .dilation = i == 0 ? 1 : 1 + takeByte(bytes) % 8,
-                              .zeroPoint = (int8_t)takeByte(bytes)};
+    convs[i] = (streamConv_t){
+        .layer = made[i].layer, .dilation = i == 0 ? 1 : 1 + takeByte(bytes) % 8, .zeroPoint = (int8_t)takeByte(bytes)};
     channels = outputs;
   }
   made[CONVS] = takeDense(bytes, network.convCount - network.firstSkip, width, 1 + takeByte(bytes) % 3, seed);
@@ -103,16 +110,20 @@ static void distort(bytes_t *bytes, streamInt8_t *network) {
   network->head = &head;
   for (int32_t i = 1 + takeByte(bytes) % 4; i > 0; i--) {
     streamConv_t *conv = &convs[takeByte(bytes) % CONVS];
-    int32_t *const field[] = {&conv->layer.kind, &conv->layer.inRows, &conv->layer.inColumns, &conv->layer.inChannels,
-                              &conv->layer.outRows, &conv->layer.outChannels, &conv->dilation, &head.inRows,
-                              &head.inChannels, &head.outChannels, &network->firstSkip, &network->stride, &network->convCount};
+    int32_t *const field[] = {&conv->layer.kind,       &conv->layer.inRows,  &conv->layer.inColumns,
+                              &conv->layer.inChannels, &conv->layer.outRows, &conv->layer.outChannels,
+                              &conv->dilation,         &head.inRows,         &head.inChannels,
+                              &head.outChannels,       &network->firstSkip,  &network->stride,
+                              &network->convCount};
     int32_t *const value = field[takeByte(bytes) % 13];
     const uint8_t how = takeByte(bytes);
-    *value = how & 1 ? (int32_t)takeWord(bytes) : (how & 2 ? *value + (int8_t)takeByte(bytes) : (int32_t)(1u << how % 31));
+    *value =
+        how & 1 ? (int32_t)takeWord(bytes) : (how & 2 ? *value + (int8_t)takeByte(bytes) : (int32_t)(1u << how % 31));
   }
   if (network->convCount <= CONVS || network->convCount > STREAM_MAX_CONVS) {
     const int32_t first = streamInt8Check(network);
-    CHECK(first == -1 || network->convCount < 1 || first <= network->convCount, "the check names a conv, the head or none");
+    CHECK(first == -1 || network->convCount < 1 || first <= network->convCount,
+          "the check names a conv, the head or none");
     CHECK(first != -1 || streamInt8ArenaBytes(network) > 0, "a network that is accepted has an arena that exists");
   }
 }
