@@ -3,8 +3,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
+#: C that needs neither the firmware's headers nor the GAP8's SDK
+FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c gap8/kernels/*.c) gap8/app/src/gap8_core.c \
+  $(addprefix firmware/app/src/,app_core.c app_level.c app_local.c app_log.c app_paper.c app_params.c floor_height.c)
+FLIES_INCLUDES = -Ifirmware/kernels -Ifirmware/link -Ifirmware/app/src -Igap8/kernels -Igap8/model -Igap8/app/src
 
-.PHONY: help setup demo test lint docs fuzz fuzz-logs repeat bench firmware emulate gap8 flash clean
+.PHONY: help setup demo test lint tidy docs fuzz fuzz-logs repeat bench firmware emulate gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -25,8 +29,13 @@ demo: setup  ## the main job: train, prune, export, detect through the C kernels
 test: setup  ## every test, sanitizers included
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
 
-lint: setup  ## ruff over Python and notebooks, by the settings in pyproject.toml; FIX=1 mends what it can
+lint: setup  ## ruff over Python and notebooks, clang-format over C (pyproject.toml, .clang-format); FIX=1 mends what it can
 	$(BIN)/ruff check $(if $(FIX),--fix) .
+	$(BIN)/clang-format $(if $(FIX),-i,--dry-run --Werror) $$(git ls-files '*.c' '*.h')
+
+tidy: setup  ## clang-tidy over the C that flies, by .clang-tidy; fetches clang-tidy (38 MB) the first time
+	@[ -x $(BIN)/clang-tidy ] || $(BIN)/python -m pip install --quiet -c tools/constraints.txt clang-tidy
+	$(BIN)/clang-tidy --quiet $(FLIES) -- -std=c11 $(FLIES_INCLUDES)
 
 docs:  ## build the site of host/docs, strictly: build/site
 	$(PYTHON) -m venv build/docs-env

@@ -28,7 +28,7 @@ uint16_t bandPowerBins(float sampleRateHz, uint16_t window, float lowHz, float h
   }
   const float low = ceilf(lowHz * (float)window / sampleRateHz - BIN_TOLERANCE);
   const float high = floorf(highHz * (float)window / sampleRateHz + BIN_TOLERANCE);
-  if (!(low >= 1.0f) || !(high <= (float)(window / 2)) || !(low <= high)) {
+  if (!(low >= 1.0f) || !(high <= (float)(uint16_t)(window / 2)) || !(low <= high)) {
     return 0;
   }
   if (firstBin != NULL) {

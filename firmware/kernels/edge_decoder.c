@@ -2,8 +2,8 @@
 
 #include "sample_guard.h"
 
-#define LOGIT_LIMIT 8.0f     // logits are clamped to this magnitude
-#define SLOW_AT_START -3.0f  // the smoothed logit before anything is known: off a platform
+#define LOGIT_LIMIT 8.0f       // logits are clamped to this magnitude
+#define SLOW_AT_START (-3.0f)  // the smoothed logit before anything is known: off a platform
 #define LONG_AGO 0x3fffffffu
 
 static void forget(edgeDecoder_t *decoder) {

@@ -255,6 +255,8 @@ void convInt8(const jobInt8_t *job) {
     const int32_t count = p.outputs - at.place < most ? p.outputs - at.place : most;
     int8_t *to = p.output + at.place * channels;
     gather(&p, &at, count, patches);
+    // count is at most LANES / area: a pooled block has never more than two, and is there.
+    // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage)
     blocks[sparse][p.area - 1][count - 1](&p, patches, to, unit, unit + here);
     item += here;
     unit = 0;

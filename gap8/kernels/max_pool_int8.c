@@ -22,7 +22,7 @@ static void largest(const layerInt8_t *layer, const int8_t *block, int8_t *outpu
     for (int32_t i = 0; i < layer->kernelRows; i++) {
       for (int32_t j = 0; j < layer->kernelColumns; j++) {
         const int8_t value = block[i * rowStride + j * channels + channel];
-        most = value > most ? value : most;
+        most = (int8_t)(value > most ? value : most);
       }
     }
     output[channel] = most;

@@ -213,7 +213,7 @@ def flown_with_the_app(craft):
 
 
 def without_heading(acc_world, quaternion):
-    """(3,) acceleration of world axes with the heading of the quaternion x, y, z, w taken off, in float32 as the app."""
+    """(3,) world acceleration with the heading of the quaternion x, y, z, w taken off, in float32 as the app does."""
     one, two = np.float32(1.0), np.float32(2.0)
     (x, y, z, w), (ax, ay, az) = np.float32(quaternion), np.float32(acc_world)
     scale = two / (x * x + y * y + z * z + w * w)

@@ -48,7 +48,13 @@ uint16_t appParamsClamp(appParams_t *params) {
   return (uint16_t)(changed + clampSteps(&params->alertHold, 1, 1000));
 }
 
-static bool sameFloat(float one, float other) { return memcmp(&one, &other, sizeof one) == 0; }
+/** The same bits: NaN is then the same as itself. */
+static bool sameFloat(float one, float other) {
+  uint32_t bits[2];
+  memcpy(&bits[0], &one, sizeof bits[0]);
+  memcpy(&bits[1], &other, sizeof bits[1]);
+  return bits[0] == bits[1];
+}
 
 bool appParamsSame(const appParams_t *one, const appParams_t *other) {
   return one->enable == other->enable && one->detector == other->detector && one->filter == other->filter &&
