@@ -102,3 +102,13 @@ def test_the_sharper_sense_gets_the_weight_and_the_other_ones_inventions_are_dro
     chosen = compare.choose_fusion(films, sense(camera_off), sense(airtouch_off))
     assert (chosen.share >= 0.75) == (camera_off < airtouch_off)
     assert not (chosen.airtouch_alone if camera_off < airtouch_off else chosen.camera_alone)
+
+
+def test_a_constant_lag_is_learnt_on_the_first_films_and_taken_off_all():
+    from airtouch.vision import compare
+
+    film = made_film()
+    found = [[Detection(e.sample + off, "edge") for e in film.edges] for off in (7, 7, 12)]
+    moved = compare.without_lag(found, compare.lag([film, film], found[:2]))
+    off = [[d.sample - e.sample for d, e in zip(some, film.edges, strict=True)] for some in moved]
+    assert off == [[0, 0], [0, 0], [5, 5]]

@@ -18,7 +18,7 @@ from airtouch.vision.camera import Camera
 
 SCENE = "paper-4cm"  #: 4 cm over the platform, straight on, as the paper's comparison
 LUX, QUICK_LUX = (500.0, 100.0, 50.0, 20.0, 5.0), (100.0, 20.0)
-FILMS, QUICK_FILMS = (4, 16), (2, 4)  #: flights whose thresholds are chosen, flights that are scored; the paper has 20
+FILMS, QUICK_FILMS = (6, 20), (2, 4)  #: flights whose thresholds are chosen, flights that are scored; the paper has 20
 SEED = 31
 FELT = ("best", "paper")
 BEST_ZEROS = (0.85, 0.0)  #: share of zeros in `best`, for its error against its size
@@ -195,8 +195,7 @@ def _everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dic
     lacking = extras.lacking("vision")
     if lacking:
         raise Missing(f"the camera needs {', '.join(lacking)}: pip install 'airtouch[vision]'")
-    from airtouch.detector.trace import Detection
-    from airtouch.vision import compare, lines
+    from airtouch.vision import compare
     from airtouch.vision.crossings import film
 
     training_count, scored_count = _count(job)
@@ -205,27 +204,39 @@ def _everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dic
     films = [film(log, SEED) for log in simulated.flown(SCENE, training_count + scored_count)]
     trained, scored = films[:training_count], films[training_count:]
     felt = {name: compare.felt(films, name) for name in FELT}
+    sights = {lux: _sights(job, films, lux, f"{training_count}_{scored_count}_{lux:g}_{made_of}") for lux in _lux(job)}
     seen: dict[tuple[str, float], list] = {}
-    for lux in _lux(job):
-        kept = job.work / f"vision_{training_count}_{scored_count}_{lux:g}_{made_of}.json"
-        try:
-            stored = json.loads(kept.read_text())
-        except (OSError, ValueError):
-            names = weights.SIZES if lux == 100.0 else ("teed",)
-            mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in names}}
-            sights = compare.filmed(films, lux, mappers, SEED, job.tell)
-            stored = {}
-            for name, some in sights.items():
-                least = compare.threshold(trained, some[:training_count])
-                stored[name] = [[d.sample for d in found] for found in compare.crossings(films, some, least)]
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            write_bytes(json.dumps(stored).encode(), kept, force=True)
-        for name, some in stored.items():
-            seen[name, lux] = [[Detection(s, "edge") for s in found] for found in some]
+    for way in ("classical", *weights.SIZES):
+        least = compare.threshold(trained * len(sights),
+                                  [s for some in sights.values() for s in some[way][:training_count]])
+        found = [compare.crossings(films, some[way], least) for some in sights.values()]
+        lag = compare.lag(trained * len(sights), [d for some in found for d in some[:training_count]])
+        for lux, some in zip(sights, found, strict=True):
+            seen[way, lux] = compare.without_lag(some, lag)
+    for lux in sights:
         how = compare.choose_fusion(trained, seen["teed", lux][:training_count], felt["best"][:training_count])
         seen["fusion", lux] = [compare.fused(a, b, how) for a, b in zip(seen["teed", lux], felt["best"], strict=True)]
     return (scored, {key: some[training_count:] for key, some in seen.items()},
             {name: some[training_count:] for name, some in felt.items()})
+
+
+def _sights(job: Job, films: list[Any], lux: float, name: str) -> dict[str, list]:
+    """What each way to an edge map sees in every film at one light, from the work folder where it was done before."""
+    from airtouch.vision import compare, lines
+    from airtouch.vision.crossings import Sight
+
+    kept = job.work / f"vision_{name}.json"
+    try:
+        return {way: [[Sight(*s) for s in some] for some in all_films]
+                for way, all_films in json.loads(kept.read_text()).items()}
+    except (OSError, ValueError, TypeError):
+        mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in weights.SIZES}}
+        found = compare.filmed(films, lux, mappers, SEED, job.tell)
+        stored = {way: [[[s.time_s, s.strength, s.ahead_m] for s in some] for some in all_films]
+                  for way, all_films in found.items()}
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(json.dumps(stored).encode(), kept, force=True)
+        return found
 
 
 def _scores(films: list[Any], found: list[Any]) -> list[FlightScore]:

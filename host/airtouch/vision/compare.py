@@ -64,6 +64,17 @@ def crossings(films: Sequence[Film], sights: Sights, least: float) -> list[list[
     return [detections(some, least, shot.speed_mps) for shot, some in zip(films, sights, strict=True)]
 
 
+def lag(films: Sequence[Film], found: Sequence[Sequence[Detection]]) -> float:
+    """The median lag of crossings, samples. The down range that tells the truth is itself some hundredths of a second
+    late, the camera is not, so that it comes out negative."""
+    return tuning.lag((shot.edges, some) for shot, some in zip(films, found, strict=True)) / SAMPLE_PERIOD_S
+
+
+def without_lag(found: Sequence[Sequence[Detection]], samples: float) -> list[list[Detection]]:
+    """Crossings with a constant lag taken off, as that of every detector is."""
+    return [[replace(d, sample=round(d.sample - samples)) for d in some] for some in found]
+
+
 def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
     """AirTouch's crossings of each film by a shipped detector, its lag taken off, within what was filmed."""
     detector = registry.get(name)
