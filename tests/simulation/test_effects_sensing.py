@@ -33,8 +33,8 @@ speed_mps = 0.3
 def sweep(quiet):
     scene = scenario.parse(SWEEP, "sweep")
 
-    def fly(effects=()):
-        log = flight.fly(scene, quiet, 3, 0, effects=effects)
+    def fly(effects=(), number=0):
+        log = flight.fly(scene, quiet, 3, number, effects=effects)
         assert not isinstance(log, flight.Diverged), str(log)
         return log
     return fly
@@ -138,6 +138,28 @@ def test_range_kick_acts_once_at_each_edge(sweep):
     first = true_edges(plain)[0].sample
     assert difference[:first - 3].max() == 0.0
     assert difference[first - 3:first + 20].max() > 500.0
+
+
+def test_one_reading_at_each_edge_mixes_both_surfaces(sweep):
+    """Onto the platform between the two distances, off it between them or up to half the step beyond; the next
+    reading is right again."""
+    shares = {"entry": [], "exit": []}
+    for number in range(12):
+        log = sweep({"range_step": {"residual": 0.0, "kick": 0.0, "mixed": 1.0}}, number)
+        for edge in true_edges(log):
+            down = log["zrange_m"][edge.sample - 12:edge.sample + 12]
+            share = (down - down[0]) / (-0.7 if edge.kind == "entry" else 0.7)
+            first = np.flatnonzero(np.abs(share) > 0.06)[0]
+            assert share[first + 3] == pytest.approx(1.0, abs=0.1)  # the next of 25 ms has only the new surface
+            shares[edge.kind].append(share[first])
+    print({kind: np.round(np.sort(some), 2) for kind, some in shares.items()})
+    entry, leaving = np.array(shares["entry"]), np.array(shares["exit"])
+    assert len(entry) > 6 and entry.max() < 1.05 and (entry < 0.5).sum() >= 2 and ((entry > 0.5) & (entry < 0.9)).any()
+    beyond = leaving > 0.9
+    assert 2 <= beyond.sum() <= len(beyond) - 2
+    assert 1.1 < leaving.max() < 1.55 and leaving[~beyond].max() < 0.55
+    plain, never = sweep(), sweep({"range_step": {"residual": 0.0, "kick": 0.0, "mixed": 0.0}})
+    assert (never["zrange_m"] == plain["zrange_m"]).all()
 
 
 def test_flow_scale_slows_the_drone_down_over_the_platform(sweep):

@@ -80,6 +80,7 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("flow_transient_above", 1, 0.0, "m, least distance at which it is"),
     ("range_residual", 1, 0.0, "m, range module's error over a platform"),
     ("range_kick", 1, 0.0, "m, error of the one reading on which an edge is noticed"),
+    ("range_mixed", 1, 0.0, "share of edges with one reading between the two surfaces, or beyond"),
     ("sensor_delay", 1, 0.0, "s, from IMU to controller"),
     ("time_jitter", 1, 0.0, "s rms, on logged time"),
     ("controller_ahead", 1, 0.0, "s, of the position controller's run before a row is logged, whole 2 ms"),

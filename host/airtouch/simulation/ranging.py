@@ -12,7 +12,26 @@ from airtouch.simulation.rotation import euler, rotate_back
 
 RANGE_MS, FLOW_MS = 7, 3  #: ticks of the first down range reading and of the first flow reading
 RANGES, FLOWS = 16, 64  #: readings that the delay lines hold
+#: share of the new surface in a reading that saw two: where it is more than this, a reading beyond an edge overshoots
+OVERSHOOT_SHARE = 0.5
 LAST = 1000.0  #: s; where nothing has changed below for so long
+
+
+@jit
+def uniform_of(normal):
+    """A uniform number in 0..1 from a standard normal one: its cumulative probability."""
+    return 0.5 * math.erfc(-normal / math.sqrt(2.0))
+
+
+@jit
+def mixed_share(drawn, leaving):
+    """How far the one reading on which an edge passes has gone from the old distance (0) to the new one (1).
+
+    drawn: uniform in 0..1, the part of the 25 ms of ranging that the new surface was below. Onto a higher surface the
+    reading follows it. Leaving one, it lies in the lower half or overshoots by up to a half
+    (authors' flights, folds 0 to 2: 25 of 53 in 0.05 to 0.5, 23 above 1.05, none from 0.5 to 0.9).
+    """
+    return drawn + 0.5 if leaving and drawn > OVERSHOOT_SHARE else drawn
 
 
 @jit
@@ -45,6 +64,8 @@ def look(plant, memory, ground, state, now, stream):
     error = memory.drift[2] * true + plant.range_bias * math.exp(-true / plant.range_bias_fade)
     dip = plant.range_dip * memory.rose * math.exp((memory.changed - now) / plant.range_dip_time)
     error += dip * math.exp(-true / plant.range_dip_fade) if plant.range_dip_fade > 0.0 else dip
+    if top != memory.top and uniform_of(memory.other_normals[3]) < plant.range_mixed:
+        error += (mixed_share(uniform_of(memory.other_normals[2]), top < memory.top) - 1.0) * (memory.top - top) / tilt
     row = memory.looks & (RANGES - 1)
     down = max(true + error + plant.range_noise * memory.other_normals[0], 0.0)
     memory.distances[row] = down if down <= sensors.MAX_RANGE_M else np.nan
