@@ -12,7 +12,7 @@ second the other: a twin's detector, whose twin was fitted to the other half. Wi
 does not go on from --start: a new network learns the K flights together with edges of that twin, laid over the free air
 of all flights of the other groups, as `airtouch adapt --from scratch` does. What is in --out already is not done again,
 so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the
-flights scored, each with all its draws.
+flights scored, each with all its draws; last, the missed edges of each height in the manifest.
 """
 
 import argparse
@@ -107,6 +107,17 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     return scores
 
 
+def missed_by_height(scores: Sequence[FlightScore]) -> str:
+    """Missed edges and all edges of each height in the manifest: "low 0/144, h82 4/20"; "-" without heights."""
+    counts: dict[str, list[int]] = {}
+    for score in scores:
+        if score.condition.height is not None:
+            count = counts.setdefault(score.condition.height, [0, 0])
+            count[0] += sum(edge.error_s is None for edge in score.edges)
+            count[1] += len(score.edges)
+    return ", ".join(f"{height} {missed}/{every}" for height, (missed, every) in sorted(counts.items())) or "-"
+
+
 def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     """One row of the table."""
     found: dict[str, Any] = summarise(merged(scores))
@@ -119,7 +130,8 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
         return f"{value} [{low}, {high}]"
 
     cells = (title, str(draws), f"{found['flights']} / {found['edges'] // draws}", text("mean_abs_error_m", 1, 3),
-             text("mean_abs_error_s", 1, 2), text("missed", 100, 1), text("false_per_minute", 1, 2))
+             text("mean_abs_error_s", 1, 2), text("missed", 100, 1), text("false_per_minute", 1, 2),
+             missed_by_height(scores))
     return f"| {' | '.join(cells)} |"
 
 
@@ -169,9 +181,8 @@ def main() -> None:
                                flown.get(group), options)
         print(line(title, scores, len(draws)), flush=True)
 
-    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute "
-          "|\n|---|---|---|---|---|---|---|",
-          flush=True)
+    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height |\n"
+          "|---|---|---|---|---|---|---|---|", flush=True)
     every = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
     if starts:
         row("as it is", "start", 0, [(0, 0)])

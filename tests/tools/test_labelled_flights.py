@@ -76,6 +76,14 @@ def test_draws_of_a_flight_add_up():
     assert both[0].windows == (2, 4, 6, 8)
 
 
+def test_missed_edges_are_counted_by_height():
+    found, missed = EdgeScore("entry", 100, 110, "entry", -0.1, -0.03), EdgeScore("exit", 200)
+    low, high = (FlightScore(h, Condition(height=h), edges, (), 1, 30.0)
+                 for h, edges in (("low", (found, found)), ("h82", (found, missed))))
+    assert labelled_flights.missed_by_height([low, high, high]) == "h82 2/4, low 0/2"
+    assert labelled_flights.missed_by_height([FlightScore("a", Condition(), (missed,), (), 1, 30.0)]) == "-"
+
+
 def test_smaller_draws_lie_within_larger_ones():
     pool = [made_flight(0, 500) for _ in range(9)]
     small, large = (labelled_flights.drawn(pool, k, draw=3) for k in (2, 5))

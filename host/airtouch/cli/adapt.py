@@ -57,7 +57,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     check_free(out, force)
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
     files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
-    usable, left_out = adapt.readable(files)
+    with Bar("reading") as bar:
+        usable, left_out = adapt.readable(files, progress=bar)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     if not usable:
@@ -80,6 +81,7 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
     """(scenario, vehicle, in words) of a twin: its folder's, one fitted now, or the simulator as it is."""
     from airtouch import vehicle as vehicles
     from airtouch.simulation import scenario
+    from airtouch.simulation.batch import available_cores
     from airtouch.twin import edge_fit, files, fit, levers
     from airtouch.twin import flights as recordings
 
@@ -93,12 +95,14 @@ def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Pat
     kept.mkdir(parents=True, exist_ok=True)
     listed = levers.default(craft, recorded.near)
     aim = fit.target(recorded.courses, recorded.features)
+    workers = available_cores()
     with Bar("fitting a twin") as bar:
-        state = fit.fit(aim, craft, listed, rounds=ROUNDS, flights=BATCH, seed=seed, fixed=levers.FIXED,
+        state = fit.fit(aim, craft, listed, rounds=ROUNDS, flights=BATCH, seed=seed, workers=workers,
+                        fixed=levers.FIXED,
                         kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
     with Bar("edges") as bar:
         values = edge_fit.refine(aim, craft, listed, fit.best(state), flights=edge_fit.share(BATCH), seed=seed,
-                                 fixed=levers.FIXED, progress=bar).values
+                                 workers=workers, fixed=levers.FIXED, progress=bar).values
     vehicle_file, scenario_file = files.write(kept, craft, listed, values, recorded.courses, levers.FIXED, force=True)
     return scenario.load(scenario_file), vehicles.load(vehicle_file), f"twin fitted to {len(recorded.courses)} of them"
 

@@ -219,13 +219,15 @@ def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: St
     return total.hexdigest()[:12]
 
 
-def readable(files: Sequence[FlightFile], speed_mps: float = 0.3) -> tuple[list[Flight], list[tuple[str, str]]]:
+def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
+             progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
     """(flights that can be used, those left out with the reason). Speeds that nothing states are read off the log."""
     from airtouch import logs
     from airtouch.twin.course import course
 
     usable, left_out = [], []
-    for file in files:
+    for number, file in enumerate(files):
+        progress(number + 1, len(files))
         try:
             log = logs.read(file.path)
             evaluate.check(log)

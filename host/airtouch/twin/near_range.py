@@ -49,7 +49,7 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
     steps = np.array([c.before_m - c.entered_m for c in courses])
     if len(courses) < FEWEST or np.ptp(np.percentile(steps, (10, 90))) > ALIKE_M:
         return None
-    parts = [part for c, x in zip(courses, channels, strict=True) for part in _around(c, x)]
+    parts = [part for c, x in zip(courses, channels, strict=True) for part in around(c, x)]
     if not parts:
         return None
     height, climb, reading, std = map(np.concatenate, zip(*parts, strict=True))
@@ -65,7 +65,7 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
     return NearRange(*(float(v) for v in solved.x))
 
 
-def _around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
+def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
     """For each edge: (m,) height over the floor in m, its slope in m/s, down range in m, and the scatter of their
     difference, as if each edge were one measurement."""
     down, dt = 0.01 * x[:, ch.DOWN], 1.0 / RATE_HZ
