@@ -11,10 +11,12 @@ With --keep, flights that the file holds already are not worked on again.
 import argparse
 import csv
 import json
+import multiprocessing
 import os
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,9 +37,11 @@ MOST = 5  #: flights that one is held against
 LEAST = 4  #: flights of a group
 SIMULATED = 4  #: groups of simulated flights
 Log = tuple[str, Callable[[], FlightLog]]
+Group = tuple[str, str, str, Vehicle, list[Log]]
+_EVERY: list[Group] = []  #: of this run
 
 
-def groups(folder: Path) -> Iterator[tuple[str, str, str, Vehicle, list[Log]]]:
+def groups(folder: Path) -> Iterator[Group]:
     """Class, drone, group, vehicle and nominal flights, each a name and a way to its log, that belong together."""
     made = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
@@ -78,6 +82,25 @@ def held_out(logs: list[Log], flown: Vehicle, others: list[Log] | None = None) -
         yield name, apparent(Data(study, [flight]))
 
 
+def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
+    """A group's flights held against each other, or against those of other groups of the same drone; JSON-ready."""
+    i, others = task
+    *_, flown, files = _EVERY[i]
+    made = held_out(files, flown, _rest(_EVERY, i) if others else None)
+    return i, others, [{"file": _name(name, others), "rate": one.rate, "passing_rates": one.passing_rates,
+                        "strengths": {k: v.tolist() for k, v in one.strengths.items()},
+                        "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in made]
+
+
+def _rest(every: list[Group], i: int) -> list[Log]:
+    """Flights of the same drone in other groups."""
+    return [f for _, drone, group, _, some in every if drone == every[i][1] and group != every[i][2] for f in some]
+
+
+def _name(name: str, others: bool) -> str:
+    return name + (", other groups" if others else "")
+
+
 def _ready(logs: list[Log], flown: Vehicle) -> list[tuple[str, Flight]]:
     return list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], flown, []), strict=True))
 
@@ -98,6 +121,8 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
         lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing_rates.items()]
         lines.append(f'["{name}".rms]')
         lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.rms.items()]
+        lines.append(f'["{name}".middle]')
+        lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.middle.items()]
         lines.append("")
     return "\n".join(lines)
 
@@ -108,30 +133,32 @@ def main() -> None:
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
     parser.add_argument("--out", type=Path, default=Path("nominal_scatter.toml"))
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
     done = {}
     if args.keep and args.keep.exists():
         done = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
     every = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
+    todo = [(i, others) for i, (*_, files) in enumerate(every) for others in (False, True)
+            if any(_name(name, others) not in done for name, _ in files) and (not others or len(_rest(every, i)) > 1)]
+    _EVERY[:] = every  # which the processes inherit: logs and ways to them need not travel
+    with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
+        for i, others, rows in pool.map(_compared, todo):
+            done |= {row["file"]: row for row in rows}
+            if args.keep:
+                with args.keep.open("a") as out:
+                    out.writelines(json.dumps(row) + "\n" for row in rows)
+            print(f"{every[i][0]}, {every[i][2]}{', other groups' if others else ''}: {len(rows)} flights",
+                  file=sys.stderr, flush=True)
     cases, alike, groups_of, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
-    for of, drone, group, flown, files in every:
+    for of, _, group, flown, files in every:
         groups_of[of].add(group)
         flown_by[of] = flown.name
-        rest = [f for _, same, other, _, some in every if same == drone and other != group for f in some]
-        for note, others in [("", None), *([(", other groups", rest)] if len(rest) > 1 else [])]:
-            if any(name + note not in done for name, _ in files):
-                for name, one in held_out(files, flown, others):
-                    done[name + note] = {"file": name + note, "rate": one.rate, "passing_rates": one.passing_rates,
-                                         "strengths": {k: v.tolist() for k, v in one.strengths.items()},
-                                         "errors": {k: v.tolist() for k, v in one.errors.items()}}
-                    if args.keep:
-                        with args.keep.open("a") as out:
-                            out.write(json.dumps(done[name + note]) + "\n")
-                    print(f"{of}: {name}{note}: {one.rate:.2f} nats a second", file=sys.stderr, flush=True)
-            for row in (done[name + note] for name, _ in files):
+        for others in (False, True):
+            for row in (done[key] for name, _ in files if (key := _name(name, others)) in done):
                 parts = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
                 cases[of].append(Apparent(*parts, row["rate"], row["passing_rates"]))
-                if others is None:
+                if not others:
                     alike[of].append(cases[of][-1])
     classes = {of: replace(measured(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}
     counts = {of: f"{len(alike[of])} flights, {len(flights)} comparisons in {len(groups_of[of])} groups"

@@ -133,3 +133,43 @@ def test_a_parameter_of_which_no_flight_tells_scatters_as_the_effect_s_others():
 def test_the_table_knows_every_effect_of_the_registry():
     for name, one in table().items():
         assert set(one.rms) == set(EFFECTS), name
+
+
+def test_a_random_effect_is_judged_by_how_far_it_is_above_its_usual_strength():
+    rng = np.random.default_rng(9)
+    flights = [Apparent({"vibration": 0.5 + 0.05 * rng.normal(size=1)}, {"vibration": np.zeros(1)}, 0.0)
+               for _ in range(300)]
+    got = measured(flights)
+    assert got.middle["vibration"] == pytest.approx(0.5, abs=0.01)
+    assert got.rms["vibration"] == pytest.approx(0.05, rel=0.15)
+    strength, (middle,), (rms,) = np.array([0.8]), got.middle["vibration"], got.rms["vibration"]
+    expected = student.logpdf(0.0, 300.0) - student.logpdf((0.8 - middle) / rms, 300.0)
+    assert got.evidence("vibration", strength) == pytest.approx(expected)
+    assert got.evidence("vibration", np.array([0.2])) == 0.0
+
+
+def test_a_parameter_that_the_data_leave_open_is_no_evidence():
+    scatter = Scatter({"imu_bias": np.full(2, 0.01)}, 8.0, (0.0, 0.5))
+    known, open_ = np.array([0.0, 1.0]), np.array([1e-3, 1.0])
+    assert scatter.evidence("imu_bias", known, open_) == 0.0
+    low = 1.0 - 1.645 * 0.1
+    assert scatter.evidence("imu_bias", known, np.array([1e-3, 0.1])) == pytest.approx(
+        scatter.evidence("imu_bias", np.array([0.0, low])))
+
+
+def test_the_best_of_several_trials_does_not_widen_the_scatter():
+    """Of four gains with a chance error of 1 each, the largest is often 2; none scatters beyond chance."""
+    rng = np.random.default_rng(10)
+    every = [rng.normal(size=4) for _ in range(200)]
+    best = [np.where(np.arange(4) == np.argmax(np.abs(x)), x, 0.0) for x in every]
+    each = [Apparent({"controller_gain": x}, {"controller_gain": np.ones(4)}, 0.0) for x in every]
+    largest = [Apparent({"controller_gain": x}, {"controller_gain": np.where(x == 0.0, 1e6, 1.0)}, 0.0) for x in best]
+    assert measured(each).rms["controller_gain"].max() < 0.5 < measured(largest).rms["controller_gain"].min()
+
+
+def test_flights_of_the_simulator_are_all_drawn_alike():
+    still = {k: 0.0 * v for k, v in table()["simulated"].rms.items()}
+    got = scatter_of([Apparent(still, still, 0.0) for _ in range(4)])
+    assert got.exact and got.freedom == table()["simulated"].freedom + 4
+    recorded = scatter_of([Apparent(still, still, 0.0) for _ in range(4)], recorded=True)
+    assert not recorded.exact and recorded.freedom == 8.0

@@ -3,10 +3,11 @@
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import loop_model
-from airtouch.gap.channels import COUNT, TORQUE
+from airtouch.gap import loop_model, measure
+from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.response import FIRST_BIN, response_of
-from airtouch.gap.spectra import AIR, frequencies
+from airtouch.gap.spectra import AIR, blocks, frequencies, starts
+from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
 from airtouch.simulation.flight import prepare
 
@@ -107,3 +108,31 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
     low = (f > 0.5) & (f < 3.0)
     assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
     assert np.all(axes["usual"][f > 40.0] > 0.9)
+
+
+def empirical(active: list[Active]) -> np.ndarray:
+    """Angular acceleration for the torque of logged commands in simulated flights, S_yw / S_ww of roll, (bins,)."""
+    vehicle, cross, power = vehicles.load("crazyflie-2.1-flow"), 0.0, 0.0
+    logs = list(batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1))
+    for flight in measure.usable(logs, vehicle, []):
+        first = starts(flight, AIR)
+        turned = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
+        made = turned - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
+        cross, power = cross + (turned * made.conj()).sum(axis=0), power + (np.abs(made) ** 2).sum(axis=0)
+    return cross / power
+
+
+def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
+    """Noise of the gyro folds into log and command alike, through the gyro chip's own low-pass."""
+    vehicle, f = vehicles.load("crazyflie-2.1-flow"), frequencies(AIR)
+    late = Active(get("sensor_latency"), {"delay": 0.003})
+    seen = empirical([late]) / empirical([])
+    noise_alone = np.eye(5)[:1]
+    told = []
+    for active in ((), (late,)):
+        row = prepare(vehicle, active)[0][0]
+        told.append(loop_model.turning_per_command(loop_model.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
+    judged = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
+    ratio = (seen / (told[1] / told[0]))[judged].reshape(-1, 8).mean(axis=1)
+    np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)
+    np.testing.assert_allclose(np.abs(ratio), 1.0, atol=0.25)

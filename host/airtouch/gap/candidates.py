@@ -209,6 +209,11 @@ def telling(terms: Sequence[Term]) -> Term:
     return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 
+def random(name: str) -> bool:
+    """Whether an effect's strength is that of a random force, which no strength below 0 has."""
+    return name in SHAKES or name in EFFECTS and terms(name)[0].kind == SPECTRUM
+
+
 def term_of(effect: Found) -> Term:
     """An effect as a diagnosis names it, as a term with its values."""
     given = {k: q.value for k, q in effect.parameters.items()}

@@ -19,7 +19,7 @@ from airtouch.gap.problem import whole_of
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
 from airtouch.gap.select import select
 from airtouch.gap.selection import Judged, Selection, probabilities
-from airtouch.gap.shrink import Shrink, shrink_of
+from airtouch.gap.shrink import Shrink, cells_of, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.gap.twin import Twin
 from airtouch.gap.unexplained import unexplained, why_not
@@ -212,7 +212,8 @@ def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray
 def _ranking(data: Data, selection: Selection) -> tuple[list[Ranked], Shrink, str, list[Found]]:
     """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
     parts = selection.parts
-    overall = shrink_of(data, parts, selection.chosen)
+    cells = cells_of(data, parts, selection.chosen)
+    overall = shrink_of(data, parts, selection.chosen, cells)
     verdict = _verdict(selection, overall.before)
     effects = _effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
@@ -224,7 +225,7 @@ def _ranking(data: Data, selection: Selection) -> tuple[list[Ranked], Shrink, st
         if name == answer and selection.chosen is not None and len(selection.named) == 1:
             share = overall.share
         elif one is not None and one.full and one.gain > FIRST_GAIN:
-            share = shrink_of(data, parts, one).share
+            share = shrink_of(data, parts, one, cells).share
         out.append(Ranked(name, float(p), share, why_not(selection, name, verdict)))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
@@ -265,7 +266,8 @@ def _control(data: Data, selection: Selection) -> dict[str, object]:
     for name in WRONG:
         if name in every and name not in taken:
             fits = tuple(fit(data, p, every[name][0]) for p in selection.parts)
-            done = shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits))
+            done = shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits),
+                             cells_of(data, selection.parts, selection.chosen))
             return {"name": name, "before": done.before, "after": done.after, "shrink": done.share.plain()}
     return {}
 
@@ -279,7 +281,8 @@ def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], s
     parts = halves(data)
     terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
     fits = tuple(fit(data, p, terms, _start(terms, selection.chosen)) for p in parts)
-    one = shrink_of(data, parts, Judged(selection.chosen.name, terms, 0.0, fits))
+    declared = Judged(selection.chosen.name, terms, 0.0, fits)
+    one = shrink_of(data, parts, declared, cells_of(data, parts, declared))
     return {"declared": _plain(one), "calibrated": _plain(overall)}
 
 

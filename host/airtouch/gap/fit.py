@@ -82,9 +82,10 @@ def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> 
     return problem.likelihood(values, added) - price
 
 
-def left_over(data: Data, part: Part, terms: Sequence[Term]) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem, what is left (flattened, offsets taken off) and the power that it should have."""
-    problem, values, added, _ = _explained(data, part, terms)
+def left_over(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
+              ) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem, what is left (flattened, offsets taken off) and the power that it should have. wide: see `judge`."""
+    problem, values, added, _ = _explained(data, part, terms, wide)
     return problem, values, problem.power + added
 
 

@@ -70,7 +70,8 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
              progress: Callable[[str], None] = lambda _: None, thorough: bool = False) -> dict[str, Judged]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full.
 
-    thorough: random effects in full, however little they promise.
+    thorough: random effects in full, however little they promise, and the strength of each parameter that is also
+    tried alone from that trial: the best of several would seem stronger than each of them is.
     """
     before = chosen.gain if chosen else 0.0
     held = chosen.terms if chosen else ()
@@ -93,9 +94,11 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
                     sure.append(crossed(on, name, terms, chosen, choice))
                     continue
                 own, k = terms[0], len(terms[0].free)
+                each = np.array(fitted)[:, :k]
+                variance = np.maximum(_of_mean(variances)[:k], each.var(axis=0, ddof=1) / len(each))
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
-                                     strength=own.among_all(np.mean(fitted, axis=0)[:k]),
-                                     variance=own.among_all(_of_mean(variances)[:k], np.inf)))
+                                     strength=own.among_all(each.mean(axis=0)),
+                                     variance=own.among_all(variance, np.inf)))
             elif any(t.kind == SPECTRUM for t in terms):
                 with_random.append((name, terms, choice))
             else:
@@ -107,6 +110,8 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
     sure += [crossed(on, j.name, j.terms[len(held):], chosen, j.choice) for j in worth]
     best = _best_of_each([*sure, *(j for j in looked if j not in worth)], len(held))
+    if thorough:
+        best = {n: _one_by_one(j, [k for k in sure if k.name == n]) for n, j in best.items()}
     return _with_evidence(on.data.study.scatter, best, before)
 
 
@@ -136,6 +141,16 @@ def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
         if both and alone and len(both.terms) > held + 1 and both.gain < alone.gain + LEAST_GAIN:
             best[name] = replace(both, gain=min(both.gain, alone.gain - LEAST_GAIN))
     return best
+
+
+def _one_by_one(best: Judged, variants: Sequence[Judged]) -> Judged:
+    """A candidate whose parameters (k,) were all tried alone, with the strength that each has there."""
+    alone = {int(np.argmin(j.variance)): j for j in variants if np.isfinite(j.variance).sum() == 1}
+    together = next((j for j in variants if np.isfinite(j.variance).all()), best)
+    if len(alone) < max(len(best.strength), 2):
+        return best
+    return replace(together, strength=np.array([alone[i].strength[i] for i in range(len(alone))]),
+                   variance=np.array([alone[i].variance[i] for i in range(len(alone))]))
 
 
 def _with_random_parts(on: Trial, left: Sequence[np.ndarray], added: Sequence[np.ndarray], chosen: Judged | None,
@@ -192,8 +207,9 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: 
     for n, j in best.items():
         own = next(t for t in reversed(j.terms) if t.name == n)
         stretched = own.kind == MEAN and at_bound(own, j.strength).any()
-        most = 0.0 if stretched else scatter.evidence(n, j.strength) if scatter else np.inf
-        out[n] = replace(j, evidence=min(j.gain - before, most))
+        error = np.sqrt(j.variance) if len(j.variance) else 0.0
+        news = scatter.evidence(n, j.strength, error) if scatter else np.inf
+        out[n] = replace(j, evidence=min(j.gain - before, 0.0 if stretched else news))
     return out
 
 
@@ -252,19 +268,22 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
     """Scaled parameters (k,) of a term as fitted, the mean of both halves, and variances (k,), 0 but for mean effects.
 
     k: of all parameters that the effect may have free; those that this variant leaves alone are 0, and nobody knows
-    how far they lie from it.
+    how far they lie from it. A variance is no less than what the halves differ by says: where the likelihood has two
+    peaks, its curvature at one of them knows nothing of the other.
     """
     hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
     same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
     k = len(term.free)
-    strength = term.among_all(np.mean([t.scaled(t.values)[:k] for t in same], axis=0))
+    each = np.array([t.scaled(t.values)[:k] for t in same])
+    strength = term.among_all(each.mean(axis=0))
     if term.kind != MEAN:
         return strength, np.zeros(len(strength))
     variances = []
     for f, t in zip(fits, same, strict=True):
         place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
         variances.append(np.diag(f.covariance)[place:place + k])
-    return strength, term.among_all(_of_mean(variances), np.inf)
+    apart = each.var(axis=0, ddof=1) / len(each) if len(each) > 1 else 0.0
+    return strength, term.among_all(np.maximum(_of_mean(variances), apart), np.inf)
 
 
 def _kind_of(term: Term) -> tuple:

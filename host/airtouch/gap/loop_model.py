@@ -183,7 +183,9 @@ def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarra
     logged, turned = _transfers(c, row, axis, np.maximum(f, 0.05))
     cross, aliases = turned * logged.conj(), _aliases(c, row, axis, f)
     for k, folded in zip(FOLDS[1:], aliases, strict=False):  # noise of the gyro folds into log and command alike
-        cross[0] += _difference(f) * np.where(f + k / PERIOD_S < 0.0, folded, folded.conj())
+        beyond = f + k / PERIOD_S
+        both = folded.conj() / _butterworth(2j * np.pi * np.abs(beyond), c.chip_hz)
+        cross[0] += _difference(f) * np.where(beyond < 0.0, both.conj(), both)
     cross, power = strengths @ cross, strengths @ _with_aliases(np.abs(logged) ** 2, aliases)
     if width > 0.0:
         cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))

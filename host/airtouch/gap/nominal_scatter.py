@@ -20,12 +20,13 @@ from importlib import resources
 import numpy as np
 from scipy.stats import t as student
 
-from airtouch.gap.candidates import TWINS
+from airtouch.gap.candidates import TWINS, random
 
 MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
-WORTH = 4.0  #: flights that a class of the table counts as at most, beside the baseline's own
+WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own
+SURELY = 1.645  #: deviations from its middle to the ends of a 90 % interval
 POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them
 NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
 RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
@@ -54,7 +55,8 @@ class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
     rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose flights a
-    class of the table was measured on.
+    class of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
+    negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
     """
 
     rms: Mapping[str, np.ndarray]
@@ -62,17 +64,24 @@ class Scatter:
     rate: tuple[float, float]
     passing_rates: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     vehicle: str = ""
+    middle: Mapping[str, np.ndarray] = field(default_factory=dict)
+    exact: bool = False
 
-    def evidence(self, name: str, strength: np.ndarray) -> float:
+    def evidence(self, name: str, strength: np.ndarray, error: np.ndarray | float = 0.0) -> float:
         """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
 
-        Student's density with `freedom`, of what remains after each further parameter has paid for itself. A parameter
-        that the table does not know yet scatters as the widest of its effect's others.
+        Student's density with `freedom`, of what remains after each further parameter has paid for itself. error (k,):
+        standard deviation by chance; a strength counts with the end of its 90 % interval that is closer to none, as a
+        parameter that the data leave open says nothing. A parameter that the table does not know yet scatters as the
+        widest of its effect's others.
         """
         rms = self.rms.get(name)
         if rms is None or not len(strength):
             return math.inf
         rms = np.append(rms, np.full(max(len(strength) - len(rms), 0), rms.max()))[:len(strength)]
+        if name in self.middle:  # a random effect weaker than usual is no news
+            strength = np.maximum(strength - self.middle[name], 0.0)
+        strength = np.maximum(np.abs(strength) - SURELY * error, 0.0)
         far = float(np.sum((strength / rms) ** 2)) - max(np.count_nonzero(strength) - 1, 0)
         return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
 
@@ -111,13 +120,18 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     name_of = list(classes)[int(np.argmax(weight))]
     own = classes[name_of] if n > 1 else _widest(classes.values())
     least = LEAST if n > 1 and name_of == SIMULATED else LEAST_RECORDED
-    worth = min(own.freedom, WORTH)
-    rms = {}
+    simulated = name_of == SIMULATED and n > 1  # whose flights are all drawn alike
+    worth = own.freedom if simulated else min(own.freedom, WORTH)
+    rms, middle = {}, {}
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
         scale = math.sqrt(wide)
-        own_rms = [_median(scale * _column(rows, name, "strengths", k), scale * _column(rows, name, "errors", k), p,
-                           worth)
+        centre = 0.0
+        if name in own.middle:
+            sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
+            middle[name] = centre = sums / (worth + len(rows))
+        own_rms = [_median(scale * (_column(rows, name, "strengths", k) - np.broadcast_to(centre, len(prior))[k]),
+                           scale * _column(rows, name, "errors", k), p, worth)
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
@@ -126,7 +140,8 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
         if len({len(x) for x in same}) == 1:
             rms |= {n: np.max(same, axis=0) for n in group if n in rms}
     passing = {n: _rate(r, [f.passing_rates.get(n, 0.0) for f in known], worth) for n, r in own.passing_rates.items()}
-    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing)
+    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing, middle=middle,
+                   exact=simulated)
 
 
 def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
@@ -164,7 +179,8 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
             if name in flight.strengths:
                 n = min(len(rms), len(flight.strengths[name]))
                 variance = np.maximum(rms[:n], NEVER_BELOW) ** 2 + wide * flight.errors[name][:n] ** 2
-                far = wide * flight.strengths[name][:n] ** 2 / variance
+                strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
+                far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
         passing = [(flight.passing_rates.get(n, 0.0), r) for n, r in own.passing_rates.items()]
         for rate, (middle, spread) in ((flight.rate, own.rate), *passing):
@@ -190,7 +206,7 @@ def table() -> dict[str, Scatter]:
     text = (resources.files("airtouch") / "gap" / "nominal_scatter.toml").read_text(encoding="utf-8")
     return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
                           tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["root_passing_rates"].items()},
-                          entry.get("vehicle", ""))
+                          entry.get("vehicle", ""), {k: np.array(v) for k, v in entry.get("middle", {}).items()})
             for name, entry in tomllib.loads(text).items()}
 
 
@@ -202,16 +218,19 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
     """
     alike = flights if alike is None else alike
     names = sorted({n for f in flights for n in f.strengths})
-    rms = {}
+    rms, middle = {}, {}
     for name in names:
         rows = [f for f in flights if name in f.strengths]
         size = max(len(f.strengths[name]) for f in rows)
         columns = [tuple(_column(rows, name, part, k) for part in ("strengths", "errors")) for k in range(size)]
+        if random(name):
+            middle[name] = np.array([strengths.mean() for strengths, _ in columns])
+            columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
         pooled = _median(*(np.concatenate(part) for part in zip(*columns, strict=True)), 0.0, 0.0)
         rms[name] = np.array([_median(*c, pooled, POOLED) for c in columns] if size > 1 else [pooled])
     passing = {n: _robust([f.passing_rates.get(n, 0.0) for f in alike])
                for n in sorted({n for f in alike for n in f.passing_rates})}
-    return Scatter(rms, float(len(alike)), _robust([f.rate for f in alike]), passing)
+    return Scatter(rms, float(len(alike)), _robust([f.rate for f in alike]), passing, middle=middle)
 
 
 def _robust(rates: Sequence[float]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term
+from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, random
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
 from airtouch.gap.fit import fit
@@ -28,11 +28,13 @@ from airtouch.gap.judging import (
     strength_of,
     trial_of,
 )
-from airtouch.gap.selection import UNKNOWN_GAIN, Hypothesis, Judged, Selection
+from airtouch.gap.selection import TEMPERATURE, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 
-LOOP_GAIN = 20.0  #: of one that changes a loop faster than the log, as nominal flights seem to by a tenth now and then
-LEAST_SHARE = 0.01  #: and as a share of what the effects before it have added
-LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
+#: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
+LEAST_SHARE, LEAST_RECORDED = 0.01, 0.1  #: and in others: no model of air is exact
+#: the same of what is random, as what a model is wrong by looks so, and of what changes the loop beside another that
+ASSUMED_SHARE = 0.25  #: does or shakes it
+CERTAIN = 20.0  #: evidence beyond which more says no more
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 WORTH_AGAIN = 0.25  #: of what the first effect must gain; candidates below it are not judged again beside a deviation
@@ -47,7 +49,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
-    need = {name: needed(data, j.terms) for name, j in alone.items()}
+    need = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
     passing = _passing(on, alone, need, without)
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
     if passing is not None and any(s.named and s.name == passing.name and s.share < least[s.name] for s in steps):
@@ -74,15 +76,16 @@ def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: M
         tried, need = _beside(on, candidates, steps, singles, progress)
     while sum(s.named for s in steps) < MOST_EFFECTS:
         so_far = steps[-1].gain if steps else 0.0
+        sure = LEAST_GAIN if any(s.named for s in steps) else FIRST_GAIN
         enough = {n: j for n, j in tried.items() if j.gain - so_far >= need[n]}
         if sum(not s.named for s in steps) == MOST_DEVIATIONS:
-            enough = {n: j for n, j in enough.items() if j.evidence >= need[n]}
+            enough = {n: j for n, j in enough.items() if j.evidence >= sure}
         best = _best_of(enough)
         if best is None:
             break
         if not any(s.named for s in steps):  # what nominal flights have as well stands beside every candidate
             singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
-        steps.append(replace(best, named=best.evidence >= need[best.name]))
+        steps.append(replace(best, named=best.evidence >= sure))
         if sum(s.named for s in steps) < MOST_EFFECTS:
             tried, need = _beside(on, candidates, steps,
                                   {n: replace(j, gain=j.gain - so_far) for n, j in tried.items()}, progress)
@@ -155,9 +158,7 @@ def _beside(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], steps: Se
     gained = {n for n, j in first.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
     worth = candidates if named else {n: v for n, v in candidates.items() if n in gained}
     tried = round_of(on, worth, steps[-1], progress)
-    need = {n: _needed_beside(on.data, steps[-1], j) if named else needed(on.data, j.terms[len(steps[-1].terms):])
-            for n, j in tried.items()}
-    return tried, need
+    return tried, {n: _needed_beside(on.data, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}
 
 
 def seconds(data: Data) -> float:
@@ -188,22 +189,23 @@ def nameless(on: Trial, chosen: Judged | None) -> float:
     return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, named)
 
 
-def needed(data: Data, terms: Sequence[Term]) -> float:
-    """Held-out log likelihood that a first effect must gain: less where nominal flights gave the floor."""
-    if data.study.controller is None:
-        return LEAST_GAIN
-    return LOOP_GAIN if data.study.controller.by_firmware and _changes_loop(data, terms) else FIRST_GAIN
-
-
 def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
     """Held-out log likelihood that a further effect must gain: more beside one that gains much: no model is exact."""
     names = {t.name for t in held.terms}
     new = [t for t in more.terms if t.name not in names]
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
-    share = LOOP_SHARE if _assumes(data, held.terms) and _changes_loop(data, new) else LEAST_SHARE
-    return max(LEAST_GAIN, needed(data, new), share * (held.gain - of_clock))
+    scatter = data.study.scatter
+    share = LEAST_RECORDED if scatter is not None and not scatter.exact else LEAST_SHARE
+    if random(more.name) or _assumes(data, held.terms) and _changes_loop(data, new):
+        share = ASSUMED_SHARE
+    return max(LEAST_GAIN, share * (held.gain - of_clock))
 
 
 def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
-    """The best of those that were fitted, and not only looked at; None where there is none."""
-    return max((j for j in judged.values() if j.full), key=lambda j: j.gain, default=None)
+    """The best of those that were fitted, and not only looked at; None where there is none.
+
+    Likelihoods of real flights are too sure of themselves (TEMPERATURE): of two that gain nearly as much, that whose
+    strength is the rarer in nominal flights.
+    """
+    return max((j for j in judged.values() if j.full), default=None,
+               key=lambda j: j.gain / TEMPERATURE + min(j.evidence, CERTAIN))

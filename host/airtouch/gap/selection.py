@@ -61,7 +61,7 @@ class Selection:
     free_before: float
     free_after: float
     parts: tuple[Part, Part]
-    least: Mapping[str, float]  #: gain that each candidate needs as the first
+    least: Mapping[str, float]  #: evidence that each candidate needs as the first
     nominal: int
     assumed: bool
     usual: float  #: log likelihood that a nameless model gains in nominal flights as long as these
