@@ -32,8 +32,8 @@ from airtouch.gap.selection import TEMPERATURE, UNKNOWN_GAIN, Hypothesis, Judged
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
 LEAST_SHARE, LEAST_RECORDED = 0.01, 0.1  #: and in others: no model of air is exact
-#: the same of what is random, as what a model is wrong by looks so, and of what changes the loop beside another that
-ASSUMED_SHARE = 0.25  #: does or shakes it
+LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
+RANDOM_SHARE = 0.25  #: the same of what is random, to be named: what the model of another is wrong by looks random
 CERTAIN = 20.0  #: evidence beyond which more says no more
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
@@ -76,7 +76,8 @@ def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: M
         tried, need = _beside(on, candidates, steps, singles, progress)
     while sum(s.named for s in steps) < MOST_EFFECTS:
         so_far = steps[-1].gain if steps else 0.0
-        sure = LEAST_GAIN if any(s.named for s in steps) else FIRST_GAIN
+        beside = any(s.named for s in steps)
+        sure = LEAST_GAIN if beside else FIRST_GAIN
         enough = {n: j for n, j in tried.items() if j.gain - so_far >= need[n]}
         if sum(not s.named for s in steps) == MOST_DEVIATIONS:
             enough = {n: j for n, j in enough.items() if j.evidence >= sure}
@@ -85,7 +86,8 @@ def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: M
             break
         if not any(s.named for s in steps):  # what nominal flights have as well stands beside every candidate
             singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
-        steps.append(replace(best, named=best.evidence >= sure))
+        left_by_another = beside and random(best.name) and best.gain - so_far < RANDOM_SHARE * so_far
+        steps.append(replace(best, named=best.evidence >= sure and not left_by_another))
         if sum(s.named for s in steps) < MOST_EFFECTS:
             tried, need = _beside(on, candidates, steps,
                                   {n: replace(j, gain=j.gain - so_far) for n, j in tried.items()}, progress)
@@ -196,8 +198,8 @@ def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
     scatter = data.study.scatter
     share = LEAST_RECORDED if scatter is not None and not scatter.exact else LEAST_SHARE
-    if random(more.name) or _assumes(data, held.terms) and _changes_loop(data, new):
-        share = ASSUMED_SHARE
+    if _assumes(data, held.terms) and _changes_loop(data, new):
+        share = LOOP_SHARE
     return max(LEAST_GAIN, share * (held.gain - of_clock))
 
 
