@@ -17,9 +17,11 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import AppCore
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
-from tools.emulate import build, gap8
+from airtouch.simulation.scenario import draw_flight
+from tools.emulate import build, gap8, height
 from tools.emulate.board import REPLAY, Board
 from tools.emulate.deck import CLEAR, Deck, Faults, frame
+from tools.emulate.plant import FLOW, Plant
 from tools.emulate.replay import FED, desktop_values, differs, replay, rows, sample
 
 ROOT = Path(__file__).parents[2]
@@ -119,6 +121,30 @@ def test_a_bit_more_is_a_difference():
     assert differs("fwz", off, values["fwz"]) and differs("steps", values["steps"] + 1, values["steps"])
     assert differs("health", int(values["health"]) ^ 1, values["health"]) and not differs("late", 7, 0)
     assert not differs("thresh", np.nan, np.nan) and differs("thresh", 1.0, np.nan) and differs("fwz", -0.0, 0.0)
+
+
+def counts_of_flow(x, distance, top):
+    """Forward counts of the optical flow, sum of 0.2 s at 0.3 m/s, so far above what lies below x."""
+    plan = draw_flight(height.mission(height.CASES[0]), 1, 0)
+    plant = Plant(plan, vehicles.load("crazyflie-2.1-flow"), 1, 0, [])
+    drone = plant._stepper.plant[0]
+    drone["flow_noise"] = 0.0
+    total = 0.0
+    for _ in range(300):
+        state = plant.memory["state"]
+        state[:3] = x, 0.0, top + distance + float(drone["range_below_rotors"])
+        state[3:6], state[6:10], state[10:13] = (0.3, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0
+        plant.step(np.full(4, 40_000.0))
+        total += plant.readings[FLOW]
+    return total
+
+
+def test_the_emulated_flow_sees_the_distance_to_what_is_below():
+    """Not the height over the floor: the real firmware divides by its own height, and corrects nothing."""
+    floor, platform = counts_of_flow(0.0, 0.2, 0.0), counts_of_flow(0.95, 0.2, 0.76)
+    assert platform == pytest.approx(floor, rel=0.05) and floor > 0.0
+    assert counts_of_flow(0.0, 0.4, 0.0) == pytest.approx(0.5 * floor, rel=0.05)
+    assert counts_of_flow(0.95, 0.04, 0.76) == pytest.approx(2.5 * floor, rel=0.05), "0.08 m is the nearest in focus"
 
 
 class Wire:

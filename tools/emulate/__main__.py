@@ -13,6 +13,8 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
+
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import read
@@ -20,6 +22,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
 from tools.emulate import build, gap8, height
+from tools.emulate.board import PER_US
 from tools.emulate.compare import report
 from tools.emulate.replay import VEHICLES, Replay, replay
 
@@ -51,7 +54,8 @@ def show(what: str, seconds: float, found: Replay) -> None:
     print(f"{what}: {found.steps} steps, {found.different} differ, prob within {found.prob_off:.1g}; edges "
           f"{' '.join(f'{kind}@{step}' for step, kind in found.edges) or 'none'}\n  late {found.late}, longest step "
           f"{found.longest_us} us; app's stack {found.stack_bytes} of 1600 bytes, least left of any task {4 * words} "
-          f"({task});\n  "
+          f"({task});\n  instructions of a step, with what preempted it: mean "
+          f"{PER_US * int(np.mean(found.loads_us)):,}, longest {PER_US * max(found.loads_us):,}, to {PER_US};\n  "
           f"{found.steps / 100:.1f} s of flight in {seconds:.0f} s", flush=True)
     if found.first:
         print(f"  first difference: {found.first}")
@@ -68,6 +72,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
     parser.add_argument("--height", action="store_true",
                         help="closed loop over edges of every kind: the height kept or not")
+    parser.add_argument("--seeds", type=int, default=1, help="of --height: draws of the noise (1)")
+    parser.add_argument("--only", default="", help="of --height: cases whose names begin so")
     parser.add_argument("--gap8", action="store_true",
                         help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
     parser.add_argument("--config", help="of firmware/app: app-config-tap and the like")
@@ -81,7 +87,7 @@ def main(arguments: list[str]) -> int:
     if given.fly:
         return 0 if report(elf) else 1
     if given.height:
-        return 0 if height.report(elf) else 1
+        return 0 if height.report(elf, given.seeds, given.only) else 1
     if given.gap8:
         log = read(given.flights[0]) if given.flights else recorded(1)[0]
         return 0 if gap8.report(elf, later(log, given.begin), given.steps) else 1

@@ -19,6 +19,7 @@ from airtouch.errors import AirTouchError
 from tools.emulator.elf import Elf
 
 SHIFT = 3  #: an instruction takes 2^3 ns: 125 million a second, as 168 MHz at 1.34 cycles each
+PER_US = 1000 >> SHIFT  #: instructions a microsecond of the firmware's clock
 PATIENCE_S = 120.0  #: of ours, for one frame
 REPLAY, FLY = b"R", b"F"
 FLOAT, SIGNED = 7, (4, 5, 6)  #: types of the firmware's log

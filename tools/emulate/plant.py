@@ -26,6 +26,9 @@ class Plant:
         self._stepper = s = Stepper(plan, vehicle, seed, flight, active)
         s.plant["firmware"]["filters"]["acc_hz"] = 0.0  # the real firmware has its own
         s.plant["gyro_lowpass"] = 0.0
+        # The simulator's flow is that of recorded flights, whose firmware was corrected for the platform: it follows
+        # the height over the floor. The sensor itself sees the distance to what is below.
+        s.plant["flow_share"] = 1.0
         s.begin(plan.setpoints[0])
         self.memory = s.memory[0]
         self.readings = np.zeros(READINGS)

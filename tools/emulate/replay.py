@@ -41,6 +41,7 @@ class Replay:
     edges: list[tuple[int, str]] = field(default_factory=list)
     late: int = 0
     longest_us: int = 0
+    loads_us: list[int] = field(default_factory=list)
     stack_bytes: int = 0
     least_left: tuple[str, int] = ("", 0)  #: task whose stack has the fewest unused words, and how many
     console: str = ""
@@ -114,6 +115,7 @@ def replay(elf: Path, log: FlightLog, steps: int | None = None,
             acc, gyro, pwm, volts, attitude = sample(row)
             kind = core.step(acc, gyro, pwm, vbat_v=volts, attitude=attitude)
             values = board.values(board.hear("S"))
+            found.loads_us.append(int(values["airtouch.load"]))
             if kind != EDGES[0]:
                 found.edges.append((step, kind))
             compare(found, step, values, desktop_values(core))
