@@ -33,7 +33,7 @@ Figures, by the paper's labels:
               help="Recorded flights, a folder with a manifest.csv; AIRTOUCH_FLIGHTS or ../shared/flights if left out.")
 @click.option("--power-log", type=click.Path(path_type=Path, dir_okay=False),
               help="An INA219's log with a column of stages, for table1; an estimate if left out.")
-@click.option("--quick", is_flag=True, help="Fewer flights, one fold, short trainings: under three minutes.")
+@click.option("--quick", is_flag=True, help="Fewer flights, one fold, short trainings.")
 @click.option("--force", is_flag=True, help="Make figures again that are there, and replace those of other settings.")
 def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: Path | None, quick: bool,
             force: bool) -> None:
@@ -44,7 +44,7 @@ def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: P
 
     \b
     airtouch paper --quick                       # a first look
-    airtouch paper                               # all of it, under half an hour on two cores; goes on after a stop
+    airtouch paper                               # all of it; goes on after a stop
     airtouch paper --only fig8d --only fig11b    # two figures
 
     Without recorded flights the figures that need them say so; the others are made. Exit code 2 where one was not made.
