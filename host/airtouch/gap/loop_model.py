@@ -8,7 +8,7 @@ gains are found from flights. Commands are in newtons per motor.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -143,7 +143,12 @@ def _aliases(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """What of the first source's noise folds into the log, noise to command, complex (folds, bins)."""
     if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
         return np.zeros((0, len(f)))
-    return _transfers(c, row, axis, np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05))[0][0]
+    folded = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
+    fixed = _fixed(c, folded)
+    plant, rate, angle, velocity, whole = _parts(c, row, axis, folded, fixed.s)
+    kick = _kick(c, fixed)
+    turned = plant * -(rate + angle) / (1.0 + plant * whole)
+    return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * turned
 
 
 def _with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
@@ -208,23 +213,23 @@ def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> 
 
     and its integrals; and all together.
     """
-    hold = np.sinc(f * c.period_s) * np.exp(-0.5 * s * c.period_s)
-    motor = np.exp(-s * float(row["actuator_delay"])) * hold * 0.5 * (
+    fixed = _fixed(c, f)
+    motor = _delayed(float(row["actuator_delay"]), 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
         1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
-    late = _delayed(s, float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0)
+    late = _delayed(float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
     lift = 4.0 * float(np.mean(row["gain"]))
-    renewed = _renewed(c, s)
+    renewed = fixed.renewed
     if axis == "thrust":
         k = float(row["height_gain"])
-        late = late * renewed / _butterworth(s, c.acc_hz)
+        late = late * renewed / fixed.acc
         climb = k * c.gain * (1.0 + c.integral / s) * late
         height = climb * c.angle * k * (1.0 + c.angle_integral / s) / s
         return lift / float(row["mass"]) * motor / s, climb, height, 0.0 * s, climb + height
     i = AXES.index(axis) - 1
     arm = _arm(row, i)
     k = c.gain * float(row["rate_gain"])
-    change = c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
-    filtered = late / _butterworth(s, c.lowpass_hz) / _butterworth(s, c.chip_hz)
+    change = c.derivative * fixed.change
+    filtered = late / fixed.lowpass / fixed.chip
     rate = k * (1.0 + c.integral / s + change) * filtered
     angle = k * (1.0 + c.integral / s + (change if c.on_error else 0.0)) * c.angle * float(row["attitude_gain"])
     angle = angle * (1.0 + c.angle_integral / s)
@@ -233,11 +238,38 @@ def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> 
     return (lift * arm / float(row["inertia"][i]) * motor / s, rate, angle, velocity, rate + angle + velocity)
 
 
-def _renewed(c: Controller, s: np.ndarray) -> np.ndarray:
-    """What the estimator's period does to its attitude, velocity and height: they hold between two predictions."""
-    runs = round(c.hold_s / c.period_s) if c.lowpass_hz else 1
-    held = sum(np.exp(-s * k * c.period_s) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
-    return held * np.exp(-0.5 * s * IMU_S) if c.hold_s else held
+class Fixed(NamedTuple):
+    """What no gain and no vehicle changes in the loop at some frequencies: arrays of their shape, or 1.
+
+    s: 2 pi i f; hold: of the motors' commands; renewed: of the estimator's attitude, velocity and height, which hold
+    between two predictions; change, outer: differences over a run of the controller and of the outer loop, 1/s;
+    lowpass, chip, acc: by which the controller's low-pass, the gyro's own and that of the acceleration divide.
+    """
+
+    s: np.ndarray
+    hold: np.ndarray
+    renewed: np.ndarray
+    change: np.ndarray
+    outer: np.ndarray
+    lowpass: np.ndarray | float
+    chip: np.ndarray | float
+    acc: np.ndarray | float
+
+
+def _fixed(c: Controller, f: np.ndarray) -> Fixed:
+    return _fixed_at(c.period_s, c.hold_s, c.lowpass_hz, c.chip_hz, c.acc_hz, f.shape, f.tobytes())
+
+
+@lru_cache(256)
+def _fixed_at(period: float, hold: float, lowpass: float, chip: float, acc: float, shape: tuple[int, ...],
+              frequencies: bytes) -> Fixed:
+    f = np.frombuffer(frequencies).reshape(shape)
+    s = 2j * np.pi * f
+    runs = round(hold / period) if lowpass else 1
+    held = sum(np.exp(-s * k * period) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
+    return Fixed(s, np.sinc(f * period) * np.exp(-0.5 * s * period), held * np.exp(-0.5 * s * IMU_S) if hold else held,
+                 (1.0 - np.exp(-s * period)) / period, (1.0 - np.exp(-s * OUTER_S)) / period,
+                 _butterworth(s, lowpass), _butterworth(s, chip), _butterworth(s, acc))
 
 
 def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -267,12 +299,10 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     size = 1.0 / (1.0 + plant * whole)
     k = c.gain * float(row["rate_gain"])
     tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])
-    kick = np.ones_like(s)
-    # set-points of the outer loop and attitudes come as steps; the log takes the sample on which they do
+    fixed = _fixed(c, f)
+    kick = _kick(c, fixed)
     if c.on_error:
-        share = 1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * c.period_s)) / c.period_s
-        kick = (1.0 + c.integral / s + c.derivative * (1.0 - np.exp(-s * OUTER_S)) / c.period_s) / share
-        tilt = tilt * share / (1.0 + c.integral / s)
+        tilt = tilt * (1.0 + c.integral / s + c.derivative * fixed.change) / (1.0 + c.integral / s)
     speed = tilt * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
     tilt = tilt * (1.0 + c.angle_integral / s)
     seen = [] if c.lowpass_hz else [tilt]
@@ -283,8 +313,19 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     turned[-1] = size / s
     logged = stepped - (rate + kick * (angle + velocity)) * turned
     turned = s * turned
-    turned[0] += _difference(f) / _butterworth(s, c.chip_hz)
+    turned[0] += _difference(f) / fixed.chip
     return logged, turned
+
+
+def _kick(c: Controller, fixed: Fixed) -> np.ndarray | float:
+    """Angle path in the log over that in the loop: set-points of the outer loop and attitudes come as steps, and the
+
+    log takes the sample on which they do.
+    """
+    if not c.on_error:
+        return 1.0
+    plain = 1.0 + c.integral / fixed.s
+    return (plain + c.derivative * fixed.outer) / (plain + c.derivative * fixed.change)
 
 
 def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
@@ -307,22 +348,29 @@ def _ranged(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
     Between two readings T apart the estimate moves on its own: X = (1 - (1 - K H) F / z)^-1 K.
     """
     s = 2j * np.pi * f
-    a, b, t = *c.range_gains, c.range_s
-    z = np.exp(-s * t)
+    height, climb = _estimated(*c.range_gains, c.range_s, f.tobytes())
+    k = float(row["height_gain"])
+    gain = k * c.gain * (1.0 + c.integral / s)
+    return np.sinc(f * c.range_s) * gain * (climb + c.angle * k * (1.0 + c.angle_integral / s) * height)
+
+
+@lru_cache(64)
+def _estimated(a: float, b: float, t: float, frequencies: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Height and climb (1/s) of the estimator, gains a and b, for an error of readings t apart, complex (bins,)."""
+    z = np.exp(-2j * np.pi * np.frombuffer(frequencies) * t)
     # (1 - K H) F = [[1 - a, (1 - a) t], [-b, 1 - b t]]
     m00, m01, m10, m11 = 1.0 - z * (1.0 - a), -z * (1.0 - a) * t, z * b, 1.0 - z * (1.0 - b * t)
     det = m00 * m11 - m01 * m10
-    height, climb = (m11 * a - m01 * b) / det, (m00 * b - m10 * a) / det
-    k = float(row["height_gain"])
-    gain = k * c.gain * (1.0 + c.integral / s)
-    return np.sinc(f * t) * gain * (climb + c.angle * k * (1.0 + c.angle_integral / s) * height)
+    return (m11 * a - m01 * b) / det, (m00 * b - m10 * a) / det
 
 
-def _delayed(s: np.ndarray, delay: float, step: float) -> np.ndarray:
+@lru_cache(512)
+def _delayed(delay: float, step: float, shape: tuple[int, ...], frequencies: bytes) -> np.ndarray:
     """A delay; between two steps the simulator (and this) draws a straight line, which smooths.
 
     Not below one step: there the smoothing alone would pass for lower gains.
     """
+    s = 2j * np.pi * np.frombuffer(frequencies).reshape(shape)
     if step <= 0.0 or delay < step:
         return np.exp(-s * delay)
     whole = np.floor(delay / step + 1e-9)

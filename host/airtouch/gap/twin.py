@@ -167,14 +167,25 @@ class Twin:
 
     def _of_axis(self, what: str, row: Any, axis: str, f: np.ndarray, make: Callable[[Controller], Any]) -> Any:
         """What a controller makes of an axis at frequencies f; made once for all plant rows with the same loop."""
-        by_firmware = self.by_firmware or what == "torque"  # in which a controller counts for its period alone
-        controller = firmware(row, axis) if by_firmware else self.controllers[AXES.index(axis)]
-        key = (what, axis, controller, of_loop(row, axis), f.tobytes())
+        by_firmware, *loops = self._loops(row)[AXES.index(axis)]
+        # in the torque of a command a controller counts for its period alone
+        controller = by_firmware if self.by_firmware or what == "torque" else self.controllers[AXES.index(axis)]
+        key = (what, axis, controller, *loops, f.tobytes())
         kept = self.__dict__.setdefault("_axes", {})
         if key not in kept:
             if len(kept) >= LOOPS:
                 kept.clear()
             kept[key] = make(controller)
+        return kept[key]
+
+    def _loops(self, row: Any) -> list[tuple]:
+        """The firmware's controller of each of AXES, and what else a plant row gives its loop."""
+        key = row.tobytes()
+        kept = self.__dict__.setdefault("_rows", {})
+        if key not in kept:
+            if len(kept) >= PLANTS:
+                kept.clear()
+            kept[key] = [(firmware(row, axis), of_loop(row, axis)) for axis in AXES]
         return kept[key]
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
