@@ -1,6 +1,10 @@
 """Sealed sets: nothing leaks, the seal holds, scores are right, and a small check of the diagnosis itself."""
 
 import json
+import os
+import pickle
+import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,6 +40,54 @@ def test_diagnosis_names_clear_effects(checked):
     assert found["pairs_one_right"]["hits"] == 2
     assert found["parameters"]["error"]["value"] < 0.25
     assert found["shrink"]["right"]["value"] > 0.75 and found["shrink"]["wrong"]["value"] < 0.25
+
+
+def dying(case):
+    """A flight's answer as it was before; the first process that is given the second flight dies."""
+    first = Path(os.environ["DIED"])
+    if case[0] == "flight_0001" and not first.exists():
+        first.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return case[0], case[1], (Path(os.environ["ANSWERS"]) / f"{case[0]}.json").read_text()
+
+
+def always_dying(_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_dies_loses_nothing(checked, tmp_path, monkeypatch):
+    folder, _ = checked
+    monkeypatch.setenv("DIED", str(tmp_path / "died"))
+    monkeypatch.setenv("ANSWERS", str(folder / "answers"))
+    monkeypatch.setattr(blind_run, "_with_study", dying)
+    names, said = [f"flight_{i:04d}" for i in range(3)], []
+    blind_run.answer(folder, tmp_path / "answers", [(n, ()) for n in names], 2, said.append, object())
+    assert (tmp_path / "died").exists() and any("died" in s for s in said)
+    for n in names:
+        assert (tmp_path / "answers" / f"{n}.json").read_bytes() == (folder / "answers" / f"{n}.json").read_bytes()
+
+
+def test_processes_that_die_again_and_again_are_told(checked, tmp_path, monkeypatch):
+    monkeypatch.setattr(blind_run, "_with_study", always_dying)
+    with pytest.raises(AirTouchError, match="4 processes died"):
+        blind_run.answer(checked[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
+                         study=object())
+
+
+def test_answers_are_the_same_wherever_flights_are_spread(checked, tmp_path):
+    folder, _ = checked
+    sent = []
+
+    def spread(function, items):
+        for item in items:
+            sent.append(pickle.dumps((function, item)))
+            function, item = pickle.loads(sent[-1])
+            yield function(item)
+
+    blind_run.answer(folder, tmp_path / "answers", [("flight_0001", ())], spread=spread)
+    assert len(sent) == 1
+    assert (tmp_path / "answers" / "flight_0001.json").read_bytes() == \
+        (folder / "answers" / "flight_0001.json").read_bytes()
 
 
 def test_flights_say_nothing_of_their_effect(checked):

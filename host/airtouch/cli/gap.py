@@ -274,9 +274,10 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
               help="How many flights; 42 % have one effect, 42 % none, the rest two.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
+@click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler, instead of processes here.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
               help="Write every figure; default: OUT/figures.json.")
-def blind_run(out: Path, flights: int, seed: int, workers: int, json_path: Path | None) -> None:
+def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None, json_path: Path | None) -> None:
     """The whole check in the folder OUT: make a set, diagnose it, open the key, score.
 
     Goes on where it was broken off. Single effects are then diagnosed once more with the
@@ -287,8 +288,9 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, json_path: Path 
     from airtouch.gap import blind_run as whole
 
     need("plots", "scoring a sealed set")
+    spread = _runner(dask, ()) if dask else None
     with gap_show.Bar() as bar:
-        found = whole.run(out, flights, seed, workers=workers, progress=bar)
+        found = whole.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
     _scored(found, json_path or out / "figures.json", out / "figures.png", True)
 
 

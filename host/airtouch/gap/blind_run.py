@@ -5,29 +5,41 @@ One JSON for each case under OUT/answers: what is there is not done again.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from airtouch.errors import AirTouchError
 from airtouch.gap import blind, blind_score, measure
 from airtouch.gap.blind_draw import KINDS
 from airtouch.gap.candidates import twins_of
 from airtouch.gap.data import Study
 from airtouch.gap.diagnose import brief
 from airtouch.logs.files import read, write_bytes
+from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import load
 
 Say = Callable[[str], None]
+Mapper = Callable[[Callable, Iterable], Iterable]
+Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
+Answer = tuple[str, tuple[str, ...], str]
+AHEAD = 4  #: flights sent to each process and not yet back
+DEATHS = 3  #: of local processes, after which the work goes on
 _study: Study | None = None
 
 
 def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
-        kinds: Iterable[str] | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
+        kinds: Iterable[str] | None = None, spread: Mapper | None = None, progress: Say = lambda _: None,
+        ) -> dict[str, Any]:
     """Make the set in `out` (unless it is there), diagnose it, score it: `blind_score.figures`.
 
-    unknown: how many single flights are diagnosed once more without their effect, all by
-    default. Takes about 2 s of one core for each flight, once more for each single one.
+    unknown: how many single flights are diagnosed once more without their effect, all by default. spread: what
+    stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about 4 s of
+    one core for each flight, once more for each single one.
     """
     out = Path(out)
     if not (out / "sealed.json").exists():
@@ -35,34 +47,54 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     answers = out / "answers"
     names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
     study = _study_in(out)
-    answer(out, answers, [(n, ()) for n in names], workers, progress, study)
+    answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
     first = sorted(answers.glob("flight_????.json"))
     # the key is opened for the answers above; effects can be withheld only when they are known
     sealed = hashlib.sha256(json.dumps([json.loads(p.read_text()) for p in first], sort_keys=True).encode()).hexdigest()
     key = blind.open_key(out, sealed)["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := twins_of(e)) else (e,)) for n, e in single[:unknown]]
-    answer(out, answers, cases, workers, progress, study)
+    answer(out, answers, cases, workers, progress, study, spread)
     return blind.score(out, answers)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
-           progress: Say = lambda _: None, study: Study | None = None) -> None:
+           progress: Say = lambda _: None, study: Study | None = None, spread: Mapper | None = None) -> None:
     """Diagnose flights of a set, one JSON each in `answers`; each case is a flight and effects to leave out.
 
-    study: of the set, where it is there already.
+    study: of the set, where it is there already; spread: as for `run`. A local process that dies takes nothing along
+    but the flights that it was at, which are done again. Raises AirTouchError where processes die again and again.
     """
     answers.mkdir(parents=True, exist_ok=True)
-    todo = [(folder, answers, name, without) for name, without in cases if not _place(answers, name, without).exists()]
-    study = study or (_study_in(folder) if todo else None)
-    if workers == 1 or len(todo) < 3:
-        _begin(study)
-        for case in todo:
-            progress(_diagnose(case))
+    cases = list(cases)
+    for left in range(DEATHS, -1, -1):
+        todo = [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
+        if not todo:
+            return
+        study = study or _study_in(folder)
+        logs = ((name, without, read(folder / f"{name}.csv.gz")) for name, without in todo)
+        try:
+            for name, without, text in _answers(study, logs, min(workers, len(todo)), spread):
+                write_bytes(text.encode(), _place(answers, name, without), True)
+                progress(name)
+        except BrokenProcessPool:
+            progress(f"a process died; {left} more may")
+    raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
+
+
+def _answers(study: Study, logs: Iterable[Case], workers: int, spread: Mapper | None) -> Iterator[Answer]:
+    """Answers as they come, in the order of the flights."""
+    if spread is not None or workers == 1:
+        yield from (spread or map)(partial(_diagnosed, study), logs)
         return
     with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
-        for name in pool.map(_diagnose, todo, chunksize=2):
-            progress(name)
+        ahead: deque[Future] = deque()
+        for case in logs:
+            ahead.append(pool.submit(_with_study, case))
+            if len(ahead) >= AHEAD * workers:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
 
 
 def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
@@ -79,14 +111,18 @@ def _begin(study: Study | None) -> None:
     _study = study
 
 
-def _diagnose(case: tuple[Path, Path, str, tuple[str, ...]]) -> str:
-    folder, answers, name, without = case
-    flights = list(measure.usable([read(folder / f"{name}.csv.gz")], _study.vehicle, []))
-    found = brief(_study, flights, without).plain() | {"flights": [name], "without": list(without)}
+def _with_study(case: Case) -> Answer:
+    return _diagnosed(_study, case)
+
+
+def _diagnosed(study: Study, case: Case) -> Answer:
+    """Name, effects left out, and the diagnosis as JSON."""
+    name, without, log = case
+    found = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
+    found |= {"flights": [name], "without": list(without)}
     content = {k: found[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
                                      "gap", "shrink", "control")}
-    write_bytes((json.dumps(content) + "\n").encode(), _place(answers, name, without), True)
-    return name
+    return name, without, json.dumps(content) + "\n"
 
 
 __all__ = ["KINDS", "answer", "blind_score", "run"]
