@@ -40,6 +40,8 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
 }
 #: parameters that are freed once a fit of the others is close
 _LATER = {"battery_sag": ("charge", "capacity"), "slung_load": ("length",)}
+#: a shape that half of the data can hardly tell: its values, of which all the data choose in the end
+_SHAPES = {"ground_effect": ("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22))}
 _ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are also tried alone
 _FIXED = {"ground_effect": {"turbulence": 0.0}, "downwash": {"turbulence": 0.0, "width": 0.0}}
 GATED = ("wind", "gust", "downwash")  #: effects that may come and go within a flight
@@ -91,6 +93,11 @@ class Term:
         """The same with those parameters free too that are fitted last."""
         more = tuple(p for p in _LATER.get(self.name, ()) if p not in self.free)
         return replace(self, free=self.free + more) if more else self
+
+    def shaped(self) -> "list[Term]":
+        """The same in every shape that all the data may choose among; none where its effect has no such."""
+        name, values = _SHAPES.get(self.name, ("", ())) if self.kind == MEAN else ("", ())
+        return [replace(self, values={**self.values, name: v}) for v in values]
 
     @property
     def acts_when_neutral(self) -> bool:

@@ -11,11 +11,11 @@ from airtouch.gap import balance_result, calibrate, callable_module, candidates,
 from airtouch.gap import pictures as picture
 from airtouch.gap.candidates import CLOCK, Term
 from airtouch.gap.data import Data, Study
-from airtouch.gap.fit import fit, strength_variance
+from airtouch.gap.fit import Fit, fit, judge, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.judging import FIRST_GAIN, halves
-from airtouch.gap.problem import whole_of
+from airtouch.gap.problem import Part, whole_of
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
 from airtouch.gap.select import select
 from airtouch.gap.selection import Judged, Selection, probabilities
@@ -29,6 +29,7 @@ from airtouch.vehicle import Vehicle
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
 AT_FLOOR = 1.0  #: gap that is at its floor
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
+SHAPE_PRICE = 1.0  #: log likelihood that another shape of an effect must gain on all the data
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
                "nobody knows how much of the commanded torque is aliases of a faster loop")
@@ -143,7 +144,7 @@ def _effects(data: Data, selection: Selection) -> list[Found]:
         return []
     others = [t for t in selection.whole.terms if t.kind != CLOCK]
     whole = whole_of(data)
-    fitted = fit(data, whole, others, _middle(selection.whole)) if others else None
+    fitted = _best_shape(data, whole, others, _middle(selection.whole)) if others else None
     chosen = {t.name for t in selection.chosen.terms}
     out, place = [], 0
     for t in fitted.terms if fitted else ():
@@ -165,6 +166,19 @@ def _effects(data: Data, selection: Selection) -> list[Found]:
         out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
     order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
     return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
+
+
+def _best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray | None) -> Fit:
+    """Effects fitted to all the data, in the shape that gains most; another than that found must earn its choice."""
+    best = fit(data, whole, terms, start)
+    for i, term in enumerate(terms):
+        level = judge(data, whole, best.terms) + SHAPE_PRICE
+        for shaped in term.shaped():
+            tried = fit(data, whole, [*terms[:i], shaped, *terms[i + 1:]], start)
+            gained = judge(data, whole, tried.terms)
+            if gained > level:
+                best, level = tried, gained
+    return best
 
 
 def _with_random_part(effect: Found, part: Term) -> Found:

@@ -1,0 +1,17 @@
+"""The height by which the lift of the ground dies out is found from all the data, in simulated flights of either curve."""
+
+import pytest
+
+from airtouch.gap import candidates
+from airtouch.gap.data import Data
+from airtouch.gap.diagnose import _best_shape
+from airtouch.gap.problem import whole_of
+from gap_flights import flown
+
+
+@pytest.mark.parametrize("fade", [0.0, 0.06])
+def test_the_shape_that_was_flown_is_found_whichever_was_taken_before(study, fade):
+    data = Data(study, flown(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
+    for taken in candidates.terms("ground_effect"):
+        found = _best_shape(data, whole_of(data), [taken], None).terms[0].values
+        assert found["fade"] == fade
