@@ -1,4 +1,4 @@
-"""The height by which the lift of the ground dies out is found from all the data, in simulated flights of either curve."""
+"""How fast the lift of the ground dies out with height is found from all the data, in simulated flights of either curve."""
 
 import pytest
 
