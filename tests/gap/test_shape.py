@@ -1,4 +1,4 @@
-"""How fast the lift of the ground dies out with height is found from all the data, in simulated flights of either curve."""
+"""How fast the lift of the ground dies out with height is found from all the data, for either curve that was flown."""
 
 import pytest
 
