@@ -20,7 +20,7 @@ def test_names_and_types_are_those_of_the_log_group():
 
 
 def test_health_flags_are_those_of_the_header():
-    flags = re.findall(r"APP_\w+ = (\d+),\s*///<", re.search(r"0 is good\. \*/\ntypedef enum \{(.*?)\}",
+    flags = re.findall(r"APP_\w+ =\s+(\d+),\s*///<", re.search(r"0 is good\. \*/\ntypedef enum \{(.*?)\}",
                                                             (APP / "app_core.h").read_text(), re.DOTALL)[1])
     assert sorted(app_log.HEALTH) == sorted(HEALTH.values()) == sorted(int(flag) for flag in flags)
 
