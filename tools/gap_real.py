@@ -1,8 +1,7 @@
 """The diagnosis on recorded flights and on other people's simulators, each row of the table in host/docs/gap-real.md.
 
-    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep
-    cases.jsonl] python tools/gap_real.py --quick          # a few flights of each row; fails where the diagnosis is
-    broken
+    python tools/gap_real.py [FLIGHTS] [--part build|view|all] [--rows authors swarm ...] [--jobs 2] [--keep x.jsonl]
+    python tools/gap_real.py --quick    # a few flights of each row; fails where the diagnosis is broken
 
 build: the flights on which settings may be chosen: the authors' folds 0 to 2, neural-swarm's days 19 and 20, three of
 CrazyPAD's conditions in four. view: the rest, of which each look is a line of host/docs/looks.md, and the peers, on

@@ -285,13 +285,13 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     """
     from airtouch.cli import gap_show
     from airtouch.extras import need
-    from airtouch.gap import blind_run as whole
+    from airtouch.gap import blind_run as check
 
     need("plots", "scoring a sealed set")
     spread = _runner(dask, ()) if dask else None
     with gap_show.Bar() as bar:
-        found = whole.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
-    _scored(found, json_path or out / "figures.json", out / "figures.png", True)
+        figures = check.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
+    _scored(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 
 def _scored(found: dict[str, Any], json_path: Path | None, plot: Path | None, force: bool) -> None:

@@ -5,9 +5,8 @@ One JSON for each case under OUT/answers: what is there is not done again.
 
 import hashlib
 import json
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
@@ -21,6 +20,7 @@ from airtouch.gap.data import Study
 from airtouch.gap.diagnose import brief
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.in_order import in_order
 from airtouch.vehicle import load
 
 Say = Callable[[str], None]
@@ -88,13 +88,7 @@ def _answers(study: Study, logs: Iterable[Case], workers: int, spread: Mapper | 
         yield from (spread or map)(partial(_diagnosed, study), logs)
         return
     with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
-        ahead: deque[Future] = deque()
-        for case in logs:
-            ahead.append(pool.submit(_with_study, case))
-            if len(ahead) >= AHEAD * workers:
-                yield ahead.popleft().result()
-        while ahead:
-            yield ahead.popleft().result()
+        yield from in_order(partial(pool.submit, _with_study), logs, AHEAD * workers)
 
 
 def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
@@ -118,9 +112,9 @@ def _with_study(case: Case) -> Answer:
 def _diagnosed(study: Study, case: Case) -> Answer:
     """Name, effects left out, and the diagnosis as JSON."""
     name, without, log = case
-    found = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
-    found |= {"flights": [name], "without": list(without)}
-    content = {k: found[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
+    diagnosis = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
+    diagnosis |= {"flights": [name], "without": list(without)}
+    content = {k: diagnosis[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
                                      "gap", "shrink", "control")}
     return name, without, json.dumps(content) + "\n"
 

@@ -216,7 +216,7 @@ def telling(terms: Sequence[Term]) -> Term:
     return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 
-def random(name: str) -> bool:
+def is_random(name: str) -> bool:
     """Whether an effect's strength is that of a random force, which no strength below 0 has."""
     return name in SHAKES or name in EFFECTS and terms(name)[0].kind == SPECTRUM
 

@@ -19,7 +19,7 @@ from airtouch.gap.problem import Part, whole_of
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
 from airtouch.gap.select import select
 from airtouch.gap.selection import Judged, Selection, probabilities
-from airtouch.gap.shrink import Shrink, cells_of, shrink_of
+from airtouch.gap.shrink import Cells, Shrink, cells_of, shrink_of
 from airtouch.gap.spectra import AIR
 from airtouch.gap.twin import Twin
 from airtouch.gap.unexplained import unexplained, why_not
@@ -66,7 +66,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     data = _data(study, some)
     selection = select(data, candidates.every(without), say, without)
     say("how far")
-    ranking, overall, verdict, effects = _ranking(data, selection)
+    gap_cells = cells_of(data, selection.parts, selection.chosen)
+    ranking, overall, verdict, effects = _ranking(data, selection, gap_cells)
     named = [candidates.term_of(e) for e in effects]
     made = gap_map(study, seen, nominal, named)
     first = summary.headline(made.cells, bool(named))
@@ -78,7 +79,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += measure.flown_unlike(study, seen)
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
-    control = _control(data, selection) if verdict == "effect" else {}
+    control = _control(data, selection, gap_cells) if verdict == "effect" else {}
     steps = advices.steps(verdict, effects, alike, first, seen, bool(nominal), vehicle.name)
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), alike, cells,
@@ -99,12 +100,13 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     """
     data = _data(study, flights) if data is None else data
     selection = select(data, candidates.every(without), without=tuple(without))
-    ranking, overall, verdict, effects = _ranking(data, selection)
+    gap_cells = cells_of(data, selection.parts, selection.chosen)
+    ranking, overall, verdict, effects = _ranking(data, selection, gap_cells)
     named = verdict == "effect"
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), _alike(selection), (),
         {"before": overall.before, "after": overall.after if named else overall.before, "floor": 1.0},
-        overall.share if named else None, _control(data, selection) if named else {}, "",
+        overall.share if named else None, _control(data, selection, gap_cells) if named else {}, "",
         flights=tuple(f.name for f in flights))
 
 
@@ -223,10 +225,9 @@ def _spread(law: Twin | None, chosen: Judged, term: Term, covariance: np.ndarray
     return covariance + apart + doubt
 
 
-def _ranking(data: Data, selection: Selection) -> tuple[list[Ranked], Shrink, str, list[Found]]:
+def _ranking(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked], Shrink, str, list[Found]]:
     """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
     parts = selection.parts
-    cells = cells_of(data, parts, selection.chosen)
     overall = shrink_of(data, parts, selection.chosen, cells)
     verdict = _verdict(selection, overall.before)
     effects = _effects(data, selection) if verdict == "effect" else []
@@ -273,15 +274,14 @@ def _alike(selection: Selection) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def _control(data: Data, selection: Selection) -> dict[str, object]:
+def _control(data: Data, selection: Selection, cells: Cells) -> dict[str, object]:
     """The gap with a deliberately wrong effect in the model."""
     taken = {n for g in _alike(selection) for n in g} | {s.name for s in selection.named}
     every = candidates.every()
     for name in WRONG:
         if name in every and name not in taken:
             fits = tuple(fit(data, p, every[name][0]) for p in selection.parts)
-            done = shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits),
-                             cells_of(data, selection.parts, selection.chosen))
+            done = shrink_of(data, selection.parts, Judged(name, fits[0].terms, 0.0, fits), cells)
             return {"name": name, "before": done.before, "after": done.after, "shrink": done.share.plain()}
     return {}
 

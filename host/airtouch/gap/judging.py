@@ -77,7 +77,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     held = chosen.terms if chosen else ()
     have = {(t.name, t.values.get("rotor")) for t in held if not t.companion}
     twins = {n for t in held if not t.companion and (group := twins_of(t.name)) for n in group[0] if n != t.name}
-    left, added = _left(on, chosen)
+    residuals, extra_power = _residuals(on, chosen)
     looked, sure, with_random = [], [], []
     for name, variants in candidates.items():
         progress(name)
@@ -88,23 +88,22 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
                 continue
             choice = np.log(sum(len(v) == len(terms) for v in variants))  # among so many; else many would beat one
             if all(t.kind == MEAN and t.name not in COMMAND_ONLY for t in terms):
-                gain, fitted, variances = first_order(on.screen, on.parts, left, added, terms, held)
+                gain, fitted, variances = first_order(on.screen, on.parts, residuals, extra_power, terms, held)
                 gain += before - price_of(terms) - choice
                 if gain < before + HOPELESS and _only_in_commands(on, terms):
                     sure.append(crossed(on, name, terms, chosen, choice))
                     continue
                 own, k = terms[0], len(terms[0].free)
                 each = np.array(fitted)[:, :k]
-                variance = np.maximum(_of_mean(variances)[:k], each.var(axis=0, ddof=1) / len(each))
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
                                      strength=own.among_all(each.mean(axis=0)),
-                                     variance=own.among_all(variance, np.inf)))
+                                     variance=own.among_all(_of_mean(each, np.array(variances)[:, :k]), np.inf)))
             elif any(t.kind == SPECTRUM for t in terms):
                 with_random.append((name, terms, choice))
             else:
                 sure.append(crossed(on, name, terms, chosen, choice))
     looked = _best_variants(looked)
-    tried = _with_random_parts(on, left, added, chosen, with_random, looked, thorough)
+    tried = _with_random_parts(on, residuals, extra_power, chosen, with_random, looked, thorough)
     sure += [j for j in tried if j.full]
     looked += [j for j in tried if not j.full]
     worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
@@ -115,14 +114,14 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     return _with_evidence(on.data.study.scatter, best, before)
 
 
-def _left(on: Trial, chosen: Judged | None) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _residuals(on: Trial, chosen: Judged | None) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """What a hypothesis, fitted on the other half, leaves of each half, flattened, and the power that it adds."""
-    left, added = [], []
+    residuals, extra_power = [], []
     for k, part in enumerate(on.parts):
         problem, values, power = left_over(on.data, part, chosen.fits[1 - k].terms if chosen and chosen.fits else ())
-        left.append(values)
-        added.append(power - problem.power)
-    return left, added
+        residuals.append(values)
+        extra_power.append(power - problem.power)
+    return residuals, extra_power
 
 
 def _best_of_each(judged: Sequence[Judged], held: int) -> dict[str, Judged]:
@@ -153,9 +152,9 @@ def _one_by_one(best: Judged, variants: Sequence[Judged]) -> Judged:
                    variance=np.array([alone[i].variance[i] for i in range(len(alone))]))
 
 
-def _with_random_parts(on: Trial, left: Sequence[np.ndarray], added: Sequence[np.ndarray], chosen: Judged | None,
-                       hypotheses: Sequence[tuple[str, Hypothesis, float]], means: Sequence[Judged], thorough: bool,
-                       ) -> list[Judged]:
+def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: Sequence[np.ndarray],
+                       chosen: Judged | None, hypotheses: Sequence[tuple[str, Hypothesis, float]],
+                       means: Sequence[Judged], thorough: bool) -> list[Judged]:
     """Hypotheses with a random effect: the variant of each that a first look finds best is judged in full.
 
     hypotheses: name, terms, and what the choice of the variant costs. means: looks at mean effects, best first; the
@@ -169,7 +168,7 @@ def _with_random_parts(on: Trial, left: Sequence[np.ndarray], added: Sequence[np
             continue
         if len(terms) == 1 or terms[0].kind == MEAN:
             random = next(t for t in terms if t.kind == SPECTRUM)
-            gain, strength = random_look(on.screen, on.parts, left, added, random)
+            gain, strength = random_look(on.screen, on.parts, residuals, extra_power, random)
             looks.setdefault(name, []).append((gain - choice, strength, terms, choice))
     out = []
     for name, tried in looks.items():
@@ -268,8 +267,7 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
     """Scaled parameters (k,) of a term as fitted, the mean of both halves, and variances (k,), 0 but for mean effects.
 
     k: of all parameters that the effect may have free; those that this variant leaves alone are 0, and nobody knows
-    how far they lie from it. A variance is no less than what the halves differ by says: where the likelihood has two
-    peaks, its curvature at one of them knows nothing of the other.
+    how far they lie from it.
     """
     hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
     same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
@@ -282,8 +280,7 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
     for f, t in zip(fits, same, strict=True):
         place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
         variances.append(np.diag(f.covariance)[place:place + k])
-    apart = each.var(axis=0, ddof=1) / len(each) if len(each) > 1 else 0.0
-    return strength, term.among_all(np.maximum(_of_mean(variances), apart), np.inf)
+    return strength, term.among_all(_of_mean(each, np.array(variances)), np.inf)
 
 
 def _kind_of(term: Term) -> tuple:
@@ -291,9 +288,13 @@ def _kind_of(term: Term) -> tuple:
     return term.name, term.kind, term.values.get("rotor")
 
 
-def _of_mean(variances: Sequence[np.ndarray]) -> np.ndarray:
-    """Variance of the mean of independent values."""
-    return np.sum(variances, axis=0) / len(variances) ** 2
+def _of_mean(values: np.ndarray, variances: np.ndarray) -> np.ndarray:
+    """Variance (k,) of the mean of independent values (n, k), no less than what they differ by says.
+
+    Where the likelihood has two peaks, its curvature at one of them knows nothing of the other.
+    """
+    apart = values.var(axis=0, ddof=1) / len(values) if len(values) > 1 else 0.0
+    return np.maximum(variances.sum(axis=0) / len(variances) ** 2, apart)
 
 
 def _refined(data: Data, part: Part, found: Fit) -> Fit:

@@ -76,14 +76,14 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
 
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
-    power, left, cost = problem.power + added, values.copy(), 0.0
+    power, residual, cost = problem.power + added, values.copy(), 0.0
     for here, column, spread in problem.offsets:
         amount, most = 0.0, OVERLAP_WEIGHT * (problem.freedom[here] + 1.0) * problem.known[here] / power[here]
         for _ in range(2):
-            weights = most / (problem.tail[here] + squared(left[here]) / power[here])
+            weights = most / (problem.tail[here] + squared(residual[here]) / power[here])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
-            slope = 2.0 * float(np.vdot(column, weights * left[here]).real) - amount / spread ** 2
+            slope = 2.0 * float(np.vdot(column, weights * residual[here]).real) - amount / spread ** 2
             amount += slope / normal
-            left[here] = values[here] - amount * column
+            residual[here] = values[here] - amount * column
         cost += 0.5 * (amount / spread) ** 2
-    return left, cost
+    return residual, cost

@@ -145,7 +145,7 @@ def _aliases(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         return np.zeros((0, len(f)))
     folded = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
     fixed = _fixed(c, folded)
-    plant, rate, angle, velocity, whole = _parts(c, row, axis, folded, fixed.s)
+    plant, rate, angle, velocity, whole = _parts(c, row, axis, folded)
     kick = _kick(c, fixed)
     turned = plant * -(rate + angle) / (1.0 + plant * whole)
     return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * turned
@@ -160,7 +160,7 @@ def _with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
 def excess_phase(c: Controller, row: Any, axis: str) -> float:
     """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable."""
     f = np.geomspace(0.3, 45.0, 160)
-    loop = _open_loop(c, row, axis, f, 2j * np.pi * f)
+    loop = _open_loop(c, row, axis, f)
     turned, size = np.unwrap(np.angle(loop)), np.abs(loop)
     turned += -2.0 * np.pi * np.ceil(turned[0] / (2.0 * np.pi))
     last = np.flatnonzero(size > 1.0)
@@ -174,7 +174,7 @@ def sensitivity(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> n
     """
     f = np.maximum(f, 0.05)
     s = 2j * np.pi * f
-    out = [1.0 / (1.0 + _open_loop(c, row, axis, f, s)) for c, axis in zip(controllers[1:], AXES[1:], strict=True)]
+    out = [1.0 / (1.0 + _open_loop(c, row, axis, f)) for c, axis in zip(controllers[1:], AXES[1:], strict=True)]
     return np.stack([*out, s / (s + 2.0 * np.pi * YAW_HZ)], axis=1)
 
 
@@ -204,16 +204,17 @@ def _difference(f: np.ndarray) -> np.ndarray:
 
 def torque_per_command(row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N."""
-    s = 2j * np.pi * np.maximum(f, 0.05)
-    return s * _parts(firmware(row, axis), row, axis, np.maximum(f, 0.05), s)[0]
+    f = np.maximum(f, 0.05)
+    return 2j * np.pi * f * _parts(firmware(row, axis), row, axis, f)[0]
 
 
-def _parts(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, ...]:
+def _parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, ...]:
     """Plant; the controller's rate (climb), angle (height) and velocity paths, each of the measured rate (climb)
 
     and its integrals; and all together.
     """
     fixed = _fixed(c, f)
+    s = fixed.s
     motor = _delayed(float(row["actuator_delay"]), 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
         1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
     late = _delayed(float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
@@ -272,8 +273,8 @@ def _fixed_at(period: float, hold: float, lowpass: float, chip: float, acc: floa
                  _butterworth(s, lowpass), _butterworth(s, chip), _butterworth(s, acc))
 
 
-def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray, s: np.ndarray) -> np.ndarray:
-    plant, *_, whole = _parts(c, row, axis, f, s)
+def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    plant, *_, whole = _parts(c, row, axis, f)
     return plant * whole
 
 
@@ -282,7 +283,7 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     f = np.maximum(f, 0.05)
     if axis == "thrust":
         s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-        plant, climb, _, _, whole = _parts(c, row, axis, f, s)
+        plant, climb, _, _, whole = _parts(c, row, axis, f)
         size = 1.0 / (1.0 + plant * whole)
         climbs = np.abs(whole * size) ** 2
         sources = [np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4, np.abs(whole / s * size) ** 2]
@@ -295,7 +296,7 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration."""
     s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-    plant, rate, angle, velocity, whole = _parts(c, row, axis, f, s)
+    plant, rate, angle, velocity, whole = _parts(c, row, axis, f)
     size = 1.0 / (1.0 + plant * whole)
     k = c.gain * float(row["rate_gain"])
     tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])

@@ -20,7 +20,7 @@ from importlib import resources
 import numpy as np
 from scipy.stats import t as student
 
-from airtouch.gap.candidates import TWINS, random
+from airtouch.gap.candidates import TWINS, is_random
 
 MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
@@ -119,18 +119,18 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     weight = np.array([_fit(c, known, wide) for c in classes.values()])
     name_of = list(classes)[int(np.argmax(weight))]
     own = classes[name_of] if n > 1 else _widest(classes.values())
-    least = LEAST if n > 1 and name_of == SIMULATED else LEAST_RECORDED
     simulated = name_of == SIMULATED and n > 1  # whose flights are all drawn alike
+    least = LEAST if simulated else LEAST_RECORDED
     worth = own.freedom if simulated else min(own.freedom, WORTH)
     rms, middle = {}, {}
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
         scale = math.sqrt(wide)
-        centre = 0.0
+        centre = np.zeros(len(prior))
         if name in own.middle:
             sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
             middle[name] = centre = sums / (worth + len(rows))
-        own_rms = [_median(scale * (_column(rows, name, "strengths", k) - np.broadcast_to(centre, len(prior))[k]),
+        own_rms = [_median(scale * (_column(rows, name, "strengths", k) - centre[k]),
                            scale * _column(rows, name, "errors", k), p, worth)
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
@@ -223,7 +223,7 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
         rows = [f for f in flights if name in f.strengths]
         size = max(len(f.strengths[name]) for f in rows)
         columns = [tuple(_column(rows, name, part, k) for part in ("strengths", "errors")) for k in range(size)]
-        if random(name):
+        if is_random(name):
             middle[name] = np.array([strengths.mean() for strengths, _ in columns])
             columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
         pooled = _median(*(np.concatenate(part) for part in zip(*columns, strict=True)), 0.0, 0.0)

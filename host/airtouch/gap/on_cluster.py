@@ -1,11 +1,11 @@
 """Work on flights spread over a dask.distributed cluster (extra `scale`)."""
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from airtouch.simulation import cluster
 from airtouch.simulation.effects import load_text
+from airtouch.simulation.in_order import in_order
 
 AHEAD = 64  #: flights sent out and not yet back
 
@@ -19,13 +19,8 @@ def mapper(address: str, plugins: Sequence[str] = ()) -> Callable[[Callable, Ite
     client = cluster.connect(address)
 
     def run(function: Callable, items: Iterable[Any]) -> Iterator[Any]:
-        waiting: deque = deque()
-        for item in items:
-            waiting.append(client.submit(_one, function, item, tuple(plugins), pure=False, retries=3))
-            if len(waiting) >= AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+        return in_order(lambda item: client.submit(_one, function, item, tuple(plugins), pure=False, retries=3), items,
+                        AHEAD)
 
     return run
 

@@ -52,21 +52,21 @@ class Screen:
         return any(np.abs(v).max(initial=0.0) > NOTHING for name in term.free
                    for flight in self.kept[_key(term, name)] for v in flight.values())
 
-    def before(self, problem: Problem, left: np.ndarray, added: np.ndarray) -> tuple[float, float]:
+    def before(self, problem: Problem, residuals: np.ndarray, extra_power: np.ndarray) -> tuple[float, float]:
         """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""
-        known = self.judged.get(id(left))
-        if known is None or known[0] is not left:
-            values, cost = without_offsets(problem, left, added)
-            known = self.judged[id(left)] = (left, problem.likelihood(values, added), cost)
+        known = self.judged.get(id(residuals))
+        if known is None or known[0] is not residuals:
+            values, cost = without_offsets(problem, residuals, extra_power)
+            known = self.judged[id(residuals)] = (residuals, problem.likelihood(values, extra_power), cost)
         return known[1:]
 
 
-def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray],
-                added: Sequence[np.ndarray], terms: Sequence[Term],
+def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.ndarray],
+                extra_power: Sequence[np.ndarray], terms: Sequence[Term],
                 beside: Sequence[Term] = ()) -> tuple[float, list[np.ndarray], list[np.ndarray]]:
     """Held-out gain of mean effects to first order, their scaled parameters on each half, and the variances of these.
 
-    left, added: for each part what the effects chosen before leave, and the power that
+    residuals, extra_power: for each part what the effects chosen before leave, and the power that
     random ones add. beside: those effects, free to give way a little.
     """
     mean = [t for t in terms if t.kind == MEAN and t.name not in COMMAND_ONLY]
@@ -87,35 +87,35 @@ def first_order(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray
         prior = np.concatenate([np.full(len(tables[train]), 30.0), [p for _, p in constants]])
         x, offsets = np.zeros(len(tables[train])), np.zeros(len(constants))
         nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
-        values = left[train]
+        values = residuals[train]
         for _ in range(ROUNDS):
-            change, covariance = bounded_step(columns, prior, values, weights_of(problem, values, added[train]),
+            change, covariance = bounded_step(columns, prior, values, weights_of(problem, values, extra_power[train]),
                                       x, offsets, low, high, nothing)
             x = np.clip(x + change[:len(x)], low, high)
             offsets = offsets + change[len(x):]
-            values = left[train] + np.concatenate([x, offsets]) @ columns
+            values = residuals[train] + np.concatenate([x, offsets]) @ columns
         problem = problem_of(screen.data, parts[test])
-        moved = left[test] + sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(left[test])))
-        after, cost = without_offsets(problem, moved, added[test])
-        before, paid = screen.before(problem, left[test], added[test])
-        gain += problem.likelihood(after, added[test]) - cost - before + paid
+        moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(residuals[test])))
+        after, cost = without_offsets(problem, residuals[test] + moved, extra_power[test])
+        before, paid = screen.before(problem, residuals[test], extra_power[test])
+        gain += problem.likelihood(after, extra_power[test]) - cost - before + paid
         found.append(x[:n])
         variances.append(np.diag(covariance)[:n])
     return gain, found, variances
 
 
-def random_look(screen: Screen, parts: Sequence[Part], left: Sequence[np.ndarray], added: Sequence[np.ndarray],
-                term: Term) -> tuple[float, np.ndarray]:
+def random_look(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.ndarray],
+                extra_power: Sequence[np.ndarray], term: Term) -> tuple[float, np.ndarray]:
     """Held-out gain of a random effect beside what is chosen, which stays as it is, and its scaled strength (k,).
 
-    left, added: as for `first_order`.
+    residuals, extra_power: as for `first_order`.
     """
     gain, strengths = 0.0, []
     for train, test in ((0, 1), (1, 0)):
         problem, other = (problem_of(screen.data, parts[k]) for k in (train, test))
-        found = strongest(problem, term, left[train], added[train])
-        more = other.random_power([found])
-        gain += other.likelihood(left[test], added[test] + more) - other.likelihood(left[test], added[test])
+        found = strongest(problem, term, residuals[train], extra_power[train])
+        rest, before = residuals[test], extra_power[test]
+        gain += other.likelihood(rest, before + other.random_power([found])) - other.likelihood(rest, before)
         strengths.append(found.scaled(found.values))
     return gain, np.mean(strengths, axis=0)
 

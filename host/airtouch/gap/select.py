@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, random
+from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, is_random
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
 from airtouch.gap.fit import fit
@@ -31,7 +31,7 @@ from airtouch.gap.judging import (
 from airtouch.gap.selection import TEMPERATURE, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
-LEAST_SHARE, LEAST_RECORDED = 0.01, 0.1  #: and in others: no model of air is exact
+LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1  #: and in others: no model of air is exact
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
 RANDOM_SHARE = 0.25  #: the same of what is random, to be named: what the model of another is wrong by looks random
 CERTAIN = 20.0  #: evidence beyond which more says no more
@@ -86,7 +86,7 @@ def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: M
             break
         if not any(s.named for s in steps):  # what nominal flights have as well stands beside every candidate
             singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
-        left_by_another = beside and random(best.name) and best.gain - so_far < RANDOM_SHARE * so_far
+        left_by_another = beside and is_random(best.name) and best.gain - so_far < RANDOM_SHARE * so_far
         steps.append(replace(best, named=best.evidence >= sure and not left_by_another))
         if sum(s.named for s in steps) < MOST_EFFECTS:
             tried, need = _beside(on, candidates, steps,
@@ -197,7 +197,7 @@ def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
     new = [t for t in more.terms if t.name not in names]
     of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
     scatter = data.study.scatter
-    share = LEAST_RECORDED if scatter is not None and not scatter.exact else LEAST_SHARE
+    share = RECORDED_SHARE if scatter is not None and not scatter.exact else LEAST_SHARE
     if _assumes(data, held.terms) and _changes_loop(data, new):
         share = LOOP_SHARE
     return max(LEAST_GAIN, share * (held.gain - of_clock))

@@ -17,6 +17,7 @@ from airtouch.gap.fit import left_over
 from airtouch.gap.problem import GROUPS, Part
 from airtouch.gap.result import Quantity
 from airtouch.gap.selection import Judged
+from airtouch.gap.spectra import squared
 
 SURE = 4.0  #: standard errors by which a cell must stand over the floor
 FEWEST = 12  #: values in a cell
@@ -36,61 +37,73 @@ class Shrink:
 
 @dataclass(frozen=True)
 class Cells:
-    """Where a gap is measured, bool (GROUPS,) for each half as the other shows it, and by how much e (floor 1) is
+    """Where a gap is measured: bool (GROUPS,) for each half, as the other half shows it.
 
-    calmer there than in nominal flights once the effects named are in the model.
+    calm: by how much the energy there (floor 1) is below nominal flights' once the effects named are in the model.
+    before: energies (n,) without any effect, calm added.
     """
 
     chosen: tuple[np.ndarray, np.ndarray]
     calm: float
+    before: np.ndarray
 
 
 def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
     """The cells of some flights. named: the effects named."""
-    terms = [f.terms for f in named.fits] if named and named.fits else [(), ()]
+    terms = _terms(named)
     chosen = tuple(_standing_out(data, parts[1 - k], terms[1 - k]) for k in (0, 1))
-    left = np.concatenate([_energy(data, parts[k], terms[1 - k], chosen[k]) for k in (0, 1)])
-    return Cells(chosen, max(1.0 - left.mean(), 0.0) if len(left) else 0.0)
+    after = _energies(data, parts, terms, chosen)
+    calm = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
+    return Cells(chosen, calm, calm + _energies(data, parts, ((), ()), chosen))
 
 
 def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells, seed: int = 0) -> Shrink:
     """The gap over all held-out blocks; each half judged under the fit of the other."""
     if judged is not None and judged.terms and all(t.name == "time_jitter" for t in judged.terms):
         return _clock(data)
-    terms = [f.terms for f in judged.fits] if judged and judged.fits else [(), ()]
-    one, two = (cells.calm + np.concatenate([_energy(data, parts[k], some[1 - k], cells.chosen[k]) for k in (0, 1)])
-                for some in (((), ()), terms))
-    if not len(one):
+    before = cells.before
+    if not len(before):
         return Shrink(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
+    after = cells.calm + _energies(data, parts, _terms(judged), cells.chosen)
     rng = np.random.default_rng(seed)
-    pieces = min(24, len(one))
-    a, b = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (one, two))
+    pieces = min(24, len(before))
+    a, b = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
     pick = rng.integers(0, pieces, (DRAWS, pieces))
     drawn = [_share(x, y) for x, y in zip(a[pick].mean(axis=1), b[pick].mean(axis=1), strict=True)]
     low, high = np.percentile(drawn, [5, 95])
-    return Shrink(float(np.sqrt(one.mean())), float(np.sqrt(two.mean())),
-                  Quantity(_share(one.mean(), two.mean()), float(low), float(high)))
+    return Shrink(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
+                  Quantity(_share(before.mean(), after.mean()), float(low), float(high)))
 
 
-def _energy(data: Data, part: Part, terms: Sequence[Term], cells: np.ndarray) -> np.ndarray:
-    """Energy (n,) over the floor that effects leave of the values of a part that lie in cells."""
-    problem, values, power = left_over(data, part, terms)
-    use = problem.known & cells[problem.groups]
-    return np.minimum(np.abs(values[use]) ** 2 / power[use], LARGEST)
+def _terms(judged: Judged | None) -> Sequence[Sequence[Term]]:
+    """A hypothesis as fitted to each half; nothing where there is none."""
+    return [f.terms for f in judged.fits] if judged and judged.fits else ((), ())
+
+
+def _energies(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], chosen: Sequence[np.ndarray],
+              ) -> np.ndarray:
+    """Energy (n,) over the floor that effects fitted to each half leave of the other's values in chosen cells."""
+    out = []
+    for k in (0, 1):
+        problem, values, power = left_over(data, parts[k], terms[1 - k])
+        use = problem.known & chosen[k][problem.groups]
+        out.append(np.minimum(squared(values[use]) / power[use], LARGEST))
+    return np.concatenate(out)
 
 
 def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     """Which cells, bool (GROUPS,), show a gap in a part, or are where effects fitted to it gain."""
     problem, values, power = left_over(data, part, ())
-    e = np.minimum(np.abs(values) ** 2 / power, LARGEST)
+    e = np.minimum(squared(values) / power, LARGEST)
     count = np.bincount(problem.groups, problem.known, GROUPS)
     mean = np.bincount(problem.groups, e * problem.known, GROUPS) / np.maximum(count, 1)
     out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2
     if terms:
-        wide = any(t.kind == SPECTRUM for t in terms)
-        level = [problem.each(values, power - problem.power) for _, values, power in
-                 (left_over(data, part, some, wide) for some in (terms, ()))]
-        out |= np.bincount(problem.groups, level[0] - level[1], GROUPS) > TELLING
+        if any(t.kind == SPECTRUM for t in terms):  # what they are compared with is as unsure of the commands' floor
+            _, values, power = left_over(data, part, (), True)
+        without = problem.each(values, power - problem.power)
+        _, values, power = left_over(data, part, terms)
+        out |= np.bincount(problem.groups, problem.each(values, power - problem.power) - without, GROUPS) > TELLING
     return out & (count >= FEWEST)
 
 

@@ -148,17 +148,17 @@ class Twin:
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
         """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""
-        made = np.ones((2, len(f), 3), complex)
+        shares = np.ones((2, len(f), 3), complex)
         for i, axis in enumerate(AXES[1:]):
-            made[:, :, i] = self._of_axis("share", row, axis, f, partial(self._share, row, i + 1, f))
-        return made
+            shares[:, :, i] = self._of_axis("share", row, axis, f, partial(self._share, row, i + 1, f))
+        return shares
 
     def _share(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
         """`_shares` of axis i, complex (2, bins)."""
-        every = self.strengths[i]
-        steps = np.full(len(every), 1e-30)
-        steps[-4:-1] = every[-4:-1]  # of the velocity and angle paths
-        turning = turning_per_command(controller, row, AXES[i], np.stack([every, steps]), f, SMOOTH)
+        level = self.strengths[i]
+        stepped = np.full(len(level), 1e-30)
+        stepped[-4:-1] = level[-4:-1]  # of the velocity and angle paths
+        turning = turning_per_command(controller, row, AXES[i], np.stack([level, stepped]), f, SMOOTH)
         return turning / self._torque(row, AXES[i], f)
 
     def _torque(self, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
@@ -171,22 +171,22 @@ class Twin:
         # in the torque of a command a controller counts for its period alone
         controller = by_firmware if self.by_firmware or what == "torque" else self.controllers[AXES.index(axis)]
         key = (what, axis, controller, *loops, f.tobytes())
-        kept = self.__dict__.setdefault("_axes", {})
-        if key not in kept:
-            if len(kept) >= LOOPS:
-                kept.clear()
-            kept[key] = make(controller)
-        return kept[key]
+        cache = self.__dict__.setdefault("_axes", {})
+        if key not in cache:
+            if len(cache) >= LOOPS:
+                cache.clear()
+            cache[key] = make(controller)
+        return cache[key]
 
     def _loops(self, row: Any) -> list[tuple]:
         """The firmware's controller of each of AXES, and what else a plant row gives its loop."""
         key = row.tobytes()
-        kept = self.__dict__.setdefault("_rows", {})
-        if key not in kept:
-            if len(kept) >= PLANTS:
-                kept.clear()
-            kept[key] = [(firmware(row, axis), of_loop(row, axis)) for axis in AXES]
-        return kept[key]
+        cache = self.__dict__.setdefault("_rows", {})
+        if key not in cache:
+            if len(cache) >= PLANTS:
+                cache.clear()
+            cache[key] = [(firmware(row, axis), of_loop(row, axis)) for axis in AXES]
+        return cache[key]
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
         """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""

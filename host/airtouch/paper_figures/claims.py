@@ -74,8 +74,7 @@ SAID = {
                            "mean absolute distance errors around 0.035m", (0.035,)),
     "light-bright": Said("fig11b", "At 100 lux vision is better: 0.012 m.", 708,
                          "At the luminance of 100 lux, vision-based TEED outperforms AirTouch with a mean error of "
-                         "around "
-                         "0.012m", (100.0, 0.012)),
+                         "around 0.012m", (100.0, 0.012)),
     "light-dark": Said("fig11b", "At 50 and 20 lux vision is worse than AirTouch.", 708,
                        "at 50 lux and 20 lux luminance, the accuracy decreases to levels worse than AirTouch's",
                        (50.0, 20.0)),
@@ -86,8 +85,7 @@ SAID = {
     "backup": Said("fusion", "AirTouch complements vision as a backup.", 713, "Complement as a backup"),
     "range": Said("range", "A drone of 2.5 kg, 450 mm and 100 mm propellers senses the ground from about 3 m.", 722,
                   "weighing 2.5 kg with a diagonal span of 450 mm and 100 mm propellers could detect ground effect "
-                  "from "
-                  "approximately 3 meters", (2.5, 0.45, 0.1, 3.0)),
+                  "from approximately 3 meters", (2.5, 0.45, 0.1, 3.0)),
     "range-small": Said("range", "The small drone's sensing is much worse above 12 cm.", 722,
                         "degraded significantly above 12 cm", (0.12,)),
 }

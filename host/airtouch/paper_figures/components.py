@@ -12,7 +12,6 @@ from airtouch.detector.variants import Variant
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID
-from airtouch.paper_figures.conditions import worse
 from airtouch.paper_figures.figure import Figure, Job
 from airtouch.paper_figures.overall import errors_m
 
@@ -49,17 +48,17 @@ def scores(job: Job, name: str, variant: Variant) -> tuple[list[FlightScore], li
 def df_loss(job: Job) -> Figure:
     """Performance:1g: trained with and without the disturbance-force loss, on all training flights and on ten."""
     recorded.files(job)
-    found = {what: scores(job, *variant) for what, variant in LOSSES.items()}
-    rows = {what: summary.summarise(some) for what, (some, _) in found.items()}
+    scored = {what: scores(job, *variant) for what, variant in LOSSES.items()}
+    rows = {what: summary.summarise(some) for what, (some, _) in scored.items()}
     epochs = {what: float(np.mean([f["parameters"]["converged_after_epochs"] for f in folds]))
-              for what, (_, folds) in found.items()}
+              for what, (_, folds) in scored.items()}
     table = [words.table_row(what, r, epochs_to_converge=epochs[what]) for what, r in rows.items()]
     pairs = list(zip(*[iter(LOSSES)] * 2, strict=True))
     gains = {pair[0]: 1.0 - (rows[pair[0]]["mean_abs_error_m"] or np.nan)
              / (rows[pair[1]]["mean_abs_error_m"] or np.nan)
              for pair in pairs}
     text = "; ".join(f"{what} {words.metres(r)}, {words.missed(r)}" for what, r in rows.items())
-    helps = any(worse(rows[w], rows[wo]) and gains[w] >= 0.5 * SAID["df-loss"].values[2] for w, wo in pairs)
+    helps = any(words.worse(rows[w], rows[wo]) and gains[w] >= 0.5 * SAID["df-loss"].values[2] for w, wo in pairs)
     sooner = [1.0 - epochs[w] / epochs[wo] for w, wo in pairs]
     verdicts = {
         "df-loss": words.judged(helps, f"{text}; error less by "
@@ -67,15 +66,14 @@ def df_loss(job: Job) -> Figure:
         "df-epochs": words.judged(max(sooner) >= 0.5 * SAID["df-epochs"].values[2],
                                   "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
                                   + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
-    return Figure("The disturbance-force loss", table, _caption(job, rows) + " Lambda is 0.1; the paper does not say "
-                                                                             "its own. The lower half is trained on "
-                                                                             f"{FEW} flights, where the paper expects "
-                                                                             "most of it.", verdicts,
-                  lambda canvas: pictures.found_within(canvas.subplots(), {
-                      what: (errors_m(some), rows[what]["edges"]) for what, (some, _) in found.items()},
-                      {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
-                                                        else "paper"], "ls": "--" if "flights" in what else "-"}
-                       for what in found}))
+    caption = (f"{_caption(job, rows)} Lambda is 0.1; the paper does not say its own. The lower half is trained on "
+               f"{FEW} flights, where the paper expects most of it.")
+    errors = {what: (errors_m(some), rows[what]["edges"]) for what, (some, _) in scored.items()}
+    styles = {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
+                                               else "paper"], "ls": "--" if "flights" in what else "-"}
+              for what in scored}
+    return Figure("The disturbance-force loss", table, caption, verdicts,
+                  lambda canvas: pictures.found_within(canvas.subplots(), errors, styles))
 
 
 def time_resolution(job: Job) -> Figure:
@@ -83,7 +81,7 @@ def time_resolution(job: Job) -> Figure:
     recorded.files(job)
     rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in RESOLUTIONS.items()}
     text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
-    verdict = words.judged(worse(rows[50], rows[200]), text)
+    verdict = words.judged(words.worse(rows[50], rows[200]), text)
     return Figure("Time resolution of FC-FE", [words.table_row(f"{s} samples", r, window=s) for s, r in rows.items()],
                   _caption(job, rows) + " A shorter window resolves time better and frequency worse; the hop is one "
                                         "sample. The paper does not say which windows it compared. Physical filter "
@@ -96,8 +94,7 @@ def input_size(job: Job) -> Figure:
     recorded.files(job)
     rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in SIZES.items()}
     text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
-    inner = {size: _cost(r) for size, r in rows.items()}
-    best = min(inner, key=inner.__getitem__)
+    best = max(rows, key=lambda size: rows[size]["hit"]["0.25"])
     low, high = SAID["input-size"].values
     verdict = words.judged(low <= best <= high, f"{text}; most edges within 0.25 m with {best}: "
                            + ", ".join(f"{s} {words.percent(r['hit']['0.25'], r['intervals']['hit']['0.25'])}"
@@ -107,20 +104,12 @@ def input_size(job: Job) -> Figure:
                   {"input-size": verdict}, lambda canvas: _curves(canvas, rows, "network input, samples"))
 
 
-def _cost(row: dict[str, Any]) -> float:
-    return -row["hit"]["0.25"]
-
-
 def _curves(canvas: Any, rows: dict[int, dict[str, Any]], label: str) -> None:
     left, right = canvas.subplots(1, 2)
     for axes, key, factor, name in ((left, "mean_abs_error_m", 1.0, "mean error of edges found, m"),
                                     (right, "missed", 100.0, "missed edges, %")):
         sizes = [s for s, r in rows.items() if r[key] is not None]
-        axes.plot(sizes, [factor * rows[s][key] for s in sizes], "o-", color=pictures.COLOURS["paper"], ms=4)
-        for s in sizes:
-            if rows[s]["intervals"][key]:
-                axes.plot([s, s], [factor * b for b in rows[s]["intervals"][key]], color=pictures.COLOURS["paper"],
-                          lw=0.8)
+        pictures.curve(axes, sizes, [rows[s] for s in sizes], key, factor, pictures.COLOURS["paper"])
         axes.set(xlabel=label, ylabel=name, ylim=(0, None))
 
 

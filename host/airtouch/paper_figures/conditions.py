@@ -33,8 +33,8 @@ def by_height(job: Job) -> Figure:
         caption += f"Recorded flights are left out: {missing}."
     groups = {key: some for key, some in groups.items() if some}
     rows = {key: summary.summarise(some) for key, some in groups.items()}
-    table = [words.table_row(f"{n}, {h}", r, detector=n, height=h, flights_are=kind) for (n, h, kind),
-             r in rows.items()]
+    table = [words.table_row(f"{n}, {h}", r, detector=n, height=h, flights_are=kind)
+             for (n, h, kind), r in rows.items()]
     hits = {key: (r["hit"]["0.05"], r["intervals"]["hit"]["0.05"]) for key, r in rows.items()}
 
     def within(name: str, height: str) -> str:
@@ -46,8 +46,8 @@ def by_height(job: Job) -> Figure:
     verdicts = {
         "height-4cm": words.judged(near[1][1] >= low, "within 0.05 m, misses included: "
                                    + "; ".join(within(n, "4cm") for n in DETECTORS) + f" (n = {2 * count} edges)"),
-        "height-9cm": words.judged(all(value <= high and value < near[1][0] for value, _ in far), "within 0.05 m, "
-                                                                                                  "misses included: "
+        "height-9cm": words.judged(all(value <= high and value < near[1][0] for value, _ in far),
+                                   "within 0.05 m, misses included: "
                                    + "; ".join(within(n, h) for n in DETECTORS for h in ("9cm", "12cm"))
                                    + f" (n = {2 * count} edges each)")}
 
@@ -85,7 +85,7 @@ def by_angle(job: Job) -> Figure:
                                        for size, r in steep[name].items() if r["edges"])
 
     both = "; ".join(text(name) for name in reversed(DETECTORS))
-    verdicts = {"angle": words.judged(worse(steep["paper"][0.0], steep["paper"][20.0]), both),
+    verdicts = {"angle": words.judged(words.worse(steep["paper"][0.0], steep["paper"][20.0]), both),
                 "angle-sides": words.judged(*_sides(rows))}
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
                + recorded.said(job, len(found["best"]), sum(len(s.edges) for s in found["best"])))
@@ -101,12 +101,6 @@ def by_angle(job: Job) -> Figure:
     return Figure("Errors by approach angle", table, caption, verdicts, draw)
 
 
-def worse(first: dict, second: dict) -> bool:
-    """Whether the second has a greater error or more misses than the first, beyond the 95 % intervals of both."""
-    return any(a is not None and b is not None and b[0] > a[1]
-               for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
-
-
 def _sides(rows: dict) -> tuple[bool, str]:
     """Whether left and right agree within their intervals for both detectors, and what they are."""
     same, said = True, []
@@ -114,7 +108,7 @@ def _sides(rows: dict) -> tuple[bool, str]:
         for angle in (10.0, 20.0):
             left, right = rows.get((name, -angle)), rows.get((name, angle))
             if left and right:
-                same &= not worse(left, right) and not worse(right, left)
+                same &= not words.worse(left, right) and not words.worse(right, left)
                 said.append(f"{name} -{angle:.0f}° {words.metres(left)} ({left['edges']} edges), +{angle:.0f}° "
                             f"{words.metres(right)} ({right['edges']})")
     return same and bool(said), "no difference beyond the 95 % intervals: " * same + "; ".join(said)
@@ -127,17 +121,16 @@ def wind(job: Job) -> Figure:
     for speed in WINDS_MPS:
         job.tell(f"wind of {speed:g} m/s: {2 * count} simulated flights")
         flights = []
-        for axis in ("x", "y"):
+        for axis, half in (("x", slice(count)), ("y", slice(count, None))):
             blown = (("wind", ((axis, -speed),)),) if speed else ()
-            flights += simulated.flown("paper-4cm", 2 * count, blown)[:count] if axis == "x" else \
-                simulated.flown("paper-4cm", 2 * count, blown)[count:]
+            flights += simulated.flown("paper-4cm", 2 * count, blown)[half]
         for name in DETECTORS:
             rows[name, speed] = summary.summarise(simulated.scores(flights, name))
     table = [words.table_row(f"{n}, {v:g} m/s", r, detector=n, wind_mps=v) for (n, v), r in rows.items()]
     said = "; ".join(f"{n}: " + ", ".join(f"{v:g} m/s {words.metres(rows[n, v])}, {words.missed(rows[n, v])}"
                                           for v in WINDS_MPS) for n in reversed(DETECTORS))
     calm = {name: rows[name, WINDS_MPS[0]] for name in DETECTORS}
-    same = {name: not any(worse(calm[name], rows[name, v]) for v in WINDS_MPS[1:]) for name in DETECTORS}
+    same = {name: not any(words.worse(calm[name], rows[name, v]) for v in WINDS_MPS[1:]) for name in DETECTORS}
     caption = (f"Simulated: {2 * count} flights a speed, 4 cm over the platform, half with wind from the front and "
                "half from the left; the shipped networks. The wind is steady, as the paper's. The recorded flights "
                "have one with a fan.")
@@ -150,13 +143,7 @@ def wind(job: Job) -> Figure:
         for name in DETECTORS:
             some = [rows[name, v] for v in WINDS_MPS]
             for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
-                middle = [None if r[key] is None else factor * r[key] for r in some]
-                axes.plot(WINDS_MPS, [float("nan") if m is None else m for m in middle], "o-", ms=4,
-                          color=pictures.colour(name), label=name)
-                for v, r in zip(WINDS_MPS, some, strict=True):
-                    if r["intervals"][key]:
-                        axes.plot([v, v], [factor * b for b in r["intervals"][key]], color=pictures.colour(name),
-                                  lw=0.8)
+                pictures.curve(axes, WINDS_MPS, some, key, factor, pictures.colour(name), name)
                 axes.set_xlabel("wind, m/s")
         left.set(ylabel="mean error of edges found, m", ylim=(0, None))
         right.set(ylabel="missed edges, %", ylim=(0, 100))

@@ -52,7 +52,6 @@ def against_baseline(job: Job) -> Figure:
         pictures.paper_stars(left, {1: ours, 2: theirs})
         pictures.bars(right, table, "missed", "missed_low", "missed_high", "missed edges, %", factor=100.0)
 
-    caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"]) + " Platforms only: no recorded "
-                                                                                    "flight "
-               "crosses a material interface, over which the paper averages too.")
+    caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"])
+               + " Platforms only: no recorded flight crosses a material interface, over which the paper averages too.")
     return Figure("Errors of the method and of the baseline", table, caption, {"baseline": verdict}, draw)

@@ -60,6 +60,16 @@ def found_within(axes: Any, errors: Mapping[str, tuple[Sequence[float], int]], s
     axes.legend(fontsize=7, frameon=False, loc="lower right")
 
 
+def curve(axes: Any, places: Sequence[float], rows: Sequence[Mapping[str, Any]], key: str, factor: float, colour: str,
+          label: str | None = None) -> None:
+    """A summary's figure at each place with its 95 % interval; no point where nothing was found."""
+    axes.plot(places, [np.nan if r[key] is None else factor * r[key] for r in rows], "o-", ms=4, color=colour,
+              label=label)
+    for place, row in zip(places, rows, strict=True):
+        if row["intervals"][key]:
+            axes.plot([place, place], [factor * b for b in row["intervals"][key]], color=colour, lw=0.8)
+
+
 def bars(axes: Any, rows: Sequence[Mapping[str, Any]], value: str, low: str, high: str, label: str,
          colours: Sequence[str] | None = None, factor: float = 1.0) -> None:
     """One bar a row with its 95 % interval."""

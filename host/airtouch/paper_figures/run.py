@@ -20,10 +20,10 @@ FIGURES = {
     "fig8a": ("overall", "heights"), "fig8b": ("materials", "overall"), "fig8c": ("overall", "against_baseline"),
     "fig8d": ("conditions", "by_height"), "fig8e": ("conditions", "by_angle"), "fig8f": ("materials", "by_pair"),
     "fig8g": ("components", "df_loss"), "fig8h": ("components", "time_resolution"),
-           "fig8i": ("components", "input_size"),
+    "fig8i": ("components", "input_size"),
     "sizes": ("sizes", "sizes"), "table1": ("table1", "power"), "wind": ("conditions", "wind"),
     "table2": ("resources", "resources"), "fig11b": ("vision_figures", "light"),
-           "fig11c": ("vision_figures", "network_size"),
+    "fig11c": ("vision_figures", "network_size"),
     "fusion": ("vision_figures", "fusion"), "range": ("sensing_range", "sensing_range"),
 }
 
@@ -86,16 +86,9 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     table = table_csv(figure.rows)
     for data, ending in ((png, "png"), (svg, "svg"), (table, "csv")):
         write_bytes(data, out / f"{name}.{ending}", force=True)
+    head, *lines = page.cells(table)
     return {"name": name, "title": figure.title, "caption": figure.caption, "claims": said,
-            "rows": [dict(zip(_head(table), line, strict=True)) for line in _lines(table)]}
-
-
-def _head(table: bytes) -> list[str]:
-    return next(iter(page.cells(table)))
-
-
-def _lines(table: bytes) -> list[list[str]]:
-    return page.cells(table)[1:]
+            "rows": [dict(zip(head, line, strict=True)) for line in lines]}
 
 
 def records(out: Path) -> dict[str, dict[str, Any]]:

@@ -54,10 +54,10 @@ def light(job: Job) -> Figure:
             f"light plays no part in its signals; simulated, shipped networks: {flights}"
             + (f"; best reaches {SAID['light-airtouch'].values[0]:g} m"
                if words.reaches(ours["best"], SAID["light-airtouch"].values[0]) else "")),
-        "light-bright": words.judged(_better(rows["teed", bright], ours["best"]) and words.reaches(
+        "light-bright": words.judged(words.worse(rows["teed", bright], ours["best"]) and words.reaches(
             rows["teed", bright], SAID["light-bright"].values[1]),
                                      f"{text(bright)}; best {words.metres(ours['best'])}"),
-        "light-dark": words.judged(all(_better(ours["best"], rows["teed", v]) for v in dark),
+        "light-dark": words.judged(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
                                    "; ".join(text(v) for v in dark) + f"; best {words.metres(ours['best'])}. "
                                    + _crossing(rows, ours["best"], _lux(job)))}
 
@@ -65,19 +65,16 @@ def light(job: Job) -> Figure:
         left, right = canvas.subplots(1, 2)
         for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
             for name in ("classical", "teed"):
-                _curve(axes, _lux(job), [rows[name, v] for v in _lux(job)], key, factor, COLOURS[name], name)
+                pictures.curve(axes, _lux(job), [rows[name, v] for v in _lux(job)], key, factor, COLOURS[name], name)
+            _airtouch(axes, ours, key, factor)
             for name, row in ours.items():
-                if row[key] is not None:
-                    axes.axhline(factor * row[key], color=pictures.colour(name), lw=1.2, label=f"AirTouch, {name}")
                 if row["intervals"][key]:
                     axes.axhspan(*(factor * b for b in row["intervals"][key]), color=pictures.colour(name), alpha=0.12,
                                  lw=0)
             axes.set(xscale="log", xlabel="light, lux", ylim=(0, None))
         left.plot(bright, SAID["light-bright"].values[1], "k*", ms=8, label="paper: TEED")
         left.plot([20, 50, 100], [SAID["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
-        left.set_ylabel("mean error of edges found, m")
-        right.set_ylabel("missed edges, %")
-        canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
+        _labelled(canvas, left, right)
 
     caption = (f"Simulated: {len(films)} flights, 4 cm over the platform, camera and AirTouch on the same flights; "
                f"frames of 324 x 244 rendered at 6 a second. {LIMITS}")
@@ -89,28 +86,24 @@ def network_size(job: Job) -> Figure:
     films, seen, felt = _everything(job)
     lux = SIZE_LUX
     rows = {name: summary.summarise(_scores(films, seen[name, lux])) for name in weights.SIZES}
-    table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux) for name,
-             r in rows.items()]
+    table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux)
+             for name, r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
     text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
                      for n, r in rows.items())
     ours = {name: summary.summarise(_scores(films, felt[name])) for name in FELT}
-    verdicts = {"network-vision": words.judged(_better(full, least), f"at 100 lux {text}"),
+    verdicts = {"network-vision": words.judged(words.worse(full, least), f"at 100 lux {text}"),
                 "network-airtouch": _airtouch_sizes(job, table)}
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
         sizes = [teed.parameters(weights.SIZES[n]) for n in rows]
         for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
-            _curve(axes, sizes, list(rows.values()), key, factor, COLOURS["teed"], "vision, 100 lux")
-            for name, row in ours.items():
-                if row[key] is not None:
-                    axes.axhline(factor * row[key], color=pictures.colour(name), lw=1.2, label=f"AirTouch, {name}")
+            pictures.curve(axes, sizes, list(rows.values()), key, factor, COLOURS["teed"], "vision, 100 lux")
+            _airtouch(axes, ours, key, factor)
             axes.axvline(SAID["network-vision"].values[0], color=pictures.PAPER, ls="--", lw=1)
             axes.set(xscale="log", xlabel="parameters of the vision network", ylim=(0, None))
-        left.set_ylabel("mean error of edges found, m")
-        right.set_ylabel("missed edges, %")
-        canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
+        _labelled(canvas, left, right)
 
     caption = (f"Simulated: the {len(films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 and 8; "
                f"each network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
@@ -131,7 +124,7 @@ def _airtouch_sizes(job: Job, table: list[dict[str, Any]]) -> Verdict:
         return Verdict(UNTESTABLE, str(missing))
     text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
     small, large = rows.values()
-    return words.judged(not _better(large, small), f"best on recorded flights: {text}")
+    return words.judged(not words.worse(large, small), f"best on recorded flights: {text}")
 
 
 def fusion(job: Job) -> Figure:
@@ -239,6 +232,20 @@ def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name
     return {way: [[Detection(s, "edge") for s in found] for found in some] for way, some in stored.items()}
 
 
+def _airtouch(axes: Any, ours: dict[str, dict[str, Any]], key: str, factor: float) -> None:
+    """A level line for each of AirTouch's detectors, which see no light."""
+    for name, row in ours.items():
+        if row[key] is not None:
+            axes.axhline(factor * row[key], color=pictures.colour(name), lw=1.2, label=f"AirTouch, {name}")
+
+
+def _labelled(canvas: Any, left: Any, right: Any) -> None:
+    """Names of two axes, errors and misses, and one legend below them."""
+    left.set_ylabel("mean error of edges found, m")
+    right.set_ylabel("missed edges, %")
+    canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
+
+
 def _scores(films: list[Any], found: list[Any]) -> list[FlightScore]:
     from airtouch.vision import compare
 
@@ -253,13 +260,6 @@ def _count(job: Job) -> tuple[int, int]:
     return QUICK_FILMS if job.quick else FILMS
 
 
-def _better(first: dict[str, Any], second: dict[str, Any]) -> bool:
-    """Whether the first has the smaller error or fewer misses beyond the 95 % intervals of both."""
-    from airtouch.paper_figures.conditions import worse
-
-    return worse(first, second)
-
-
 def _crossing(rows: dict[tuple[str, float], dict[str, Any]], ours: dict[str, Any], lux: Sequence[float]) -> str:
     """Between which lights the camera's mean error passes AirTouch's, in words."""
     errors = [(v, rows["teed", v]["mean_abs_error_m"]) for v in lux if rows["teed", v]["mean_abs_error_m"] is not None]
@@ -269,12 +269,3 @@ def _crossing(rows: dict[tuple[str, float], dict[str, Any]], ours: dict[str, Any
         return "The mean errors of the camera and of best cross " + " and ".join(crossed)
     return (f"The mean errors do not cross from {lux[0]:g} to {lux[-1]:g} lux: the camera is the "
             + ("better" if errors and errors[-1][1] < ours["mean_abs_error_m"] else "worse") + " one throughout")
-
-
-def _curve(axes: Any, places: Sequence[float], rows: Sequence[dict[str, Any]], key: str, factor: float, colour: str,
-           label: str) -> None:
-    axes.plot(places, [np.nan if r[key] is None else factor * r[key] for r in rows], "o-", ms=4, color=colour,
-              label=label)
-    for place, row in zip(places, rows, strict=True):
-        if row["intervals"][key]:
-            axes.plot([place, place], [factor * b for b in row["intervals"][key]], color=colour, lw=0.8)

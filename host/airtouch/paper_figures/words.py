@@ -46,6 +46,12 @@ def reaches(row: Mapping[str, Any], error_m: float) -> bool:
     return (interval[0] if interval else value) <= error_m
 
 
+def worse(first: dict, second: dict) -> bool:
+    """Whether the second has a greater error or more misses than the first, beyond the 95 % intervals of both."""
+    return any(a is not None and b is not None and b[0] > a[1]
+               for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
+
+
 def judged(yes: bool, found: str) -> Verdict:
     """A verdict of two."""
     return Verdict(REPRODUCED if yes else NOT_REPRODUCED, found)

@@ -1,10 +1,9 @@
 """Many flights: deterministic per seed whatever the number of workers, bounded memory."""
 
-import itertools
 import os
-from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from airtouch import vehicle as vehicles
@@ -12,6 +11,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario as scenarios
 from airtouch.simulation.flight import Chosen, Diverged, fly
+from airtouch.simulation.in_order import in_order
 from airtouch.simulation.scenario import Scenario
 from airtouch.vehicle import Vehicle
 
@@ -47,16 +47,7 @@ def _in_order(one, numbers: Iterator[int], workers: int) -> Iterator[FlightLog |
         yield from map(one, numbers)
         return
     with ThreadPoolExecutor(workers) as pool:
-        waiting: deque[Future] = deque(pool.submit(one, n) for n in itertools.islice(numbers,
-                AHEAD * workers))
-        try:
-            while waiting:
-                result = waiting.popleft().result()
-                waiting.extend(pool.submit(one, n) for n in itertools.islice(numbers, 1))
-                yield result
-        finally:
-            for future in waiting:
-                future.cancel()
+        yield from in_order(partial(pool.submit, one), numbers, AHEAD * workers)
 
 
 def simulate(scenario: Scenario | str | Path, vehicle: Vehicle | str | Path | None = None,

@@ -1,18 +1,18 @@
 """The same flights in local processes that fly and write, for batches where writing is the work."""
 
-import itertools
 import multiprocessing
 import os
 import threading
-from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import store
 from airtouch.simulation.flight import Chosen, Diverged, fly
+from airtouch.simulation.in_order import in_order
 from airtouch.simulation.scenario import Scenario
 from airtouch.vehicle import Vehicle
 
@@ -31,22 +31,13 @@ def write(folder: Path, scenario: Scenario, numbers: Sequence[int], *, vehicle: 
     if workers == 1:
         yield from (_one(job, n) for n in numbers)
         return
-    waiting: deque[Future] = deque()
-    left = iter(numbers)
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start,
                              initargs=(tuple(plugins),)) as pool:
         try:
-            waiting.extend(pool.submit(_one, job, n) for n in itertools.islice(left, AHEAD * workers))
-            while waiting:
-                result = waiting.popleft().result()
-                waiting.extend(pool.submit(_one, job, n) for n in itertools.islice(left, 1))
-                yield result
+            yield from in_order(partial(pool.submit, _one, job), numbers, AHEAD * workers)
         except BrokenProcessPool:
             raise AirTouchError("a worker process died; call the same command again to continue") from None
-        finally:
-            for future in waiting:
-                future.cancel()
 
 
 def _start(plugins: Sequence[str]) -> None:

@@ -79,10 +79,10 @@ def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
     """AirTouch's crossings of each film by a shipped detector, its lag taken off, within what was filmed."""
     detector = registry.get(name)
     model = detector.load(None)
-    lag = detector.lag_s(model) / SAMPLE_PERIOD_S
+    late = detector.lag_s(model) / SAMPLE_PERIOD_S
     found = []
     for shot in films:
-        moved = [replace(d, sample=round(d.sample - lag)) for d in detector.run(shot.log, model).edges]
+        moved = [replace(d, sample=round(d.sample - late)) for d in detector.run(shot.log, model).edges]
         found.append([d for d in moved if shot.first_s <= d.sample * SAMPLE_PERIOD_S <= shot.last_s])
     return found
 

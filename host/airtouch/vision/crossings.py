@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.detector.trace import Detection
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
@@ -16,7 +17,6 @@ from airtouch.vision.lines import Line
 
 MARGIN_S = 0.8  #: filmed before the first edge and after the last
 GROUP_S = 0.6  #: frames further apart than this are of different edges
-SAMPLE_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def film(log: FlightLog, seed: int) -> Film:
     edges = tuple(true_edges(log))
     drawn = scenes.Scene(*(draw_texture(rng) for _ in range(2)), corners, float(plan.world.surface[0, 0]))
     return Film(log, edges, drawn, plan.values["clearance"], plan.values["speed"],
-                edges[0].sample * SAMPLE_S - MARGIN_S, edges[-1].sample * SAMPLE_S + MARGIN_S)
+                edges[0].sample * SAMPLE_PERIOD_S - MARGIN_S, edges[-1].sample * SAMPLE_PERIOD_S + MARGIN_S)
 
 
 def draw_texture(rng: np.random.Generator) -> np.ndarray:
@@ -70,7 +70,7 @@ def frames(camera: Camera, shot: Film, lux: float, seed: int) -> Iterator[tuple[
 
 def pose(log: FlightLog, time_s: float) -> scenes.Pose:
     """Where the drone truly is at a time, between the samples of its log."""
-    place = time_s / SAMPLE_S
+    place = time_s / SAMPLE_PERIOD_S
     at = {name: np.interp(place, np.arange(len(log)), log[name])
           for name in ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")}
     return scenes.Pose(np.array([at["x_m"], at["y_m"], at["z_m"]]),
@@ -96,5 +96,6 @@ def detections(sights: Sequence[Sight], threshold: float, speed_mps: float) -> l
     found = []
     for group in groups:
         times = np.array([s.time_s + s.ahead_m / speed_mps for s in group])
-        found.append(Detection(round(float(np.average(times, weights=[s.strength for s in group])) / SAMPLE_S), "edge"))
+        middle_s = float(np.average(times, weights=[s.strength for s in group]))
+        found.append(Detection(round(middle_s / SAMPLE_PERIOD_S), "edge"))
     return sorted(found, key=lambda d: d.sample)
