@@ -21,6 +21,7 @@ from airtouch.gap.fit import fit
 from airtouch.gap.flight import Flight
 from airtouch.gap.generic import usual_of
 from airtouch.gap.loop_model import sensitivity
+from airtouch.gap.lost_rows import bridging_power
 from airtouch.gap.nominal_scatter import scatter_of
 from airtouch.gap.problem import whole_of
 from airtouch.gap.response import Response, response_of
@@ -114,23 +115,32 @@ def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[
     left = [np.nan_to_num(residual(f, vehicle, calibration)) for f in flights]
     first = [{r: starts(f, r) for r in (AIR, REST)} for f in flights]
     made = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(left, first, strict=True)]
-    answer = _response(vehicle, calibration, law, flights, first, made)
-    return Study(vehicle, calibration, law, floor_of(flights, left, first, made, least), answer, nominal=len(flights))
+    answer, quiet = _response(vehicle, calibration, law, flights, first, made)
+    lost = [bridging_power(f, vehicle, calibration, s[AIR], q, answer)
+            for f, s, q in zip(flights, first, quiet, strict=True)]
+    floor = floor_of(flights, left, first, made, least, lost)
+    return Study(vehicle, calibration, law, floor, answer, nominal=len(flights))
 
 
 def _response(vehicle: Vehicle, calibration: tuple[Active, ...], law: twin.Twin | None, flights: Sequence[Flight],
-              first: Sequence[dict[str, np.ndarray]], made: Sequence[dict[str, np.ndarray]]) -> Response | None:
-    """How the gyro follows the commands, taken off `made` in place; None without gyro or loop model."""
+              first: Sequence[dict[str, np.ndarray]], made: Sequence[dict[str, np.ndarray]],
+              ) -> tuple[Response | None, Sequence[np.ndarray | None]]:
+    """How the gyro follows the commands, taken off `made` in place, and where no set-point stepped (`Data.quiet`).
+
+    None, and for every flight None, without gyro or loop model.
+    """
+    nothing = [None] * len(flights)
     if law is None or any(f.rates is None for f in flights):
-        return None
+        return None, nothing
     loop = sensitivity(law.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
     turning = [blocks(angular_acceleration(f), s[AIR], AIR) for f, s in zip(flights, first, strict=True)]
     answer = response_of(turning, [m[AIR][:, :, TORQUE] for m in made], loop)
-    for measured, m in zip(turning, made, strict=True):
-        if answer is not None:
-            quiet = answer.quiet(measured - m[AIR][:, :, TORQUE])
-            m[AIR] = answer.applied(quiet, measured, m[AIR], m[AIR], m[AIR], m[AIR])
-    return answer
+    if answer is None:
+        return None, nothing
+    quiet = [answer.quiet(t - m[AIR][:, :, TORQUE]) for t, m in zip(turning, made, strict=True)]
+    for q, measured, m in zip(quiet, turning, made, strict=True):
+        m[AIR] = answer.applied(q, measured, m[AIR], m[AIR], m[AIR], m[AIR])
+    return answer, quiet
 
 
 def _terms() -> tuple[list[Term], np.ndarray]:

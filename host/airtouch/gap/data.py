@@ -8,6 +8,7 @@ import numpy as np
 
 from airtouch.gap.channels import TORQUE, angular_acceleration, residual
 from airtouch.gap.flight import Flight
+from airtouch.gap.lost_rows import bridging_power
 from airtouch.gap.motion import held
 from airtouch.gap.nominal_scatter import Scatter
 from airtouch.gap.response import Response
@@ -48,6 +49,7 @@ class Data:
     base: list[dict[str, np.ndarray]] = field(default_factory=list)
     turning: list[np.ndarray] = field(default_factory=list)  #: spectra in the air of the measured angular acceleration
     quiet: list[np.ndarray] = field(default_factory=list)  #: blocks in the air and axes where no set-point stepped
+    bridging: list[np.ndarray] = field(default_factory=list)  #: power that lost rows add to the blocks in the air
 
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
@@ -56,6 +58,9 @@ class Data:
         if self.study.response is not None:
             self.quiet = [self.study.response.quiet(t - b[AIR][:, :, TORQUE])
                           for t, b in zip(self.turning, _replayed(self, ()), strict=True)]
+        study, quiet = self.study, self.quiet or [None] * len(self.flights)
+        self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
+                         for f, b, q in zip(self.flights, self.first, quiet, strict=True)]
         self.base = spectra(self, ())
 
 

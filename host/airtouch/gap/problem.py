@@ -52,8 +52,8 @@ class Problem:
         if data.slow:
             self.keep[AIR][FIRST_BIN:, TORQUE] = False
         self.twin = TwinView(data.study.controller, data.flights, data.first, part.pieces)
-        self.power = self._gather([{r: data.study.floor.level(f, b[r], r) for r in b}
-                                   for f, b in zip(data.flights, data.first, strict=True)]).real
+        self.power = self._gather([{r: data.study.floor.level(f, b[r], r) + (lost if r == AIR else 0.0) for r in b}
+                                   for f, b, lost in zip(data.flights, data.first, data.bridging, strict=True)]).real
         self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
                                      for s in data.base]).real.astype(int)
         self.flight = np.concatenate([np.full(self._size(p), p[0]) for p in part.pieces]) \

@@ -19,6 +19,7 @@ AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples
 OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
 MOST_LOST = 0.1  #: of a block
+LEAST_LEFT = 0.1  #: of a value's power, once what lost rows add on average is taken off
 TRIM_HZ = 0.6  #: below it torque and rate hold the trim of a flight, which does not go with how hard it is flown
 
 
@@ -105,12 +106,13 @@ class Floor:
 
 
 def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: Sequence[dict[str, np.ndarray]],
-             spectra: Sequence[dict[str, np.ndarray]], least: np.ndarray) -> Floor:
+             spectra: Sequence[dict[str, np.ndarray]], least: np.ndarray, bridging: Sequence[np.ndarray]) -> Floor:
     """The floor of flights declared nominal, from what the calibrated model leaves of them.
 
     residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first samples and the spectra;
     least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of
-    its difference), below which the floor never goes.
+    its difference), below which the floor never goes. bridging: power (blocks, bins, COUNT) that lost rows add in the
+    air; it is taken off, as each flight has its own, but for what is left by chance.
     """
     power, count, slopes = {}, {}, None
     for regime in (AIR, REST):
@@ -124,7 +126,8 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
                                            for f, s in zip(flights, first, strict=True)])
                 trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= 3)
                 slopes = slopes_of(each, hardness, frequencies(AIR), trim)
-                each = each / slopes.level(hardness)
+                level = slopes.level(hardness)
+                each = np.maximum(each - np.concatenate(bridging), LEAST_LEFT * each) / level
             mean = np.nan_to_num(np.nanmean(each, axis=0))
             power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
         else:
