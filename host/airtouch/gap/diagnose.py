@@ -28,6 +28,7 @@ from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
 AT_FLOOR = 1.0  #: gap that is at its floor
+CALMED = 0.5  #: of how far a flight is below the floor, that effects named may leave
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 SHAPE_PRICE = 1.0  #: log likelihood that another shape of an effect must gain on all the data
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
@@ -126,14 +127,16 @@ def _some(flights: Sequence[Flight]) -> list[Flight]:
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 
 
-def _verdict(selection: Selection, before: float) -> str:
-    """before: the gap over its floor; what does not stand over it is nothing, whatever small differences add up to.
+def _verdict(selection: Selection, gap: Shrink, exact: bool) -> str:
+    """What does not stand over the floor is nothing, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
-    in both halves of the data, in whose common part the gap is measured.
+    in both halves of the data, in whose common part the gap is measured. exact: the flights are a simulator's; there a
+    flight calmer than nominal ones, which the effects named bring to the floor, has them; a recorded one had calm air.
     """
+    calmed = exact and abs(gap.after - AT_FLOOR) < CALMED * abs(gap.before - AT_FLOOR)
     apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if before <= AT_FLOOR and not apart:
+    if gap.before <= AT_FLOOR and not (apart or calmed):
         return "none"
     if not selection.explained:
         return "unknown"
@@ -229,7 +232,8 @@ def _ranking(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranke
     """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
     parts = selection.parts
     overall = shrink_of(data, parts, selection.chosen, cells)
-    verdict = _verdict(selection, overall.before)
+    scatter = data.study.scatter
+    verdict = _verdict(selection, overall, scatter is not None and scatter.exact)
     effects = _effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
     chance = agreeing(probabilities(selection, verdict == "none"), answer)

@@ -14,7 +14,7 @@ from airtouch.gap import random_effects
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.data import Data
 from airtouch.gap.least_squares import bounded_step, cost_of, limits, weights_of, without_offsets
-from airtouch.gap.problem import LOOP, Part, Problem, problem_of
+from airtouch.gap.problem import GROUPS, LOOP, Part, Problem, problem_of
 from airtouch.gap.spectra import squared
 from airtouch.simulation.effects import Active
 
@@ -27,6 +27,7 @@ FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slop
 ROUNDS = 4  #: in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
+CLOSE = 0.05  #: to neutral, scaled, where a fit of a new effect begins: some have no slope at neutral itself
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
 
 
@@ -89,6 +90,14 @@ def left_over(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
     return problem, values, problem.power + added
 
 
+def cell_gains(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
+    """Log likelihood (GROUPS,) that effects with these parameters add in each cell: view, channel and band."""
+    problem, values, power = left_over(data, part, (), any(t.kind == SPECTRUM for t in terms))
+    without = problem.each(values, power - problem.power)
+    problem, values, power = left_over(data, part, terms)
+    return np.bincount(problem.groups, problem.each(values, power - problem.power) - without, GROUPS)
+
+
 def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
     """What effects leave of a part, the power that they add, and what offsets and the commands' floor cost."""
@@ -108,17 +117,18 @@ def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean
 
 
 def _start(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:
-    """What is known, or close to neutral; effects of the loop, of which nothing is known, where their likelihood is
+    """What is known, else (NaN) close to neutral; effects of the loop, of which nothing is known, where their
 
-    highest on a coarse grid.
+    likelihood is highest on a coarse grid.
     """
     size = sum(len(t.free) for t in mean)
-    x = np.full(size, 0.05) if known is None else known
+    known = np.full(size, np.nan) if known is None else known
+    x = np.where(np.isnan(known), CLOSE, known)
     place = 0
     for t in mean:
         here = range(place, place + len(t.free))
         place += len(t.free)
-        if t.name not in LOOP or not len(problem.twin) or (known is not None and known[here].any()):
+        if t.name not in LOOP or not len(problem.twin) or not np.isnan(known[here]).all():
             continue
         low, high = limits(mean)
         best = -np.inf

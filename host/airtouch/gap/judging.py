@@ -4,7 +4,7 @@ Two halves of the flights (of the blocks, for a few flights) take turns. A first
 the most promising are fitted in full.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,11 +67,13 @@ def halves(data: Data) -> tuple[Part, Part]:
 
 
 def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: Judged | None,
-             progress: Callable[[str], None] = lambda _: None, thorough: bool = False) -> dict[str, Judged]:
+             progress: Callable[[str], None] = lambda _: None, thorough: bool = False,
+             promising: Container[str] = ()) -> dict[str, Judged]:
     """Every candidate on top of what is chosen: a first look at all, the most promising in full.
 
     thorough: random effects in full, however little they promise, and the strength of each parameter that is also
-    tried alone from that trial: the best of several would seem stronger than each of them is.
+    tried alone from that trial: the best of several would seem stronger than each of them is. promising: names that
+    are judged in full whatever the first look says.
     """
     before = chosen.gain if chosen else 0.0
     held = chosen.terms if chosen else ()
@@ -106,7 +108,8 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     tried = _with_random_parts(on, residuals, extra_power, chosen, with_random, looked, thorough)
     sure += [j for j in tried if j.full]
     looked += [j for j in tried if not j.full]
-    worth = [j for i, j in enumerate(looked) if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN)]
+    worth = [j for i, j in enumerate(looked)
+             if i < FULL and (j.gain - before > 0.5 * FIRST_GAIN) or j.name in promising]
     sure += [crossed(on, j.name, j.terms[len(held):], chosen, j.choice) for j in worth]
     best = _best_of_each([*sure, *(j for j in looked if j not in worth)], len(held))
     if thorough:
@@ -204,7 +207,8 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: 
     """
     out = {}
     for n, j in best.items():
-        own = next(t for t in reversed(j.terms) if t.name == n)
+        mine = [t for t in j.terms if t.name == n]
+        own = telling(mine[-2:]) if mine[-1].companion else mine[-1]
         stretched = own.kind == MEAN and at_bound(own, j.strength).any()
         error = np.sqrt(j.variance) if len(j.variance) else 0.0
         news = scatter.evidence(n, j.strength, error) if scatter else np.inf
@@ -306,9 +310,9 @@ def _refined(data: Data, part: Part, found: Fit) -> Fit:
 
 
 def _start(chosen: Judged | None, terms: Sequence[Term], train: int) -> np.ndarray | None:
-    """The parameters found before, with nothing of the new effects; None where nothing was found."""
+    """The parameters found before, NaN for those of the new effects; None where nothing was found."""
     if chosen is None or not chosen.fits:
         return None
     known = chosen.fits[train].scaled
     size = sum(len(t.free) for t in terms if t.kind == MEAN)
-    return np.concatenate([known, np.zeros(size - len(known))])
+    return np.concatenate([known, np.full(size - len(known), np.nan)])

@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, is_random
+from airtouch.gap.channels import COUNT
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
-from airtouch.gap.fit import fit
+from airtouch.gap.fit import cell_gains, fit
 from airtouch.gap.flight import PERIOD_S
 from airtouch.gap.gates import gated
 from airtouch.gap.generic import generic_gain
@@ -28,10 +29,12 @@ from airtouch.gap.judging import (
     strength_of,
     trial_of,
 )
+from airtouch.gap.problem import GROUPS
 from airtouch.gap.selection import TEMPERATURE, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1  #: and in others: no model of air is exact
+CELL_GAIN = 1.0  #: log likelihood that an effect gains in a cell which it moves
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
 RANDOM_SHARE = 0.25  #: the same of what is random, to be named: what the model of another is wrong by looks random
 CERTAIN = 20.0  #: evidence beyond which more says no more
@@ -86,7 +89,8 @@ def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: M
             break
         if not any(s.named for s in steps):  # what nominal flights have as well stands beside every candidate
             singles = {**singles, **{n: j for n, j in tried.items() if n not in {s.name for s in steps}}}
-        left_by_another = beside and is_random(best.name) and best.gain - so_far < RANDOM_SHARE * so_far
+        left_by_another = beside and is_random(best.name) \
+            and best.gain - so_far < _misfit(on, steps[-1], best, RANDOM_SHARE)
         steps.append(replace(best, named=best.evidence >= sure and not left_by_another))
         if sum(s.named for s in steps) < MOST_EFFECTS:
             tried, need = _beside(on, candidates, steps,
@@ -159,8 +163,9 @@ def _beside(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], steps: Se
     named = any(s.named for s in steps)
     gained = {n for n, j in first.items() if j.gain > WORTH_AGAIN * FIRST_GAIN}
     worth = candidates if named else {n: v for n, v in candidates.items() if n in gained}
-    tried = round_of(on, worth, steps[-1], progress)
-    return tried, {n: _needed_beside(on.data, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}
+    sure = {n for n, j in first.items() if j.full and j.evidence >= LEAST_GAIN and not is_random(n)}
+    tried = round_of(on, worth, steps[-1], progress, promising=sure)
+    return tried, {n: _needed_beside(on, steps[-1], j) if named else FIRST_GAIN for n, j in tried.items()}
 
 
 def seconds(data: Data) -> float:
@@ -191,16 +196,42 @@ def nameless(on: Trial, chosen: Judged | None) -> float:
     return max(sum(generic_gain(on.data, on.parts, fits)), 0.0) + clock_left(on.data, named)
 
 
-def _needed_beside(data: Data, held: Judged, more: Judged) -> float:
+def _needed_beside(on: Trial, held: Judged, more: Judged) -> float:
     """Held-out log likelihood that a further effect must gain: more beside one that gains much: no model is exact."""
     names = {t.name for t in held.terms}
     new = [t for t in more.terms if t.name not in names]
-    of_clock = sum(clock_gain(data, t)[1] for t in held.terms if t.kind == CLOCK)
-    scatter = data.study.scatter
-    share = RECORDED_SHARE if scatter is not None and not scatter.exact else LEAST_SHARE
-    if _assumes(data, held.terms) and _changes_loop(data, new):
+    share = RECORDED_SHARE if _recorded(on) else LEAST_SHARE
+    if _assumes(on.data, held.terms) and _changes_loop(on.data, new):
         share = LOOP_SHARE
-    return max(LEAST_GAIN, share * (held.gain - of_clock))
+    return _misfit(on, held, more, share, everywhere=is_random(more.name))
+
+
+def _misfit(on: Trial, held: Judged, more: Judged, share: float, everywhere: bool = False) -> float:
+    """Log likelihood that a further effect may gain because the effects before it are wrong by a share of theirs.
+
+    In flights of a simulator they are wrong where they act: what they gain counts in the cells where the newcomer
+    gains, the axes of a channel together; everywhere: wherever they gain.
+    """
+    of_clock = sum(clock_gain(on.data, t)[1] for t in held.terms if t.kind == CLOCK)
+    whole = max(LEAST_GAIN, share * (held.gain - of_clock))
+    if everywhere or _recorded(on) or not (more.full and more.fits and held.fits) or more.gain - held.gain >= whole:
+        return whole
+    before, both = (sum(cell_gains(on.data, on.parts[test], j.fits[train].terms) for train, test in ROUND_TRIP)
+                    for j in (held, more))
+    before, own = _axes_together(before), _axes_together(both - before)
+    return max(LEAST_GAIN, share * float(np.maximum(before[own > CELL_GAIN], 0.0).sum()))
+
+
+def _axes_together(gains: np.ndarray) -> np.ndarray:
+    """Gains (GROUPS,) of cells with those of x, y and z added up."""
+    cell = np.arange(GROUPS)
+    return np.bincount(cell - cell % 1000 % COUNT % 3, gains, GROUPS)
+
+
+def _recorded(on: Trial) -> bool:
+    """Whether the flights are not those of a simulator with the same models."""
+    scatter = on.data.study.scatter
+    return scatter is not None and not scatter.exact
 
 
 def _best_of(judged: Mapping[str, Judged]) -> Judged | None:

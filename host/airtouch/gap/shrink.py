@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.candidates import SPECTRUM, Term
+from airtouch.gap.candidates import Term
 from airtouch.gap.data import Data
-from airtouch.gap.fit import left_over
+from airtouch.gap.fit import cell_gains, left_over
 from airtouch.gap.problem import GROUPS, Part
 from airtouch.gap.result import Quantity
 from airtouch.gap.selection import Judged
@@ -99,11 +99,7 @@ def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     mean = np.bincount(problem.groups, e * problem.known, GROUPS) / np.maximum(count, 1)
     out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2
     if terms:
-        if any(t.kind == SPECTRUM for t in terms):  # what they are compared with is as unsure of the commands' floor
-            _, values, power = left_over(data, part, (), True)
-        without = problem.each(values, power - problem.power)
-        _, values, power = left_over(data, part, terms)
-        out |= np.bincount(problem.groups, problem.each(values, power - problem.power) - without, GROUPS) > TELLING
+        out |= cell_gains(data, part, terms) > TELLING
     return out & (count >= FEWEST)
 
 
