@@ -1,6 +1,7 @@
 """What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
-    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled [--twin FOLDER]
+    python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled
+        [--twin FOLDER | --beside FOLDER]
         [--labelled 2 --labelled 5] [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
 Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
@@ -10,7 +11,9 @@ learning.
 --start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the
 second the other: a twin's detector, whose twin was fitted to the other half. With --twin, as often as --start, training
 does not go on from --start: a new network learns the K flights together with edges of that twin, laid over the free air
-of all flights of the other groups, as `airtouch adapt --from scratch` does. What is in --out already is not done again,
+of all flights of the other groups, as `airtouch adapt --from scratch` does. With --beside, training goes on from
+--start with the K flights and those of that folder, half of the crops each, as `airtouch adapt` does with simulated
+ones: so that it does not forget what the K lack. What is in --out already is not done again,
 so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the
 flights scored, each with all its draws; last, the missed edges of each height in the manifest.
 """
@@ -19,13 +22,14 @@ import argparse
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from airtouch import vehicle
-from airtouch.detector import best, crossval, dataset, evaluate, training_set
+from airtouch.detector import best, crossval, dataset, evaluate, sensors, training_set
 from airtouch.detector.dataset import FlightFile
 from airtouch.detector.score import FlightScore
 from airtouch.detector.stream.model import StreamModel
@@ -81,6 +85,16 @@ def simulated(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.Flown:
     return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
 
 
+def recorded_beside(folders: Sequence[Path], speed: float | None, pool: Sequence[adapt.Flight]) -> adapt.Flown:
+    """Flights of other folders to learn beside the pool's, without the sensors that the pool lacks."""
+    listed = dataset.collect(folders, speed)
+    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
+    if left_out:
+        raise AirTouchError(f"not usable: {left_out[0][1]}")
+    absent = adapt.lacking(pool)
+    return adapt.Flown([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
+
+
 def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
          pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: StreamModel | None,
          flown: adapt.Flown | None, options: argparse.Namespace) -> list[FlightScore]:
@@ -89,7 +103,8 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
              [f.path.name for f in held], [f.log.source for f in pool]]
     if flown and row == "labelled":
-        asked += [adapt.TWIN_STEPS, repr(adapt.MIXED_DECODER), [training_set.flight_hash(log) for log in flown.logs]]
+        asked += [bool(options.beside), adapt.TWIN_STEPS, repr(adapt.MIXED_DECODER),
+                  [training_set.flight_hash(log) for log in flown.logs]]
     key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
     kept = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{key}.json"
     if kept.is_file():
@@ -98,7 +113,7 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     if row == "start":
         model = start
     elif flown and row == "labelled":
-        model = adapt.together(None, start, some, flown, seed, None, COMMAND)
+        model = adapt.together(start if options.beside else None, start, some, flown, seed, None, COMMAND)
     else:
         model = best.fit([f.log for f in some], seed=seed, start=start if row == "labelled" else None, steps=steps,
                          command=COMMAND)
@@ -145,6 +160,8 @@ def main() -> None:
     parser.add_argument("--twin", type=Path, action="append", default=[],
                         help="folder of `airtouch twin` whose edges are learnt with the labelled flights; as many as "
                              "--start")
+    parser.add_argument("--beside", type=Path, action="append", default=[],
+                        help="folder of labelled flights to learn beside the K; none of them may be scored")
     parser.add_argument("--by", choices=("halves", "day"), default="halves")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"))
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
@@ -166,11 +183,15 @@ def main() -> None:
     if len(options.twin) not in (0, len(options.start)):
         raise SystemExit(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for each, "
                          "or none")
+    if options.beside and (options.twin or not options.start):
+        raise SystemExit("--beside goes on from a model: give --start, and no --twin")
     models = [best.load(path) for path in options.start]
     starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=False))
     twins = dict(zip(groups, options.twin if len(options.twin) > 1 else options.twin * len(groups), strict=False))
     pools = {g: [adapt.Flight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g] for g in groups}
     flown = {g: simulated(twins[g], pools[g]) for g in twins}
+    if options.beside:
+        flown = dict.fromkeys(groups, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
 
     def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
         scores: list[FlightScore] = []

@@ -9,6 +9,7 @@ from airtouch.detector import best
 from airtouch.detector.dataset import Condition
 from airtouch.detector.score import EdgeScore, FlightScore
 from airtouch.errors import AirTouchError
+from airtouch.twin import adapt
 from made_flight import SMALL, made_flight
 from tools import labelled_flights
 
@@ -52,6 +53,25 @@ def test_every_flight_is_scored_by_models_that_never_saw_it(house, tmp_path, mon
     assert [row.split(" | ")[1:3] for row in rows] == [["1", "4 / 8"], ["2", "4 / 8"], ["2", "4 / 8"]]
     run(monkeypatch, *call)
     assert len(trained) == 8, "what is done is not done again"
+
+
+def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monkeypatch):
+    """Three flights of another folder beside the one of the pool: training goes on from the model with all four."""
+    beside = tmp_path / "beside"
+    beside.mkdir()
+    for i in range(3):
+        logs.write(made_flight(20 + i), beside / f"g{i}.csv")
+    best.fit([made_flight(9)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    asked, fit = [], best.fit
+    monkeypatch.setattr(adapt, "TWIN_STEPS", {"shipped": 3, "scratch": 3})
+    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: asked.append((len(flights), o)) or fit(flights, *a, **o))
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--speed", 0.3)
+    run(monkeypatch, *call, "--beside", beside)
+    assert [count for count, _ in asked] == [4, 4] and all(o["start"] is not None for _, o in asked)
+    assert all(o["emphasis"] == [3.0, 1.0, 1.0, 1.0] for _, o in asked)
+    with pytest.raises(SystemExit, match="no --twin"):
+        run(monkeypatch, *call, "--beside", beside, "--twin", tmp_path)
 
 
 def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):

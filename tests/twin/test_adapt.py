@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from airtouch import logs
 from airtouch.cli import airtouch
-from airtouch.detector import best
+from airtouch.detector import best, sensors
 from airtouch.detector.dataset import Condition, FlightFile
 from airtouch.detector.score import EdgeScore, FlightScore
 from airtouch.logs.flight_log import FlightLog
@@ -83,6 +83,47 @@ def test_flights_without_down_range_are_used_by_pseudo_labels(made, quick, tmp_p
     adapt.adapt(flights, scene, adapt_vehicle(), tmp_path / "work", start=best.load(None), withhold=True)
     assert [label is None for label in seen[-1][:5]] == [False] * 5
     assert found.model.metadata["adapted"]["pseudo_labelled"] == 3
+
+
+@pytest.mark.slow
+def test_flights_without_acceleration_train_a_detector_without(made, quick, tmp_path):
+    """The simulated flights beside them have none either, and the shipped model for such logs is gone on from."""
+    bare = [replace(f, log=sensors.without(f.log, ("acceleration",))) for f in flights_of(made, 4)]
+    folder, out = write(tmp_path / "flights", bare), tmp_path / "mine.npz"
+    said = CliRunner().invoke(airtouch, ["adapt", str(folder), "--out", str(out), "--no-hold-out"])
+    assert said.exit_code == 0, said.output + str(said.exception)
+    assert "no twin: it needs 4 flights" in said.output and "here are 0" in said.output
+    model = best.load(out)
+    assert set(sensors.CHANNELS_OF["acceleration"]) <= set(model.recipe.muted)
+    assert best.run(bare[0].log, model).probability.shape == (len(bare[0].log),)
+
+
+@pytest.mark.slow
+def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(made, quick, tmp_path, monkeypatch):
+    from airtouch.cli import adapt as cli
+    from airtouch.twin import edge_fit
+    monkeypatch.setattr(cli, "ROUNDS", 1)
+    monkeypatch.setattr(cli, "BATCH", 40)
+    flights, work = flights_of(made, 5), tmp_path / "work"
+    folder = write(tmp_path / "flights", flights)
+    listed = [replace(f, file=replace(f.file, path=folder / f"flight_{i}.csv.gz")) for i, f in enumerate(flights)]
+
+    def courses(some):
+        scene, _, said = cli._twin(None, None, some, None, work, 0)
+        assert f"fitted to {len(some)} of them" in said
+        return scene.table["values"]["course"]["choice"]
+
+    first, refine = courses(listed[:4]), edge_fit.refine
+    monkeypatch.setattr(edge_fit, "refine", lambda *_, **__: pytest.fail("fitted again"))
+    assert courses(listed[:4]) == first and len(first) == 4
+    monkeypatch.setattr(edge_fit, "refine", refine)
+    assert len(courses(listed)) == 5
+
+
+def test_a_twin_and_a_vehicle_are_one_too_many(tmp_path):
+    said = CliRunner().invoke(airtouch, ["adapt", str(tmp_path), "--twin", str(tmp_path), "--vehicle", "mine.toml",
+                                         "--out", str(tmp_path / "mine.npz")])
+    assert said.exit_code != 0 and "leave --vehicle out" in str(said.exception)
 
 
 def adapt_vehicle():

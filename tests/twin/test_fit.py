@@ -97,6 +97,20 @@ def test_a_damaged_fit_is_named(aim, vehicle, chosen, tmp_path):
         fit.fit(aim, vehicle, chosen, rounds=1, flights=48, kept=tmp_path / "fit.json")
 
 
+def test_a_fit_of_other_flights_is_refused(aim, vehicle, chosen, tmp_path):
+    """One flight more, or another vehicle, is another fit."""
+    kept = tmp_path / "fit.json"
+    fit.fit(fit.Target(aim.courses[:-1], aim.features[:-1], aim.scatter), vehicle, chosen, rounds=1, flights=48,
+            kept=kept)
+    with pytest.raises(AirTouchError, match="other flights"):
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, kept=kept)
+    keys = {fit.key(aim, vehicle, chosen), fit.key(aim, replace(vehicle, mass_kg=0.05), chosen),
+            fit.key(aim, vehicle, chosen, seed=1), fit.key(aim, vehicle, chosen[1:])}
+    assert len(keys) == 4
+    moved = fit.Target([replace(c, source="elsewhere") for c in aim.courses], aim.features, aim.scatter)
+    assert fit.key(moved, vehicle, chosen) == fit.key(aim, vehicle, chosen)
+
+
 def test_regression_is_least_squares():
     """A linear world: the Jacobian and the gap at the centre come back."""
     rng = np.random.default_rng(0)

@@ -14,6 +14,7 @@ from airtouch.extras import need
 from airtouch.logs.files import check_free
 
 ROUNDS, BATCH = 8, 160  #: of a twin that is fitted on the way
+BARE = "paper-mixed"  #: scenario where no twin can be fitted
 MORE = 5  #: flights that the outlook is given for
 
 
@@ -23,6 +24,8 @@ MORE = 5  #: flights that the outlook is given for
               help="Model file to write.")
 @click.option("--twin", "twin_folder", type=click.Path(path_type=Path, file_okay=False),
               help="Folder of `airtouch twin`; one is fitted to the flights if left out.")
+@click.option("--vehicle", metavar="NAME", help="Vehicle that this fit starts from, a name or a .toml file; default "
+              "crazyflie-2.1-flow.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
 @click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
@@ -35,8 +38,9 @@ MORE = 5  #: flights that the outlook is given for
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
               help="Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
-def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, origin: str, speed: float | None,
-            folds: tuple[int, ...], hold_out: bool, withhold_range: bool, seed: int, force: bool) -> None:
+def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehicle: str | None, origin: str,
+            speed: float | None, folds: tuple[int, ...], hold_out: bool, withhold_range: bool, seed: int,
+            force: bool) -> None:
     """Train a detector for the drone that flew FLIGHTS: logs, or folders (the clean flights of a manifest.csv).
 
     \b
@@ -55,6 +59,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     need("train", "training")
     started = time.monotonic()
     check_free(out, force)
+    if twin_folder and vehicle:
+        raise AirTouchError("--twin has a vehicle of its own; leave --vehicle out")
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
     files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
     with Bar("reading") as bar:
@@ -62,11 +68,11 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     if not usable:
-        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, "
-                            "with acceleration, gyro and motors logged at 100 Hz")
+        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, with "
+                            "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
-    scene, craft, where = _twin(twin_folder, [f.file.path for f in labelled], speed, work / "twin", seed)
+    scene, craft, where = _twin(twin_folder, vehicle, labelled, speed, work, seed)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; {where}")
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     with Stages() as stages:
@@ -77,34 +83,28 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, orig
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
 
 
-def _twin(folder: Path | None, paths: list[Path], speed: float | None, kept: Path, seed: int) -> tuple[Any, Any, str]:
+def _twin(folder: Path | None, vehicle: str | None, flights: Any, speed: float | None, work: Path,
+          seed: int) -> tuple[Any, Any, str]:
     """(scenario, vehicle, in words) of a twin: its folder's, one fitted now, or the simulator as it is."""
     from airtouch import vehicle as vehicles
+    from airtouch.detector import sensors
     from airtouch.simulation import scenario
-    from airtouch.simulation.batch import available_cores
-    from airtouch.twin import edge_fit, files, fit, levers
+    from airtouch.twin import calibrate, files
     from airtouch.twin import flights as recordings
 
     if folder is not None:
-        return (scenario.load(folder / files.SCENARIO), vehicles.load(folder / files.VEHICLE), f"twin of {folder}")
-    craft = vehicles.load()
+        return (scenario.load(folder / files.SCENARIO), vehicles.load(str(folder / files.VEHICLE)), f"twin of {folder}")
+    craft = vehicles.load(vehicle) if vehicle else vehicles.load()
+    paths = [f.file.path for f in flights if not sensors.missing(f.log)]
     if len(paths) < recordings.FEWEST:
-        return (scenario.load("paper-mixed"), craft,
-                f"no twin: it needs {recordings.FEWEST} flights over a platform with down range; simulator as it is")
-    recorded = recordings.recorded(paths, speed_mps=speed)
-    kept.mkdir(parents=True, exist_ok=True)
-    listed = levers.default(craft, recorded.near)
-    aim = fit.target(recorded.courses, recorded.features)
-    workers = available_cores()
-    with Bar("fitting a twin") as bar:
-        state = fit.fit(aim, craft, listed, rounds=ROUNDS, flights=BATCH, seed=seed, workers=workers,
-                        fixed=levers.FIXED,
-                        kept=kept / "fit.json", progress=lambda done, total, _: bar(done, total))
-    with Bar("edges") as bar:
-        values = edge_fit.refine(aim, craft, listed, fit.best(state), flights=edge_fit.share(BATCH), seed=seed,
-                                 workers=workers, fixed=levers.FIXED, progress=bar).values
-    vehicle_file, scenario_file = files.write(kept, craft, listed, values, recorded.courses, levers.FIXED, force=True)
-    return scenario.load(scenario_file), vehicles.load(vehicle_file), f"twin fitted to {len(recorded.courses)} of them"
+        return (scenario.load(BARE), craft, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
+                f"acceleration, gyro, motors and down range, here are {len(paths)}; simulator as it is")
+    with Bar("reading again") as bar:
+        recorded = recordings.recorded(paths, speed_mps=speed, progress=bar)
+    kept = work / f"twin_{calibrate.key(recorded, craft, flights=BATCH, seed=seed)}"
+    calibrate.calibrate(recorded, craft, kept, rounds=ROUNDS, flights=BATCH, seed=seed, bar=Bar)
+    return (scenario.load(kept / files.SCENARIO), vehicles.load(str(kept / files.VEHICLE)),
+            f"twin fitted to {len(recorded.courses)} of them")
 
 
 def _say(found: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:

@@ -13,7 +13,7 @@ from airtouch.cli.progress import Bar
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 
-FIT, SUMMARY, REPORT = "fit.json", "twin.json", "report.html"
+SUMMARY, REPORT = "twin.json", "report.html"
 
 
 @click.command(name="twin")
@@ -56,42 +56,32 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     need("train", "comparing the twin with the drone")
     from airtouch import vehicle as vehicles
     from airtouch.report import twin_report
-    from airtouch.simulation.batch import available_cores
-    from airtouch.twin import compare, edge_fit, files, fit, levers
+    from airtouch.twin import calibrate, compare, files, levers
     from airtouch.twin import flights as recordings
 
-    _check_free(out, resume, force)
+    _check_free(out / calibrate.FIT, resume, force)
     craft = vehicles.load(vehicle)
     with Bar("reading") as bar:
         recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
     for _, reason in recorded.left_out:
         click.echo(f"airtouch: {reason}", err=True)
-    out.mkdir(parents=True, exist_ok=True)
-    aim = fit.target(recorded.courses, recorded.features)
-    listed = levers.default(craft, recorded.near)
-    workers = workers or available_cores()
-    with Bar("fitting") as bar:
-        state = fit.fit(aim, craft, listed, rounds=rounds, flights=batch, seed=seed, workers=workers,
-                        fixed=levers.FIXED,
-                        kept=out / FIT, progress=lambda done, total, now: bar(done, total, _misfit(now)))
-    with Bar("edges") as bar:
-        values = edge_fit.refine(aim, craft, listed, fit.best(state), flights=edge_fit.share(batch), seed=seed,
-                                 workers=workers, fixed=levers.FIXED, progress=bar).values
-    files.write(out, craft, listed, values, recorded.courses, levers.FIXED, force=True)
+    fitted = calibrate.calibrate(recorded, craft, out, rounds=rounds, flights=batch, seed=seed, workers=workers,
+                                 bar=Bar)
     with Bar("flying the twin") as bar:
-        flown, lost = compare.flown(recorded.courses, craft, listed, values, seed, levers.FIXED, progress=bar)
+        flown, lost = compare.flown(recorded.courses, craft, fitted.levers, fitted.values, seed, levers.FIXED,
+                                    progress=bar)
     with Bar("telling apart") as bar:
         phases: list[str] = []
-        comparison = compare.compare(recorded, aim, flown, lost, seed,
+        comparison = compare.compare(recorded, fitted.aim, flown, lost, seed,
                                      lambda name: (phases.append(name), bar(len(phases), 6, name)))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
-    by_name = {lever.name: float(value) for lever, value in zip(listed, values, strict=True)}
-    summary = _summary(comparison, by_name, state.history, recorded, typed)
+    by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
+    summary = _summary(comparison, by_name, fitted.history, recorded, typed)
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
-    twin_report.write_report(out / REPORT, recorded, comparison, listed, values, state.history[0]["misfit"],
-                             command=typed, force=True)
-    click.echo(f"{len(recorded.courses)} flights; misfit in scatters: {_misfit(state.history[0]['misfit'])} "
-               f"-> {_misfit(comparison.misfit)}")
+    twin_report.write_report(out / REPORT, recorded, comparison, fitted.levers, fitted.values,
+                             fitted.history[0]["misfit"], command=typed, force=True)
+    click.echo(f"{len(recorded.courses)} flights; misfit in scatters: "
+               f"{calibrate.in_words(fitted.history[0]['misfit'])} -> {calibrate.in_words(comparison.misfit)}")
     for a in comparison.auroc:
         click.echo(f"{a.phase:7} AUROC {a.value:.3f} ({a.low:.3f} to {a.high:.3f}), {a.real_flights} flights, "
                    f"{a.windows} windows; tells: {a.telling[0]}")
@@ -102,15 +92,11 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 
 
-def _check_free(out: Path, resume: bool, force: bool) -> None:
-    if (out / FIT).exists() and not (resume or force):
-        raise AirTouchError(f"{out}: holds a twin already; --resume goes on with it, --force starts anew")
+def _check_free(kept: Path, resume: bool, force: bool) -> None:
+    if kept.exists() and not (resume or force):
+        raise AirTouchError(f"{kept.parent}: holds a twin already; --resume goes on with it, --force starts anew")
     if force and not resume:
-        (out / FIT).unlink(missing_ok=True)
-
-
-def _misfit(now: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value:.2f}" for name, value in now.items())
+        kept.unlink(missing_ok=True)
 
 
 def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:

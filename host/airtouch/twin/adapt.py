@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector import best, evaluate, simulated, summary
+from airtouch.detector import best, evaluate, sensors, simulated, summary
 from airtouch.detector.dataset import FlightFile
 from airtouch.detector.score import FlightScore
 from airtouch.detector.stream.model import StreamModel
@@ -84,11 +84,15 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     start: weights to go on from, None for none. work: a folder in which each finished stage is kept, so that the
     same call goes on after a stop. withhold: the last stage takes all flights as if they had no down range, to measure
     what unlabelled ones bring. twin_only: all labelled flights scored by the detector that has seen the twin only.
-    Raises AirTouchError where nothing crosses an edge.
+    A sensor that all flights lack is taken from the simulated ones too. Raises AirTouchError where nothing crosses an
+    edge.
     """
     work.mkdir(parents=True, exist_ok=True)
+    absent = lacking(flights)
+    start = start.serving(absent) if start else None
     key = _key(flights, scene, vehicle, start, seed)
     flown, what = simulated_flights(flights, scene, vehicle, seed, progress)
+    flown = replace(flown, logs=[sensors.without(log, absent) for log in flown.logs])
     twin = _model(work / f"twin_{key}.npz", lambda: best.fit(
         flown.logs, seed, start=start, pseudo_labels=flown.edges, decoder=None if start else DECODER,
         steps=TWIN_STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"),
@@ -105,6 +109,11 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     own = sum(f.labelled for f in last)
     known = {"twin": what, "labelled": own, "pseudo_labelled": len(flights) - own}
     return Adapted(replace(model, metadata={**model.metadata, "adapted": known}), held, half, twin_only)
+
+
+def lacking(flights: Sequence[Flight]) -> tuple[str, ...]:
+    """The sensors that none of the flights has."""
+    return tuple(s for s in sensors.SENSORS if all(s in sensors.missing(f.log) for f in flights))
 
 
 def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,
@@ -230,7 +239,7 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
         progress(number + 1, len(files))
         try:
             log = logs.read(file.path)
-            evaluate.check(log)
+            evaluate.check(log, best.SPARE_SENSORS)
             speed = file.condition.speed_mps
             if speed is None and evaluate.truth(log):
                 try:

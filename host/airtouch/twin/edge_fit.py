@@ -116,4 +116,4 @@ def _variance(values: np.ndarray) -> np.ndarray:
 
 
 def _cost(gap: np.ndarray) -> float:
-    return sum((fit.GROUP_WEIGHT[name] * off) ** 2 for name, off in fit.misfit(gap).items())
+    return fit.total(fit.misfit(gap)) ** 2

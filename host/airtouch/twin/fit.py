@@ -6,10 +6,11 @@ Jacobian; Evensen, The Ensemble Kalman Filter, 2003), and the levers move to whe
 units of the recorded flights' scatter, is least. A ridge keeps a step within what the round has tried.
 """
 
+import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -49,12 +50,16 @@ class Target:
 
 @dataclass
 class State:
-    """A fit between rounds: levers (p,), misfit by group of each round, and the last rounds' flights."""
+    """A fit between rounds: levers (p,), misfit by group of each round, and the last rounds' flights.
+
+    refined: (p,) levers after the stage of the edges (`calibrate`), None before it.
+    """
 
     values: np.ndarray
     history: list[dict[str, Any]]
     drawn: list[np.ndarray]
     apart: list[np.ndarray]
+    refined: np.ndarray | None = None
 
 
 def target(courses: Sequence[Course], features: np.ndarray) -> Target:
@@ -74,16 +79,27 @@ def fit(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int =
         progress: Progress | None = None) -> State:
     """The levers after all rounds. Same arguments, same result.
 
-    kept: a file in which each finished round is written; a fit that stopped goes on from it.
+    kept: a file in which each finished round is written; a fit that stopped goes on from it. Raises AirTouchError where
+    it holds a fit of other flights or settings.
     """
-    state = _load(kept, levers, seed, flights) or State(lever_set.starts(levers), [], [], [])
+    asked = key(aim, vehicle, levers, flights=flights, seed=seed, fixed=fixed)
+    state = load(kept, asked) or State(lever_set.starts(levers), [], [], [])
     for number in range(len(state.history), rounds):
         _round(state, aim, vehicle, levers, number, rounds, flights, seed, fixed, workers)
+        state.refined = None
         if progress:
             progress(number + 1, rounds, state.history[-1]["misfit"])
         if kept:
-            _save(kept, state, levers, seed, flights)
+            save(kept, state, asked)
     return state
+
+
+def key(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, flights: int = FLIGHTS, seed: int = 0,
+        fixed: Mapping[str, Any] | None = None) -> str:
+    """Twelve digits that change with anything a round depends on; more rounds of the same fit have the same."""
+    courses = [replace(course, source="") for course in aim.courses]
+    said = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
+    return hashlib.sha256(said.encode() + np.ascontiguousarray(aim.features).tobytes()).hexdigest()[:12]
 
 
 def best(state: State) -> np.ndarray:
@@ -91,8 +107,12 @@ def best(state: State) -> np.ndarray:
 
     Nearest: least sum of squared misfits over the groups, each with its weight.
     """
-    return np.array(min(state.history, key=lambda entry: sum(
-        (GROUP_WEIGHT[name] * off) ** 2 for name, off in entry["misfit"].items()))["values"])
+    return np.array(min(state.history, key=lambda entry: total(entry["misfit"]))["values"])
+
+
+def total(misfit: Mapping[str, float]) -> float:
+    """All groups' misfits as one number, scatters: root of the weighted sum of squares."""
+    return float(np.sqrt(sum((GROUP_WEIGHT[name] * off) ** 2 for name, off in misfit.items())))
 
 
 def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever], number: int, rounds: int,
@@ -182,23 +202,28 @@ def least_squares_step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarr
     return lsq_linear(a, b, bounds=(low, high)).x
 
 
-def _save(path: Path, state: State, levers: Sequence[Lever], seed: int, flights: int) -> None:
+def save(path: Path, state: State, asked: str) -> None:
+    """Write a fit to a file that `load` reads. asked: its `key`."""
     write_bytes(json.dumps({
-        "levers": [lever.name for lever in levers], "seed": seed, "flights": flights,
-        "values": state.values.tolist(), "history": state.history,
+        "key": asked, "values": state.values.tolist(), "history": state.history,
         "drawn": [d.tolist() for d in state.drawn],
-        "apart": [[[v if np.isfinite(v) else None for v in row] for row in a.tolist()] for a in state.apart]}).encode(),
-        path, force=True)
+        "apart": [[[v if np.isfinite(v) else None for v in row] for row in a.tolist()] for a in state.apart],
+        "refined": None if state.refined is None else state.refined.tolist()}).encode(), path, force=True)
 
 
-def _load(path: Path | None, levers: Sequence[Lever], seed: int, flights: int) -> State | None:
+def load(path: Path | None, asked: str) -> State | None:
+    """The fit in a file, None without one. Raises AirTouchError for a damaged file and for a fit of another `key`."""
     if path is None or not path.is_file():
         return None
     try:
         table = json.loads(path.read_text())
-        same = (table["levers"], table["seed"], table["flights"]) == ([v.name for v in levers], seed, flights)
+        same = table.get("key") == asked
         apart = [np.array([[np.nan if v is None else v for v in row] for row in a]) for a in table["apart"]]
-        return State(np.array(table["values"]), table["history"], [np.array(d) for d in table["drawn"]],
-                     apart) if same else None
-    except (ValueError, KeyError, TypeError):
+        refined = table.get("refined")
+        state = State(np.array(table["values"]), table["history"], [np.array(d) for d in table["drawn"]], apart,
+                      None if refined is None else np.array(refined))
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise AirTouchError(f"{path}: a damaged fit; remove it or use --force") from None
+    if not same:
+        raise AirTouchError(f"{path}: a fit to other flights, or with other settings; --force starts anew")
+    return state

@@ -1,0 +1,71 @@
+"""A twin from recorded flights: the rounds of the fit, then the levers that act at edges, then the files."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.simulation.batch import available_cores
+from airtouch.twin import edge_fit, files, fit
+from airtouch.twin import levers as lever_set
+from airtouch.twin.fit import Target
+from airtouch.twin.flights import Recorded
+from airtouch.twin.levers import Lever
+from airtouch.vehicle import Vehicle
+
+FIT = "fit.json"
+#: bar(stage) is a context whose value is called with (done, total, note)
+Bars = Callable[[str], AbstractContextManager[Callable[[int, int, str], None]]]
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What the twin was fitted to, its levers and their values (levers,), and the rounds of the fit."""
+
+    aim: Target
+    levers: tuple[Lever, ...]
+    values: np.ndarray
+    history: list[dict[str, Any]]
+
+
+def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, flights: int, seed: int, bar: Bars,
+              workers: int | None = None) -> Calibrated:
+    """Fit a twin and write vehicle.toml, scenario.toml and fit.json into a folder. Same arguments, same twin.
+
+    What is done is in fit.json: the same call goes on after a stop, and does nothing twice. Raises AirTouchError where
+    that is a fit of other flights or settings.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    workers = workers or available_cores()
+    aim, levers, asked = _asked(recorded, vehicle, flights, seed)
+    with bar("fitting") as told:
+        state = fit.fit(aim, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
+                        fixed=lever_set.FIXED, kept=out / FIT,
+                        progress=lambda done, total, now: told(done, total, f"misfit {fit.total(now):.2f}"))
+    if state.refined is None:
+        with bar("edges") as told:
+            state.refined = edge_fit.refine(
+                aim, vehicle, levers, fit.best(state), flights=edge_fit.share(flights), seed=seed, workers=workers,
+                fixed=lever_set.FIXED, progress=lambda done, total: told(done, total, "")).values
+        fit.save(out / FIT, state, asked)
+    files.write(out, vehicle, levers, state.refined, recorded.courses, lever_set.FIXED, force=True)
+    return Calibrated(aim, levers, state.refined, state.history)
+
+
+def key(recorded: Recorded, vehicle: Vehicle, *, flights: int, seed: int) -> str:
+    """Twelve digits that change with the flights, the vehicle and the settings of a fit."""
+    return _asked(recorded, vehicle, flights, seed)[2]
+
+
+def _asked(recorded: Recorded, vehicle: Vehicle, flights: int, seed: int) -> tuple[Target, tuple[Lever, ...], str]:
+    aim = fit.target(recorded.courses, recorded.features)
+    levers = lever_set.default(vehicle, recorded.near)
+    return aim, levers, fit.key(aim, vehicle, levers, flights=flights, seed=seed, fixed=lever_set.FIXED)
+
+
+def in_words(misfit: dict[str, float]) -> str:
+    """Group and misfit in scatters, one after the other."""
+    return ", ".join(f"{name} {value:.2f}" for name, value in misfit.items())
