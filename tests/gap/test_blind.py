@@ -27,13 +27,16 @@ def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind") / "set"
     patch = pytest.MonkeyPatch()
     patch.setattr(blind, "strengths", lambda *_: CLEAR)
+    calibrated, study_in = [], blind_run._study_in
+    patch.setattr(blind_run, "_study_in", lambda of: calibrated.append(study_in(of)) or calibrated[-1])
     found = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
     patch.undo()
-    return folder, found
+    assert len(calibrated) == 1, "a set is calibrated once"
+    return folder, found, calibrated[0]
 
 
 def test_diagnosis_names_clear_effects(checked):
-    _, found = checked
+    _, found, _ = checked
     assert found["diagnosed"] == 10 and found["top_1"]["n"] == 4 and found["false_alarms"]["n"] == 4
     assert found["top_1"]["hits"] >= 3 and found["top_3"]["hits"] == 4  # by chance, of 24 names: 3 in 10,000
     assert found["false_alarms"]["hits"] <= 1
@@ -56,7 +59,7 @@ def always_dying(_):
 
 
 def test_a_process_that_dies_loses_nothing(checked, tmp_path, monkeypatch):
-    folder, _ = checked
+    folder, *_ = checked
     monkeypatch.setenv("DIED", str(tmp_path / "died"))
     monkeypatch.setenv("ANSWERS", str(folder / "answers"))
     monkeypatch.setattr(blind_run, "_with_study", dying)
@@ -75,7 +78,7 @@ def test_processes_that_die_again_and_again_are_told(checked, tmp_path, monkeypa
 
 
 def test_answers_are_the_same_wherever_flights_are_spread(checked, tmp_path):
-    folder, _ = checked
+    folder, _, study = checked
     sent = []
 
     def spread(function, items):
@@ -84,14 +87,14 @@ def test_answers_are_the_same_wherever_flights_are_spread(checked, tmp_path):
             function, item = pickle.loads(sent[-1])
             yield function(item)
 
-    blind_run.answer(folder, tmp_path / "answers", [("flight_0001", ())], spread=spread)
+    blind_run.answer(folder, tmp_path / "answers", [("flight_0001", ())], study=study, spread=spread)
     assert len(sent) == 1
     assert (tmp_path / "answers" / "flight_0001.json").read_bytes() == \
         (folder / "answers" / "flight_0001.json").read_bytes()
 
 
 def test_flights_say_nothing_of_their_effect(checked):
-    folder, _ = checked
+    folder, *_ = checked
     kept = {p.name.split(".")[0] for p in folder.glob("*.gz")}
     assert kept == {f"cal_{i}" for i in range(6)} | {f"flight_{i:04d}" for i in range(10)}
     for path in folder.glob("*.csv.gz"):
@@ -103,7 +106,7 @@ def test_flights_say_nothing_of_their_effect(checked):
 
 
 def test_the_seal(checked, tmp_path):
-    folder, _ = checked
+    folder, *_ = checked
     key = blind.key_of(folder)
     again = blind.score(folder, folder / "answers")  # the same answers may be scored once more
     assert again["top_1"]["n"] == 4
@@ -123,7 +126,7 @@ def test_the_seal(checked, tmp_path):
 
 
 def test_command_writes_figures(checked, tmp_path):
-    folder, found = checked
+    folder, found, _ = checked
     out, plot = tmp_path / "f.json", tmp_path / "f.png"
     result = CliRunner().invoke(command, ["blind", "score", str(folder), str(folder / "answers"), "--json", str(out),
                                           "--plot", str(plot)])

@@ -22,6 +22,7 @@ AXES = ("thrust", "roll", "pitch")
 YAW_HZ = 1.0  #: usual bandwidth of a yaw loop, which AXES leave out
 OUTER_S = 0.01  #: period of the firmware's position loop and of its estimator's predictions
 IMU_S = 0.001  #: between samples of the IMU
+CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1
 
 
 @dataclass(frozen=True)
@@ -159,8 +160,7 @@ def _with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
 
 def excess_phase(c: Controller, row: Any, axis: str) -> float:
     """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable."""
-    f = np.geomspace(0.3, 45.0, 160)
-    loop = _open_loop(c, row, axis, f)
+    loop = _open_loop(c, row, axis, CROSSING_HZ)
     turned, size = np.unwrap(np.angle(loop)), np.abs(loop)
     turned += -2.0 * np.pi * np.ceil(turned[0] / (2.0 * np.pi))
     last = np.flatnonzero(size > 1.0)

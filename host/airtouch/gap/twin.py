@@ -8,7 +8,7 @@ then multiplies them by the ratio of the modelled spectra with and without it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -227,26 +227,39 @@ def _same_loop(one: Any, two: Any) -> bool:
     return all(np.array_equal(one[k], two[k]) for k in LOOP_FIELDS)
 
 
+@cache
 def frequencies() -> np.ndarray:
-    """Hz of the bins that are judged."""
-    return _every()[_kept()]
+    """Hz of the bins that are judged; not to be changed."""
+    return _constant(_every()[_kept()])
 
 
+@cache
 def fine_frequencies() -> np.ndarray:
-    """FINE points a bin and REACH bins beyond the first and the last: what a block's window mixes."""
+    """FINE points a bin and REACH bins beyond the first and the last: what a block's window mixes; not to be changed."""
     f = frequencies()
     step = (f[1] - f[0]) / FINE
-    return f[0] + step * np.arange(-REACH * FINE, (len(f) - 1 + REACH) * FINE + 1)
+    return _constant(f[0] + step * np.arange(-REACH * FINE, (len(f) - 1 + REACH) * FINE + 1))
 
 
 def through_window(power: np.ndarray) -> np.ndarray:
     """PSD (..., fine points) as blocks under a Hann window show it, (..., bins)."""
-    x = np.arange(-REACH * FINE, REACH * FINE + 1) / FINE
-    kernel = (0.5 * np.sinc(x) + 0.25 * (np.sinc(x - 1.0) + np.sinc(x + 1.0))) ** 2
-    kernel /= kernel.sum()
+    kernel = _window()
     count = (power.shape[-1] - 1) // FINE + 1 - 2 * REACH
     place = np.arange(count)[:, None] * FINE + np.arange(len(kernel))
     return power[..., place] @ kernel
+
+
+@cache
+def _window() -> np.ndarray:
+    """What the points around a bin count in it."""
+    x = np.arange(-REACH * FINE, REACH * FINE + 1) / FINE
+    kernel = (0.5 * np.sinc(x) + 0.25 * (np.sinc(x - 1.0) + np.sinc(x + 1.0))) ** 2
+    return _constant(kernel / kernel.sum())
+
+
+def _constant(values: np.ndarray) -> np.ndarray:
+    values.flags.writeable = False
+    return values
 
 
 def _every() -> np.ndarray:
