@@ -1,7 +1,8 @@
 """Scores of constructed detections, worked out by hand."""
 
 import itertools
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airtouch.detector.dataset import Condition
-from airtouch.detector.score import match, over_platform, score_edges, score_flight
+from airtouch.detector.score import EdgeScore, FlightScore, match, over_platform, score_edges, score_flight
 from airtouch.detector.summary import by_height, summarise
 from airtouch.detector.trace import Detection
 
@@ -105,7 +106,7 @@ def test_unknown_truth_gives_detections_and_no_false_rate():
     table = summarise([score])
     assert score.false is None and table["detections"] == 1
     assert table["false_per_minute"] is None and table["mean_abs_error_m"] is None
-    assert "range" in score.note
+    assert score.note == "no down range in this log: detections are listed, not judged"
 
 
 def test_a_flight_without_edges_has_only_false_ones():
@@ -122,6 +123,66 @@ def test_no_speed_leaves_seconds():
 def test_over_platform_starts_over_when_the_first_edge_is_an_exit():
     over = over_platform([True_(3, "exit"), True_(5, "entry")], 8)
     assert over.tolist() == [True, True, True, False, False, True, True, True]
+
+
+def test_an_edge_of_unknown_kind_changes_the_state_and_a_named_one_sets_it():
+    first = over_platform([True_(2, "exit"), True_(4, "edge"), True_(6, "edge")], 8)
+    assert first.tolist() == [True, True, False, False, True, True, False, False]
+    assert over_platform([True_(1, "entry"), True_(3, "entry")], 5).tolist() == [False, True, True, True, True]
+    assert over_platform([True_(2, "exit"), True_(3, "exit")], 5).tolist() == [True, True, False, False, False]
+    assert over_platform([True_(2, "exit")], 4).tolist() == [True, True, False, False]
+    assert over_platform([True_(2, "edge")], 4).tolist() == [False, False, True, True]
+    assert over_platform([], 3).tolist() == [False] * 3
+
+
+def test_a_score_says_which_flight_and_which_edges():
+    missed, found = flight([Detection(1410, "exit")]).edges
+    assert missed == EdgeScore("entry", 1000)
+    assert found == EdgeScore("exit", 1400, 1410, "exit", pytest.approx(-0.1), pytest.approx(-0.02))
+    for true in ((ENTRY, EXIT), None):
+        score = flight([Detection(500, "entry")], true=true)
+        assert (score.file, score.condition, score.airborne_s) == ("f.csv", LOW, pytest.approx(16.0))
+    assert score_flight("f.csv", LOW, [ENTRY], AIRBORNE, np.full(2000, np.nan),
+                        [Detection(1000, "entry")]).edges[0].error_s == 0.0
+
+
+def test_a_probability_of_a_half_says_over_and_unknown_ones_count_as_nothing():
+    probability = np.full(len(AIRBORNE), 0.5)
+    probability[1000:1100] = np.nan
+    assert flight([], probability=probability).windows == (300, 300, 0, 1200)
+
+
+def test_balanced_accuracy_needs_samples_over_and_not_over():
+    score = flight([])
+    assert replace(score, windows=(5, 10, 0, 0)).balanced_accuracy() is None
+    assert replace(score, windows=(0, 0, 5, 10)).balanced_accuracy() is None
+    assert replace(score, windows=(1, 4, 3, 4)).balanced_accuracy() == 0.5
+
+
+def test_a_score_is_the_same_after_it_was_json():
+    bins = np.arange(30.0).reshape(10, 3)
+    score = replace(flight([Detection(990, "entry"), Detection(500, "edge")]), windows=(3, 4, 1, 2), bins=bins,
+                    note="a note", in_training=True)
+    entry = json.loads(json.dumps(score.as_dict()))
+    assert (entry["balanced_accuracy"], entry["detections"], entry["airborne_s"]) == (0.625, 2, 16.0)
+    assert entry["false"] == [500] and entry["condition"]["height"] == "low"
+    assert [e["error_s"] for e in entry["edges"]] == [pytest.approx(0.1), None]
+    again = FlightScore.from_dict(entry)
+    np.testing.assert_array_equal(again.bins, bins)
+    assert replace(again, bins=score.bins) == score
+    unknown = flight([Detection(500, "entry")], true=None)
+    assert FlightScore.from_dict(json.loads(json.dumps(unknown.as_dict()))).false is None
+    del entry["in_training"]  # as older files have it
+    assert FlightScore.from_dict(entry).in_training is False
+    assert set(entry) == {"file", "condition", "edges", "false", "detections", "balanced_accuracy", "airborne_s",
+                          "windows", "reliability", "note"}
+    with pytest.raises(KeyError):
+        FlightScore.from_dict({"file": "f.csv"})
+
+
+def test_nothing_is_matched_with_nothing():
+    assert match([], [3.0], 5.0) == [] == match([3.0], [], 5.0)
+    assert match([0.0, 0.4], [0.1], 0.2) == [(0, 0)]  # whatever the unit: no pair is worth a forbidden one
 
 
 samples = st.lists(st.integers(0, 600), max_size=5)
