@@ -1,0 +1,226 @@
+"""Selection on made flights whose truth is known: white noise of the declared sensors, and what a test injects."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap import calibrate, judging
+from airtouch.gap.candidates import every
+from airtouch.gap.clock import clock_gain
+from airtouch.gap.data import Data
+from airtouch.gap.fit import fit, judge
+from airtouch.gap.flight import PERIOD_S
+from airtouch.gap.nominal_scatter import Scatter
+from airtouch.gap.select import MOST_EFFECTS, seconds, select
+from airtouch.gap.spectra import AIR
+from gap_flights import VEHICLE, flight, noise
+
+ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and goes
+LOUDNESS = np.sqrt(2.0)  #: the floor of a study without flights is twice the declared power
+DOWN = 0.5  #: m/s^2, pushed where a test pushes
+FLOOR = calibrate.declared(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise
+
+
+def made(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
+    """A hover with white noise `louder` times as strong as the floor has it, and a steady force, m/s^2."""
+    acc, gyro = (LOUDNESS * louder * rms * np.array(ratio) for rms, ratio in (
+        (VEHICLE.acc_noise_rms_mps2, VEHICLE.acc_noise_ratio), (VEHICLE.gyro_noise_rms_radps, VEHICLE.gyro_noise_ratio)))
+    return flight(length_s, noise(length_s, 1.0, seed) * acc + np.array(force),
+                  noise(length_s, 1.0, seed + 500) * gyro, **options)
+
+
+def chosen(names):
+    return {n: v for n, v in every().items() if n in names}
+
+
+def found(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: None):
+    data = Data(study, flights, slow=True)
+    return select(data, chosen(names), progress, without), data
+
+
+def scattered(**rms):
+    return replace(FLOOR, scatter=Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0)))
+
+
+def own_gain(data, terms, first=None):
+    """Held-out log likelihood of effects by the definition: fitted on one half, judged on the other, both ways."""
+    total = 0.0
+    for train, test in ((0, 1), (1, 0)):
+        parts = judging.halves(data)
+        start = None if first is None else first[train]
+        fitted = fit(data, parts[train], terms, start).terms
+        random = any(t.kind == "spectrum" for t in fitted)
+        total += judge(data, parts[test], fitted) - judge(data, parts[test], (), random)
+    return total
+
+
+@pytest.fixture(scope="module")
+def heavy():
+    return found([made(1, (0.0, 0.0, -DOWN))], ("mass", "thrust_coefficient", "imu_bias", "rotor_drag", "weak_motor"))
+
+
+def test_where_nothing_is_nothing_is_found():
+    said = []
+    names = ("mass", "imu_bias", "rotor_drag", "wind", "imu_noise", "weak_motor")
+    selection, _ = found([made(1)], names, progress=said.append)
+    assert selection.steps == () and selection.chosen is None and selection.explained
+    assert set(said) == set(selection.singles) == set(names) == set(selection.least)
+    assert set(selection.least.values()) == {judging.LEAST_GAIN}  # without a loop the stricter one
+    assert selection.free_before == selection.free_after < 12.0
+    assert not any(j.full for j in selection.singles.values())
+    assert not selection.assumed and selection.usual == 0.0
+    drag, motor = selection.singles["rotor_drag"], selection.singles["weak_motor"]
+    # a vehicle that stands in the air has no drag: two parameters that do nothing cost the price of one
+    assert drag.gain == pytest.approx(-judging.PRICE) and drag.choice == 0.0
+    assert motor.choice == pytest.approx(np.log(4.0)), "one of four rotors"
+    assert selection.singles["wind"].choice == pytest.approx(np.log(2.0))
+
+
+def test_a_steady_push_is_its_mass_and_its_twin_is_not_added(heavy):
+    selection, data = heavy
+    (step,) = selection.steps
+    assert step.name == "mass" and step.named and step.full and step.evidence == step.gain
+    loss = selection.singles["thrust_coefficient"].terms[0].values["loss"]
+    assert step.terms[0].values["fraction"] == pytest.approx(loss / (1.0 - loss), rel=0.03)
+    bias = selection.singles["imu_bias"]
+    assert bias.terms[0].values["acc_z"] == pytest.approx(-DOWN, rel=0.03)
+    assert bias.strength[2] == pytest.approx(-DOWN / 0.1, rel=0.03) and bias.variance.shape == (6,)
+    assert np.abs(bias.strength[:2]).max() < 0.1
+    # the variance of the mean of white noise of twice the declared power, in the unit of the parameter
+    true = LOUDNESS * VEHICLE.acc_noise_rms_mps2 * VEHICLE.acc_noise_ratio[2] / 0.1 / np.sqrt(3000)
+    assert 0.5 * true < np.sqrt(bias.variance[2]) < 4.0 * true
+    assert step.gain == pytest.approx(own_gain(data, step.terms), rel=0.01), "one parameter costs nothing"
+    assert bias.gain == pytest.approx(own_gain(data, bias.terms) - 5 * judging.PRICE, abs=2.0)
+    assert selection.free_before > 0.9 * step.gain and selection.free_after < 12.0 and selection.explained
+    assert selection.chosen.terms == step.terms
+
+
+def test_what_is_as_strong_as_in_nominal_flights_is_a_deviation_and_stands_beside_what_is_named():
+    selection, _ = found([made(2, (0.0, 0.0, -DOWN), louder=2.0)], ("mass", "imu_noise"), scattered(mass=[3.0]))
+    assert [(s.name, s.named) for s in selection.steps] == [("imu_noise", True), ("mass", False)]
+    assert selection.steps[1].evidence < 1.0 < judging.LEAST_GAIN < selection.steps[1].gain - selection.steps[0].gain
+    assert [s.name for s in selection.named] == ["imu_noise"]
+    # four times a floor of twice the declared power; the declared one itself is no part of what is added
+    assert selection.chosen.terms[0].values["factor"] == pytest.approx(np.sqrt(2.0 * 4.0 - 1.0), rel=0.03)
+    assert [t.name for t in selection.chosen.terms] == ["imu_noise"]
+    assert {t.name for t in selection.whole.terms} == {"imu_noise", "mass"} and selection.assumed
+    alone, _ = found([made(2, (0.0, 0.0, -DOWN))], ("mass",), scattered(mass=[3.0]))
+    assert [s.named for s in alone.steps] == [False] and alone.chosen is None and alone.explained
+    assert alone.usual == pytest.approx(12.0), "of a rate of 0"
+
+
+def test_of_two_that_gain_nearly_as_much_the_rarer_in_nominal_flights_is_named():
+    one = [made(1, (0.0, 0.0, -DOWN))]
+    selection, _ = found(one, ("mass", "imu_bias"), scattered(mass=[3.0], imu_bias=[0.001] * 6))
+    assert [s.name for s in selection.named] == ["imu_bias"]
+    assert selection.singles["mass"].gain > selection.singles["imu_bias"].gain
+    selection, _ = found(one, ("mass", "imu_bias"), scattered(mass=[0.001], imu_bias=[0.001] * 6))
+    assert [s.name for s in selection.named] == ["mass"]
+
+
+def test_an_effect_at_its_bound_stands_in_for_another_and_is_not_named():
+    selection, _ = found([made(3, (0.0, 0.0, -8.0))], ("mass",))
+    (step,) = selection.steps
+    assert step.terms[0].values["fraction"] == 1.0 and step.evidence == 0.0 and not step.named
+    assert selection.chosen is None and not selection.explained
+
+
+def test_bounds_are_approached_from_within_on_both_sides():
+    mass = every()["mass"][0][0]
+    low, high = mass.bounds()
+    near = judging.STRETCHED
+    for x, at in ((high, True), (high * (near + 1e-6), True), (high * 0.99, False), (low, True), (0.99 * low, False),
+                  (0.0 * high, False)):
+        assert judging.at_bound(mass, x).tolist() == [at]
+
+
+def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
+    """Noise of twice the rms; one row in ten lost; and a push: three effects, each found beside the others."""
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    one = replace(made(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)
+    names = ("mass", "imu_noise", "packet_loss")
+    selection, data = found([one], names)
+    assert {s.name for s in selection.named} == set(names) and selection.named[-1].name == "packet_loss"
+    share = next(t for t in selection.whole.terms if t.name == "packet_loss").values["share"]
+    assert share == pytest.approx(lost.mean(), rel=0.1)
+    by_name = {s.name: s.share for s in selection.named}
+    lost_alone = clock_gain(data, chosen(["packet_loss"])["packet_loss"][0][0])[1]
+    assert by_name["packet_loss"] == pytest.approx(lost_alone, rel=1e-3)
+    gains = [s.gain for s in selection.steps]
+    assert gains == sorted(gains)
+    assert by_name["mass"] > 100.0 and by_name["imu_noise"] > 1000.0
+    without = own_gain(data, [t for t in selection.whole.terms if t.name == "imu_noise"])
+    of_clock = by_name["packet_loss"]
+    assert by_name["mass"] == pytest.approx(gains[-1] - of_clock - without, rel=0.02)
+
+
+def test_no_more_than_so_many_effects_are_named(monkeypatch):
+    assert MOST_EFFECTS == 3
+    monkeypatch.setattr("airtouch.gap.select.MOST_EFFECTS", 2)
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    selection, _ = found([replace(made(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)],
+                         ("mass", "imu_noise", "packet_loss"))
+    assert {s.name for s in selection.named} == {"imu_noise", "packet_loss"}, "the two that gain most"
+
+
+def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
+    one = made(6)
+    t = np.arange(len(one)) * PERIOD_S
+    force = one.acceleration.copy()
+    force[(t >= 9.0) & (t < 15.0), 2] -= 1.0
+    pushed = [replace(one, acceleration=force, name="pushed")]
+    selection, _ = found(pushed, ("mass",), scattered(), ())
+    assert [s.name for s in selection.named] == ["downwash"]
+    ((name, since, until),) = selection.steps[0].terms[0].gate
+    assert name == "pushed" and since == pytest.approx(9.0, abs=1.3) and until == pytest.approx(15.0, abs=1.3)
+    assert selection.steps[0].evidence > 100.0 and "downwash" in selection.singles
+    assert selection.least["downwash"] == judging.LEAST_GAIN
+    for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
+        other, _ = found(pushed, ("mass",), study, without)
+        assert "downwash" not in other.singles
+
+
+def test_a_look_that_is_thorough_fits_what_promises_nothing():
+    data = Data(FLOOR, [made(7)], slow=True)
+    for thorough in (False, True):
+        judged = judging.round_of(judging.trial_of(data), chosen(["imu_noise", "mass"]), None, thorough=thorough)
+        assert judged["imu_noise"].full == thorough
+        assert judged["imu_noise"].gain < judging.HOPELESS and judged["imu_noise"].strength[0] < 0.05
+
+
+def test_halves_share_no_block_and_leave_none_out():
+    few = Data(FLOOR, [made(8), made(9), made(10, length_s=3.0)], slow=True)
+    first, second = judging.halves(few)
+    for (i, regime, one), (j, of, other) in zip(first.pieces, second.pieces, strict=True):
+        assert (i, regime) == (j, of) and len(one) == len(few.first[i][regime]) and (one ^ other).all()
+    (_, _, one), *_, (_, _, short) = first.pieces
+    assert one[:9].tolist() == [True] * 3 + [False] * 3 + [True] * 3
+    assert 0 < short.sum() <= len(short), "a short flight is in both halves where it can be"
+    many = Data(FLOOR, [made(k) for k in range(5)], slow=True)
+    first, second = ({i for i, _, chosen in part.pieces if chosen.all()} for part in judging.halves(many))
+    assert (first, second) == ({0, 2, 4}, {1, 3})
+    assert {r for _, r, _ in judging.halves(few)[0].pieces} == {AIR}
+
+
+def test_flights_last_as_long_as_their_samples():
+    assert seconds(Data(FLOOR, [made(1), made(2, length_s=10.0)], slow=True)) == pytest.approx(40.0)
+
+
+def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
+    data = Data(FLOOR, [made(1, (0.0, 0.0, -DOWN))], slow=True)
+    on = judging.trial_of(data)
+    candidates = chosen(["mass", "thrust_coefficient", "weak_motor", "imu_noise"])
+    held = judging.round_of(on, candidates, None)["mass"]
+    beside = judging.round_of(on, candidates, held)
+    assert set(beside) == {"weak_motor", "imu_noise"}
+    for judged in beside.values():
+        assert judged.terms[0].name == "mass" and judged.gain < held.gain + 12.0
+        assert judged.evidence == pytest.approx(judged.gain - held.gain)
+    again = judging.crossed(on, "mass", held.terms, None, 0.5)
+    assert again.gain == pytest.approx(held.gain - 0.5) and again.choice == 0.5
+    motor = chosen(["weak_motor"])["weak_motor"][0]
+    both = judging.crossed(on, "weak_motor", motor, again, 0.25)
+    assert both.choice == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
+    gain = own_gain(data, [*again.terms, *motor], [np.append(f.scaled, 0.0) for f in again.fits])
+    assert both.gain == pytest.approx(gain - 0.75, abs=0.1)

@@ -1,0 +1,147 @@
+"""Changes the product in small ways, one at a time, and counts the changes that the tests notice (mutmut).
+
+    make mutate [GROUP=score] [SAMPLE=60]     # or: python tools/mutate.py score --sample 60
+    python tools/mutate.py score --show       # the changes that no test noticed, as they stand in build/mutate
+
+A group is a few modules and the tests that are there for them. mutmut works on a copy in build/mutate, where what is
+done is not done again; `--force` begins anew. A sample is drawn evenly, by a seed, from the mutants that a test
+reaches and those that none does; without one every mutant is run. Needs `pip install airtouch[mutate]`.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from airtouch.gap.blind_score import wilson
+
+ROOT = Path(__file__).parents[1]
+BUILD = ROOT / "build" / "mutate"
+LEAST = 0.85  #: of the mutants that are to be noticed
+
+
+@dataclass(frozen=True)
+class Group:
+    """Modules below host/airtouch, and tests below tests."""
+
+    modules: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+GROUPS = {
+    "reference": Group(("reference/*.py",), (
+        "reference", "kernels/test_equal_on_made_inputs.py", "kernels/test_network.py", "kernels/test_stream.py",
+        "app/test_floor_height.py")),
+    "score": Group(("detector/score.py",), ("detector/test_score.py",)),
+    "selection": Group(("gap/select.py", "gap/judging.py"), ("gap/test_select.py",)),
+}
+#: mutmut's exit codes, by what they say
+KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)
+CONFIG = """
+[tool.mutmut]
+source_paths = ["src"]
+only_mutate = {modules}
+also_copy = ["tests", "tools", "firmware", "gap8", "host"]
+pytest_add_cli_args = ["-p", "no:cacheprovider"]
+pytest_add_cli_args_test_selection = {tests}
+"""
+
+
+def staged(name: str, force: bool) -> Path:
+    """The copy of the project in which a group is mutated; the one that is there, unless `force`."""
+    place, group = BUILD / name, GROUPS[name]
+    if force and place.exists():
+        shutil.rmtree(place)
+    shutil.copytree(ROOT / "host" / "airtouch", place / "src" / "airtouch", dirs_exist_ok=True,
+                    ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("tests", "tools", "firmware", "gap8", "host/docs"):
+        shutil.copytree(ROOT / folder, place / folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    config = CONFIG.format(modules=json.dumps([f"src/airtouch/{m}" for m in group.modules]),
+                           tests=json.dumps([f"tests/{t}" for t in group.tests]))
+    (place / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text() + config)
+    return place
+
+
+def run_mutmut(place: Path, *mutants: str) -> None:
+    """The named mutants, or all; those that are done are not run again."""
+    flights = os.environ.get("AIRTOUCH_FLIGHTS", str(ROOT.parent / "shared" / "flights"))
+    subprocess.run([sys.executable, "-m", "mutmut", "run", "--max-children", "1", *mutants], cwd=place,
+                   env=os.environ | {"AIRTOUCH_FLIGHTS": flights})
+
+
+def results(place: Path) -> dict[str, int | None]:
+    """Exit code of each mutant, None where it was not run."""
+    found: dict[str, int | None] = {}
+    for path in sorted((place / "mutants").rglob("*.py.meta")):
+        found |= json.loads(path.read_text())["exit_code_by_key"]
+    return found
+
+
+def table(codes: dict[str, int | None]) -> float:
+    """Prints a line for each module and one for all; the share noticed."""
+    by_module: dict[str, Counter] = {}
+    for mutant, code in codes.items():
+        if code is not None:
+            module = mutant.rsplit(".", 1)[0].removeprefix("airtouch.")
+            said = "noticed" if code in KILLED + LATE else "unnoticed" if code in SURVIVED else \
+                "reached by no test" if code in UNSEEN else f"exit code {code}"
+            by_module.setdefault(module, Counter())[said] += 1
+    total = Counter()
+    for count in by_module.values():
+        total += count
+    share = 0.0
+    for module, count in [*sorted(by_module.items()), ("all", total)]:
+        n, hits = sum(count.values()), count["noticed"]
+        if not n:
+            continue
+        between = wilson(hits, n)
+        share = hits / n
+        rest = ", ".join(f"{k} {v}" for k, v in sorted(count.items()) if k != "noticed")
+        print(f"{module}: noticed {hits} of {n}, {share:.1%} [{between['low']:.0%}, {between['high']:.0%}]"
+              + (f"; {rest}" if rest else ""))
+    return share
+
+
+def show(place: Path, codes: dict[str, int | None]) -> None:
+    """Prints the mutants that no test noticed."""
+    for mutant, code in codes.items():
+        if code in SURVIVED + UNSEEN:
+            subprocess.run([sys.executable, "-m", "mutmut", "show", mutant], cwd=place)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("groups", nargs="*", help=f"of {', '.join(GROUPS)}; all by default")
+    parser.add_argument("--sample", type=int, help="mutants of each group")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--show", action="store_true", help="print those that no test noticed, and run nothing")
+    parser.add_argument("--force", action="store_true", help="begin anew")
+    args = parser.parse_args(arguments)
+    if unknown := set(args.groups) - set(GROUPS):
+        parser.error(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
+    worst = 1.0
+    for name in args.groups or GROUPS:
+        if args.show:
+            show(BUILD / name, results(BUILD / name))
+            continue
+        place = staged(name, args.force)
+        if args.sample:
+            if not results(place):
+                run_mutmut(place, "airtouch.no-such-mutant")  # makes the mutants and runs none
+            names = sorted(results(place))
+            run_mutmut(place, *random.Random(args.seed).sample(names, min(args.sample, len(names))))
+        else:
+            run_mutmut(place)
+        print(f"{name}:")
+        worst = min(worst, table(results(place)))
+    return 0 if worst >= LEAST else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
