@@ -4,8 +4,8 @@
     python tools/mutate.py score --show       # the changes that no test noticed, as they stand in build/mutate
 
 A group is a few modules and the tests that are there for them. mutmut works on a copy in build/mutate, where what is
-done is not done again; `--force` begins anew. A sample is drawn evenly, by a seed, from the mutants that a test
-reaches and those that none does; without one every mutant is run. Needs `pip install airtouch[mutate]`.
+done is not done again; `--force` begins anew. A sample is drawn by a seed from all mutants; without one each is
+run. Needs `pip install airtouch[mutate]`.
 """
 
 import argparse
@@ -135,11 +135,13 @@ def main(arguments: list[str] | None = None) -> int:
             if not results(place):
                 run_mutmut(place, "airtouch.no-such-mutant")  # makes the mutants and runs none
             names = sorted(results(place))
-            run_mutmut(place, *random.Random(args.seed).sample(names, min(args.sample, len(names))))
+            names = random.Random(args.seed).sample(names, min(args.sample, len(names)))
+            run_mutmut(place, *names)
         else:
             run_mutmut(place)
-        print(f"{name}:")
-        worst = min(worst, table(results(place)))
+            names = sorted(results(place))
+        print(f"{name}, {len(names)} of {len(results(place))} mutants:")
+        worst = min(worst, table({n: c for n, c in results(place).items() if n in set(names)}))
     return 0 if worst >= LEAST else 1
 
 

@@ -24,8 +24,8 @@ FLOOR = calibrate.declared(VEHICLE, ())  #: no loop, no calibration, a floor of 
 
 def made(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
     """A hover with white noise `louder` times as strong as the floor has it, and a steady force, m/s^2."""
-    acc, gyro = (LOUDNESS * louder * rms * np.array(ratio) for rms, ratio in (
-        (VEHICLE.acc_noise_rms_mps2, VEHICLE.acc_noise_ratio), (VEHICLE.gyro_noise_rms_radps, VEHICLE.gyro_noise_ratio)))
+    declared = calibrate.sensor_noise(VEHICLE)
+    acc, gyro = LOUDNESS * louder * declared[:3], LOUDNESS * louder * declared[3:6]
     return flight(length_s, noise(length_s, 1.0, seed) * acc + np.array(force),
                   noise(length_s, 1.0, seed + 500) * gyro, **options)
 

@@ -235,7 +235,7 @@ def frequencies() -> np.ndarray:
 
 @cache
 def fine_frequencies() -> np.ndarray:
-    """FINE points a bin and REACH bins beyond the first and the last: what a block's window mixes; not to be changed."""
+    """FINE points a bin, REACH bins beyond first and last: what a block's window mixes. Not to be changed."""
     f = frequencies()
     step = (f[1] - f[0]) / FINE
     return _constant(f[0] + step * np.arange(-REACH * FINE, (len(f) - 1 + REACH) * FINE + 1))
