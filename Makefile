@@ -8,7 +8,7 @@ FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c gap8/kernels/*.c) gap8
   $(addprefix firmware/app/src/,app_core.c app_level.c app_local.c app_log.c app_paper.c app_params.c floor_height.c)
 FLIES_INCLUDES = -Ifirmware/kernels -Ifirmware/link -Ifirmware/app/src -Igap8/kernels -Igap8/model -Igap8/app/src
 
-.PHONY: help setup demo test lint tidy docs fuzz fuzz-logs repeat bench firmware emulate gap8 flash clean
+.PHONY: help setup demo test lint tidy docs fuzz fuzz-logs mutate repeat bench firmware emulate gap8 flash clean
 
 help:  ## this list
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -47,6 +47,10 @@ fuzz:  ## fuzz the C that flies for long: [TARGET="parser app"] [RUNS=1000000] [
 
 fuzz-logs: setup  ## fuzz the log readers: [RUNS=100000] [ARGS="--format usd-2 --first 100000"]
 	$(BIN)/python tools/fuzz_logs.py --count $(or $(RUNS),100000) $(ARGS)
+
+mutate: setup  ## changes that no test notices, in references, selection and score: [GROUP=score] [SAMPLE=60] [ARGS=--show]
+	@$(BIN)/python -c "import mutmut" 2> /dev/null || $(BIN)/python -m pip install --quiet -c tools/constraints.txt mutmut
+	$(BIN)/python tools/mutate.py $(GROUP) $(if $(SAMPLE),--sample $(SAMPLE)) $(ARGS)
 
 repeat: setup  ## the tests that use threads, sockets or processes, many times over: [TIMES=50] [TEST=tests/sitl]
 	$(BIN)/python tools/repeat.py $(TEST) --times $(or $(TIMES),50)

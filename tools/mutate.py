@@ -48,7 +48,8 @@ CONFIG = """
 source_paths = ["src"]
 only_mutate = {modules}
 also_copy = ["tests", "tools", "firmware", "gap8", "host"]
-pytest_add_cli_args = ["-p", "no:cacheprovider"]
+pytest_add_cli_args = ["-p", "no:cacheprovider", "-k", "not real_windows"]
+track_dependencies = false
 pytest_add_cli_args_test_selection = {tests}
 """
 

@@ -91,7 +91,7 @@ def test_thrust_between_laboratories_is_above_three_percent(flights, fitted, tes
     vehicle = fitted_on(fitted, flights)
     pwm, volts, thrust, speed = settled(tested, flights)
     got = speeds(vehicle, pwm, volts)
-    assert rms(vehicle.thrust_per_speed2 * got**2, thrust) < goal
+    assert 0.03 < rms(vehicle.thrust_per_speed2 * got**2, thrust) < goal
     assert rms(got, speed) < 0.02
 
 

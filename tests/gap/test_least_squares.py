@@ -1,0 +1,69 @@
+"""Steps of ridge regression against SciPy's and NumPy's own least squares."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from airtouch.gap.least_squares import bounded_step
+
+NOTHING = (np.zeros(3), np.zeros((3, 3)))
+
+
+@pytest.fixture
+def system():
+    """Columns (3, 200), values (200,), weights (200,), prior (3,), and the same as real rows with the prior's."""
+    rng = np.random.default_rng(0)
+    columns = rng.normal(size=(3, 200)) + 1j * rng.normal(size=(3, 200))
+    values = np.array([-1.0, 2.0, -0.5]) @ columns + 0.3 * (rng.normal(size=200) + 1j * rng.normal(size=200))
+    weights, prior = rng.uniform(0.1, 2.0, 200), np.array([0.5, 1.0, 3.0])
+    root = np.sqrt(2.0 * weights)
+    rows = np.vstack([(root * columns.real).T, (root * columns.imag).T, np.diag(1.0 / prior)])
+    aim = -np.concatenate([root * values.real, root * values.imag])  # a step lowers values + columns * step
+    return columns, values, weights, prior, rows, aim
+
+
+@pytest.mark.parametrize("offset", [False, True])
+def test_a_step_is_the_weighted_ridge_regression(system, offset):
+    columns, values, weights, prior, rows, aim = system
+    at = np.array([0.2, -0.1, 0.3])
+    x, offsets = (at[:2], at[2:]) if offset else (at, np.zeros(0))
+    n = len(x)
+    twin = NOTHING[0][:n], NOTHING[1][:n, :n]
+    free = np.full(n, -9.0), np.full(n, 9.0)
+    step, covariance = bounded_step(columns, prior, values, weights, x, offsets, *free, twin)
+    expected = np.linalg.lstsq(rows, np.concatenate([aim, -at / prior]), rcond=None)[0]
+    np.testing.assert_allclose(step, expected, rtol=1e-9)
+    np.testing.assert_allclose(covariance, np.linalg.inv(rows.T @ rows)[:n, :n], rtol=1e-9)
+
+
+def test_a_parameter_at_its_bound_stays_and_the_others_are_best_beside_it(system):
+    columns, values, weights, prior, rows, aim = system
+    x, low, high = np.zeros(3), np.full(3, -9.0), np.array([0.0, 9.0, 9.0])  # the first would rise to 1
+    step, covariance = bounded_step(columns, prior, values, weights, x, np.zeros(0), low, high, NOTHING)
+    expected = lsq_linear(rows, np.concatenate([aim, np.zeros(3)]), (low, np.maximum(high, 1e-300)), tol=1e-12).x
+    assert step[0] == 0.0
+    np.testing.assert_allclose(step, expected, atol=1e-6)
+    np.testing.assert_allclose(covariance[1:, 1:], np.linalg.inv((rows.T @ rows)[1:, 1:]), rtol=1e-9)
+    down, _ = bounded_step(columns, prior, values, weights, x, np.zeros(0), np.array([-9.0, 0.0, -9.0]),
+                           np.full(3, 9.0), NOTHING)
+    assert down[1] == 0.0 < down[0]
+    away, _ = bounded_step(columns, prior, -values, weights, x, np.zeros(0), low, high, NOTHING)
+    assert away[0] < 0.0, "away from its bound it is free"
+    none, all_known = bounded_step(columns[:1], prior[:1], values, weights, x[:1], np.zeros(0), low[:1], high[:1],
+                                   (np.zeros(1), np.zeros((1, 1))))
+    assert none.tolist() == [0.0] and all_known.shape == (1, 1)
+
+
+def test_gradient_and_information_of_elsewhere_are_added_and_damping_shortens(system):
+    columns, values, weights, prior, rows, aim = system
+    rng = np.random.default_rng(1)
+    more, far = rng.normal(size=(8, 3)), rng.normal(size=8)
+    free = np.full(3, -9.0), np.full(3, 9.0)
+    step, _ = bounded_step(columns, prior, values, weights, np.zeros(3), np.zeros(0), *free,
+                           (more.T @ far, more.T @ more))
+    both = np.linalg.lstsq(np.vstack([rows, more]), np.concatenate([aim, np.zeros(3), far]), rcond=None)[0]
+    np.testing.assert_allclose(step, both, rtol=1e-9)
+    damped, _ = bounded_step(columns, prior, values, weights, np.zeros(3), np.zeros(0), *free, NOTHING, damping=1.0)
+    normal = rows.T @ rows
+    doubled = normal + np.diag(np.diag(normal))
+    np.testing.assert_allclose(doubled @ damped, rows.T @ np.concatenate([aim, np.zeros(3)]))
