@@ -97,7 +97,7 @@ def bench_inference(table: Table, some: list[FlightLog]) -> None:
     row_of_peers(table, "paper network, a window", lambda: run_int8(model.int8, q), model.tflite, q[..., None])
     stream = best.load(None)
     channels = channels_of(some[0])[0]
-    layer = stream.int8.convs[0].layer
+    layer = stream.int8.layers[0]
     quantised = quantise(channels, layer.input_scale, layer.input_zero_point)
     length = stream.recipe.receptive_samples
     ends = np.linspace(length, len(quantised), 40).astype(int)

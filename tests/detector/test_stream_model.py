@@ -14,10 +14,12 @@ from airtouch import kernels, logs
 from airtouch.detector import best
 from airtouch.detector.stream import batches, quantisation, training
 from airtouch.detector.stream import model as model_file
-from airtouch.detector.stream.float_network import float_logits
+from airtouch.detector.stream.network import float_logits, keras_model, weight_names
+from airtouch.detector.stream.outputs import OUTPUTS, goals
 from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
+from airtouch.reference.edge_decoder import LOGITS
 from airtouch.reference.int8_network import quantise
 from airtouch.reference.motion_channels import NAMES
 from airtouch.reference.stream_int8 import run_stream
@@ -32,9 +34,9 @@ def test_the_same_arguments_give_the_same_bits(small):
 
 def test_what_is_compiled_is_known_by_all_that_it_reads():
     """A field that the compiled step read and COMPILED lacked would be taken from another recipe."""
-    read = {name for part in (training._compiled.__wrapped__, training.build, Recipe.shapes.fget)
+    read = {name for part in (training._compiled.__wrapped__, *(o.weight for o in OUTPUTS), Recipe.graph.fget)
             for name in re.findall(r"(?:recipe|self)\.(\w+)", inspect.getsource(part))}
-    assert read - {"shapes"} == set(training.COMPILED)
+    assert read - {"graph"} == set(training.COMPILED)
 
 
 def test_pruned_blocks_are_whole_and_exact(small):
@@ -58,7 +60,7 @@ def test_the_shipped_model_equals_tflite_micro_on_real_windows(flights):
 def _check_against_tflite_micro(model, x: np.ndarray, count: int) -> int:
     """The stream's row at a sample equals tflite-micro over the window that ends there."""
     runtime = pytest.importorskip("tflite_micro.python.tflite_micro.runtime")
-    first = model.int8.convs[0].layer
+    first = model.int8.layers[0]
     quantised = quantise(x, first.input_scale, first.input_zero_point)
     streamed = kernels.run_stream(model.int8, quantised)
     assert np.array_equal(streamed, run_stream(model.int8, quantised))
@@ -76,23 +78,22 @@ def _check_against_tflite_micro(model, x: np.ndarray, count: int) -> int:
 def test_the_float_network_is_what_was_quantised(small):
     """int8 logits follow the float ones within a few steps of the output scale."""
     x = batches.channels_of(made_flight(6))[0]
-    logits = float_logits(small.weights, SMALL, x)
+    logits = float_logits(small.weights, SMALL.graph, x)
     head = small.int8.head
-    first = small.int8.convs[0].layer
+    first = small.int8.layers[0]
     out = kernels.run_stream(small.int8, quantise(x, first.input_scale, first.input_zero_point))
     error = np.abs(head.output_scale * (out.astype(float) - head.output_zero_point) - logits)
     assert np.median(error) < 3 * head.output_scale
 
 
 def test_the_float_network_is_the_one_that_keras_trained(small):
-    keras_model = training.build(SMALL)
-    last = len(SMALL.shapes) - 1
-    shapes = [v.shape for v in keras_model.trainable_variables]
-    names = [f"layer{i}.{part}" for i in range(last + 1) for part in ("kernel", "bias")]
-    keras_model.set_weights([small.weights[name].reshape(shape) for name, shape in zip(names, shapes, strict=True)])
+    model = keras_model(SMALL.graph)
+    shapes = [v.shape for v in model.trainable_variables]
+    model.set_weights([small.weights[name].reshape(shape)
+                       for name, shape in zip(weight_names(SMALL.graph), shapes, strict=True)])
     x = batches.channels_of(made_flight(6))[0]
-    expected = np.asarray(keras_model(x[None]))[0]
-    assert np.allclose(float_logits(small.weights, SMALL, x), expected, atol=1e-4)
+    expected = np.asarray(model(x[None]))[0]
+    assert np.allclose(float_logits(small.weights, SMALL.graph, x), expected, atol=1e-4)
 
 
 def test_it_is_causal_and_never_looks_at_the_range(small):
@@ -166,3 +167,19 @@ def test_representative_windows_cover_every_flight():
     found = quantisation.windows([np.full((50, CHANNELS), k) for k in range(4)], recipe, 8)
     assert found.shape == (8, recipe.receptive_samples, CHANNELS)
     assert sorted(set(found[:, 0, 0])) == [0, 1, 2, 3]
+
+
+def test_the_outputs_are_what_the_decoder_reads():
+    assert [output.name for output in OUTPUTS] == list(LOGITS)
+
+
+def test_goals_peak_where_their_edge_is_due():
+    over = np.zeros(400, dtype=np.uint8)
+    over[100:300] = 1
+    edges = [logs.Edge(100, "entry", 0.8, 0.05), logs.Edge(300, "exit", 0.05, 0.8)]
+    wanted = goals(over, edges, SMALL)
+    assert wanted.shape == (400, len(OUTPUTS)) and wanted.dtype == np.float32
+    assert np.array_equal(np.flatnonzero(wanted[:, 0]), np.arange(100, 300) + SMALL.over_delay)
+    for column, edge in ((1, edges[0]), (2, edges[1])):
+        assert wanted[:, column].argmax() == edge.sample + SMALL.delay
+        assert wanted[:, column].max() == 1.0

@@ -99,7 +99,7 @@ def test_best_as_a_stream_has_the_desktops_bits(models, chips, flights):
     model = models["best"]
     log = logs.read(collect([flights / "airtouch"])[0].path)
     channels, _ = channels_of(log, model.recipe.motion)
-    first = model.int8.convs[0].layer
+    first = model.int8.layers[0]
     quantised = quantise(channels[200:800], first.input_scale, first.input_zero_point)
     np.testing.assert_array_equal(gap8_counts.stream(chips["best"], quantised).outputs,
                                   run_stream(model.int8, quantised))

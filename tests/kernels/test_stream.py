@@ -1,5 +1,7 @@
 """The streaming network: C equals NumPy to the last bit, and both the windowed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,8 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream import run_stream as run_c
 from airtouch.reference.int8_network import Int8Layer
-from airtouch.reference.stream_int8 import StreamConv, StreamNetwork, run_stream
+from airtouch.reference.stream_graph import CONV, HEAD, StreamLayer
+from airtouch.reference.stream_int8 import StreamNetwork, run_stream
 
 
 def dense(rng, taps, channels, outputs, *, relu=True, sparsity=0.0, zero_point=-128) -> Int8Layer:
@@ -22,23 +25,29 @@ def dense(rng, taps, channels, outputs, *, relu=True, sparsity=0.0, zero_point=-
                      -128 if relu else 3, relu, weights, rng.integers(-3000, 3000, outputs).astype(np.int32), scale)
 
 
-def network(seed, *, width=8, channels=4, taps=3, dilations=(1, 2, 4), stride=2, first_skip=1, sparsity=0.0):
-    """A random network: one strided convolution, then the dilated ones, then a head of three."""
+def network(seed, *, width=8, channels=4, taps=3, dilations=(1, 2, 4), stride=2, first_skip=1, sparsity=0.0,
+            outputs=3):
+    """A random network: one strided convolution, then the dilated ones, then a head."""
     rng = np.random.default_rng(seed)
-    convs = [StreamConv(dense(rng, 4, channels, width, zero_point=-1, sparsity=sparsity), 1)]
-    convs += [StreamConv(dense(rng, taps, width, width, sparsity=sparsity), d) for d in dilations]
-    read = len(convs) - first_skip
-    return StreamNetwork(tuple(convs), dense(rng, read, width, 3, relu=False, sparsity=sparsity), stride, first_skip)
+    layers = [dense(rng, 4, channels, width, zero_point=-1, sparsity=sparsity)]
+    layers += [dense(rng, taps, width, width, sparsity=sparsity) for _ in dilations]
+    reads = tuple(range(first_skip, len(layers)))
+    layers.append(dense(rng, len(reads), width, outputs, relu=False, sparsity=sparsity))
+    graph = (StreamLayer("first", CONV, 4, channels, width, stride=stride),
+             *(StreamLayer(f"conv{i}", CONV, taps, width, width, d) for i, d in enumerate(dilations)),
+             StreamLayer("head", HEAD, len(reads), width, outputs, relu=False, reads=reads))
+    return StreamNetwork(graph, tuple(layers))
 
 
 @settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**31), width=st.sampled_from([4, 8, 12]), taps=st.integers(1, 4),
        stride=st.integers(1, 3), first_skip=st.integers(0, 2), sparsity=st.sampled_from([0.0, 0.7, 1.0]),
-       dilations=st.lists(st.integers(1, 9), min_size=1, max_size=4), samples=st.integers(0, 120))
-def test_c_equals_numpy(seed, width, taps, stride, first_skip, sparsity, dilations, samples):
+       outputs=st.integers(1, 6), dilations=st.lists(st.integers(1, 9), min_size=1, max_size=4),
+       samples=st.integers(0, 120))
+def test_c_equals_numpy(seed, width, taps, stride, first_skip, sparsity, dilations, samples, outputs):
     first_skip = min(first_skip, len(dilations))
     net = network(seed, width=width, taps=taps, dilations=tuple(dilations), stride=stride,
-                  first_skip=first_skip, sparsity=sparsity)
+                  first_skip=first_skip, sparsity=sparsity, outputs=outputs)
     x = np.random.default_rng(seed).integers(-128, 128, (samples, net.channels)).astype(np.int8)
     assert np.array_equal(run_c(net, x), run_stream(net, x))
 
@@ -76,8 +85,13 @@ def test_bad_networks_are_refused():
     good = network(5)
     with pytest.raises(AirTouchError, match="needs samples"):
         run_c(good, np.zeros((10, 5), np.int8))
-    wider = StreamNetwork(good.convs[:1] + network(6, width=12).convs[1:], good.head, 2, 1)
+    wider = StreamNetwork(good.graph, good.layers[:1] + network(6, width=12).layers[1:-1] + good.layers[-1:])
     with pytest.raises(AirTouchError, match="layer 1 does not fit"):
         arena_bytes(wider)
+    *convs, head = good.graph
     with pytest.raises(AirTouchError, match="layer 4 does not fit"):
-        arena_bytes(StreamNetwork(good.convs, good.head, 2, 2))
+        arena_bytes(StreamNetwork((*convs, replace(head, reads=(2, 3))), good.layers))
+    for graph in ((*convs, replace(head, reads=(1, 3))), (*convs, replace(head, reads=())),
+                  (convs[0], replace(convs[1], stride=2), *good.graph[2:]), good.graph[:1]):
+        with pytest.raises(AirTouchError, match="convolutions in a row and a head"):
+            arena_bytes(StreamNetwork(graph, good.layers))

@@ -122,7 +122,7 @@ def test_the_whole_equals_its_parts():
     acc, gyro, pwm = flight(3, 900)
     events = c.stream_detector(acc, gyro, pwm, net)
     channels, airborne = c.motion_channels(acc, gyro, pwm)
-    first = net.convs[0].layer
+    first = net.layers[0]
     rows = run_stream(net, quantise(channels, first.input_scale, first.input_zero_point))
     logits = net.head.output_scale * (rows.astype(np.float32) - net.head.output_zero_point)
     steps = np.arange(0, len(acc), net.stride)

@@ -32,7 +32,7 @@ def kernel_inputs(code: FlightCode, flight: np.ndarray) -> dict[str, np.ndarray]
     """What each kernel is given in a flight (n,) of edgeSample_t."""
     events = code.fly("edge_pipeline", flight)
     channels = code.fly("motion_channels", flight).output
-    first = best.load(None).int8.convs[0].layer
+    first = best.load(None).int8.layers[0]
     clean = np.nan_to_num(np.column_stack([flight["acc"], flight["gyro"], flight["pwm"]]), posinf=0.0, neginf=0.0)
     nine = np.column_stack([clean[:, :6], clean[:, 7:] - clean[:, 6:7]])
     return {

@@ -19,8 +19,8 @@ from airtouch.detector.channels import nine_channels
 from airtouch.detector.score import SAMPLE_PERIOD_S
 from airtouch.detector.stream import model as model_file
 from airtouch.detector.stream.batches import channels_of, flight_of
-from airtouch.detector.stream.float_network import float_logits
 from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.stream.network import float_logits
 from airtouch.detector.stream.recipe import STRIDE, Recipe
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
@@ -71,7 +71,7 @@ def model_for(model: StreamModel | None, log: FlightLog) -> StreamModel:
 def run_float(log: FlightLog, model: StreamModel) -> Trace:
     """As `run`, with the float network as trained: what quantisation is measured against."""
     x, airborne = channels_of(log, model.recipe.motion)
-    steps = float_logits(model.weights, model.recipe, x)
+    steps = float_logits(model.weights, model.recipe.graph, x)
     edge = np.zeros(len(log), dtype=np.uint8)
     edge[::STRIDE] = kernels.edge_decoder(steps, airborne[::STRIDE], model.decoder_without(sensors.missing(log)))
     return trace_of(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
@@ -135,7 +135,7 @@ def fit(
         flights, labels = [flights[i] for i in drawn], [labels[i] for i in drawn]
         emphasis = emphasis if emphasis is None else [emphasis[i] for i in drawn]
     recipe = replace(recipe, muted=tuple(sorted({*recipe.muted, *sensors.silent_in_all(flights)})))
-    if start is not None and start.recipe.weight_shapes() != recipe.weight_shapes():
+    if start is not None and start.recipe.graph != recipe.graph:
         raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
                             "alone")
     prepared = []

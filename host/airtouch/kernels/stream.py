@@ -5,6 +5,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.network import checked, flat_layers, pointer
+from airtouch.reference.stream_graph import CONV, HEAD
 from airtouch.reference.stream_int8 import StreamNetwork
 
 
@@ -19,7 +20,7 @@ def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
         raise AirTouchError(f"network: needs samples (n, {network.channels}), not {x.shape}")
     flat, keep = flat_stream(network)
     arena = ffi.new("int8_t[]", arena_bytes(network))
-    outputs = np.empty((-(-len(x) // network.stride), network.head.output_shape[2]), dtype=np.int8)
+    outputs = np.empty((-(-len(x) // network.stride), network.outputs), dtype=np.int8)
     lib.streamInt8Flight(flat, pointer("int8_t", x), len(x), arena, pointer("int8_t", outputs))
     return outputs
 
@@ -31,12 +32,21 @@ def arena_bytes(network: StreamNetwork) -> int:
 
 
 def flat_stream(network: StreamNetwork) -> tuple[object, list]:
-    """The C view of a network, and what must outlive it."""
+    """The C view of a network, and what must outlive it.
+
+    Raises AirTouchError for a graph other than convolutions in a row, the first one strided, and a head that reads
+    the last of them.
+    """
+    *convs, head = network.graph
+    if [layer.operation for layer in network.graph] != [CONV] * len(convs) + [HEAD] or any(
+            layer.reads or layer.stride > 1 for layer in convs[1:]) or head.reads != tuple(
+            range(head.reads[0] if head.reads else 0, len(convs))):
+        raise AirTouchError("network: the C kernel runs convolutions in a row and a head that reads the last of them")
     layers, keep = flat_layers(network.layers)
-    dilations = np.array([conv.dilation for conv in network.convs], dtype=np.int32)
-    zero_points = np.array([conv.layer.input_zero_point for conv in network.convs], dtype=np.int32)
+    dilations = np.array([layer.dilation for layer in convs], dtype=np.int32)
+    zero_points = np.array([layer.input_zero_point for layer in network.layers[:-1]], dtype=np.int32)
     flat = ffi.new("flatStreamInt8_t *", {
         "layers": layers, "dilations": pointer("int32_t", dilations),
         "zeroPoints": pointer("int32_t", zero_points), "stride": network.stride,
-        "firstSkip": network.first_skip})
+        "firstSkip": head.reads[0]})
     return flat, [layers, dilations, zero_points, *keep]

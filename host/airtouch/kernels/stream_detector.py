@@ -61,7 +61,7 @@ def stream_detector(
     flat, keep = flat_stream(network)
     arena = ffi.new("int8_t[]", arena_bytes(network))
     events = ffi.new("streamEvent_t[]", max(len(acc), 1))
-    first = network.convs[0].layer
+    first = network.layers[0]
     quantisation = ffi.new("streamQuantisation_t *", {
         "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
         "outputScale": network.head.output_scale, "outputZeroPoint": network.head.output_zero_point})

@@ -21,7 +21,7 @@ class StreamSession:
     def __init__(self, network: StreamNetwork, motion: MotionConfig | None = None,
                  decoder: DecoderConfig = DecoderConfig()) -> None:
         flat, keep = flat_stream(network)
-        first = network.convs[0].layer
+        first = network.layers[0]
         quantisation = ffi.new("streamQuantisation_t *", {
             "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
             "outputScale": network.head.output_scale, "outputZeroPoint": network.head.output_zero_point})

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+LOGITS = ("over", "entry", "exit")  #: columns of the logits
 LOGIT_LIMIT = 8.0  #: logits are clamped to this magnitude
 SLOW_AT_START = -3.0  #: the smoothed over logit before anything is known: off a platform
 LONG_AGO = 0x3FFFFFFF  #: steps since an edge that never was

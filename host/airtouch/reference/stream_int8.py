@@ -1,7 +1,6 @@
-"""The streaming int8 network, defined over a whole flight at once: causal dilated convolutions.
+"""The int8 network of a stream, defined over a whole flight at once.
 
-Row t of a convolution reads rows t, t - d, t - 2 d, ... of its input; before the first row lies
-zero (the zero point). gap8/kernels/stream_int8 computes the same, one row at a time.
+Before the first row lies zero (the zero point). gap8/kernels/stream_int8 computes the same, one row at a time.
 """
 
 from dataclasses import dataclass
@@ -9,46 +8,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.reference.int8_network import Int8Layer, requantise
-
-
-@dataclass(frozen=True)
-class StreamConv:
-    """One causal convolution: a dense `layer` over its taps, and the rows between two taps.
-
-    layer: kind "dense", input_shape (taps, 1, channels), weights (out, taps * channels), oldest tap first.
-    """
-
-    layer: Int8Layer
-    dilation: int
+from airtouch.reference.stream_graph import CONV, HEAD, StreamLayer, follow, receptive_samples, taps_of
 
 
 @dataclass(frozen=True)
 class StreamNetwork:
-    """Convolutions in a row and a dense head that reads the newest row of each from `first_skip` on.
+    """A graph and the int8 layer of each of its layers.
 
-    The first convolution is computed on every `stride`-th sample, the first sample included.
+    layers: kind "dense", input_shape (taps, 1, inputs), weights (outputs, taps * inputs), oldest tap first.
     """
 
-    convs: tuple[StreamConv, ...]
-    head: Int8Layer
-    stride: int
-    first_skip: int
+    graph: tuple[StreamLayer, ...]
+    layers: tuple[Int8Layer, ...]
 
     @property
-    def layers(self) -> tuple[Int8Layer, ...]:
-        """All layers, the head last."""
-        return (*(conv.layer for conv in self.convs), self.head)
+    def head(self) -> Int8Layer:
+        """The last layer."""
+        return self.layers[-1]
 
     @property
     def channels(self) -> int:
         """Values a sample."""
-        return self.convs[0].layer.input_shape[2]
+        return self.graph[0].inputs
+
+    @property
+    def outputs(self) -> int:
+        """Values of a row of the last layer."""
+        return self.graph[-1].outputs
+
+    @property
+    def stride(self) -> int:
+        """Samples to one row of outputs."""
+        return int(np.prod([layer.stride for layer in self.graph]))
 
     @property
     def receptive_samples(self) -> int:
         """Samples of the past, the newest included, that an output depends on."""
-        rows = sum((conv.layer.input_shape[0] - 1) * conv.dilation for conv in self.convs[1:])
-        return rows * self.stride + self.convs[0].layer.input_shape[0]
+        return receptive_samples(self.graph)
 
     @property
     def multiplications(self) -> int:
@@ -56,25 +52,38 @@ class StreamNetwork:
         return int(sum(np.count_nonzero(layer.weights) for layer in self.layers))
 
 
+def int8_layer(layer: StreamLayer, arrays: dict[str, np.ndarray]) -> Int8Layer:
+    """The int8 layer of a layer of the graph.
+
+    arrays: weights int8 (outputs, ...), bias int32 (outputs,), weight_scale float32 (outputs,), scale float32 and
+    zero_point int32 of input and output, (2,).
+    """
+    (scale_in, scale_out), (zero_in, zero_out) = arrays["scale"], arrays["zero_point"]
+    return Int8Layer("dense", (layer.taps, 1, layer.inputs), (1, 1, layer.outputs), (1, 1), float(scale_in),
+                     int(zero_in), float(scale_out), int(zero_out), layer.relu,
+                     arrays["weights"].reshape(layer.outputs, -1), arrays["bias"], arrays["weight_scale"])
+
+
 def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
     """int8 head outputs (ceil(n / stride), outputs) of int8 samples (n, channels)."""
-    x = np.asarray(quantised, dtype=np.int8)
-    rows = []
-    for index, conv in enumerate(network.convs):
-        x = _causal(conv, x)
-        if index == 0:
-            x = x[::network.stride]
-        if index >= network.first_skip:
-            rows.append(x)
-    return _dense(network.head, np.hstack(rows))
+    int8 = iter(network.layers)  # `follow` takes the layers in order
+
+    def apply(layer: StreamLayer, x: np.ndarray) -> np.ndarray:
+        return OPERATIONS[layer.operation](layer, next(int8), x)[::layer.stride]
+
+    return follow(network.graph, np.asarray(quantised, dtype=np.int8), apply, np.hstack)
 
 
-def _causal(conv: StreamConv, x: np.ndarray) -> np.ndarray:
-    taps, channels = conv.layer.input_shape[0], x.shape[1]
-    reach = (taps - 1) * conv.dilation
-    past = np.full((reach, channels), conv.layer.input_zero_point, dtype=np.int8)
-    padded = np.vstack([past, x])
-    return _dense(conv.layer, np.hstack([padded[k * conv.dilation:][:len(x)] for k in range(taps)]))
+def _conv(layer: StreamLayer, int8: Int8Layer, x: np.ndarray) -> np.ndarray:
+    return _dense(int8, np.hstack(taps_of(layer, x, int8.input_zero_point)))
+
+
+def _head(layer: StreamLayer, int8: Int8Layer, x: np.ndarray) -> np.ndarray:
+    return _dense(int8, x)
+
+
+#: operation -> int8 output (n, outputs) of its int8 input (n, ...)
+OPERATIONS = {CONV: _conv, HEAD: _head}
 
 
 def _dense(layer: Int8Layer, x: np.ndarray) -> np.ndarray:

@@ -8,7 +8,8 @@ import numpy as np
 from airtouch import kernels, logs
 from airtouch.detector import sensors
 from airtouch.detector.score import over_platform
-from airtouch.detector.stream.recipe import CHANNELS, ENTRY, EXIT, OUTPUTS, OVER, STRIDE, Recipe
+from airtouch.detector.stream.outputs import OUTPUTS, goals
+from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import MotionConfig
 
@@ -54,22 +55,6 @@ def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None 
                   tuple(sorted(silent)))
 
 
-def goals(over: np.ndarray, edges: Sequence[logs.Edge], recipe: Recipe) -> np.ndarray:
-    """What the three logits are to say at each sample, (n, 3) in 0..1.
-
-    over: (n,) 0 or 1. The events are bumps of height 1 `delay` samples after their edge.
-    """
-    n = len(over)
-    wanted = np.zeros((n, OUTPUTS), np.float32)
-    wanted[recipe.over_delay:, OVER] = over[:n - recipe.over_delay]
-    t = np.arange(n)
-    for edge in edges:
-        bump = np.exp(-0.5 * np.square((t - edge.sample - recipe.delay) / recipe.event_sigma))
-        column = ENTRY if edge.kind == "entry" else EXIT
-        wanted[:, column] = np.maximum(wanted[:, column], bump)
-    return wanted
-
-
 def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
           free_air: Sequence[Flight] = ()) -> tuple[np.ndarray, np.ndarray]:
     """Inputs (batch, crop, 12) float32 and goals (batch, crop / 2, 3) float32.
@@ -79,7 +64,7 @@ def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
     share = np.array([f.weight for f in flights])
     drawn = [flights[i] for i in rng.choice(len(flights), recipe.batch, p=share / share.sum())]
     x = np.empty((recipe.batch, recipe.crop, CHANNELS), np.float32)
-    y = np.empty((recipe.batch, recipe.crop // STRIDE, OUTPUTS), np.float32)
+    y = np.empty((recipe.batch, recipe.crop // STRIDE, len(OUTPUTS)), np.float32)
     silent = _silent(recipe, rng)
     for row, flight in enumerate(drawn):
         if free_air and rng.random() < recipe.free_air_share:

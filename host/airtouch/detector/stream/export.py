@@ -31,7 +31,7 @@ def render(model: StreamModel) -> dict[str, str]:
 def golden_flight(network: StreamNetwork) -> tuple[np.ndarray, np.ndarray]:
     """int8 samples (GOLDEN, 12) of made-up smooth channels and NumPy's rows (GOLDEN / stride, 3)."""
     walk = np.random.default_rng(0).normal(scale=0.3, size=(GOLDEN, network.channels)).cumsum(axis=0)
-    first = network.convs[0].layer
+    first = network.layers[0]
     inputs = quantise(4.0 * np.sin(walk), first.input_scale, first.input_zero_point)
     return inputs, run_stream(network, inputs)
 
@@ -63,13 +63,13 @@ extern const motionConfig_t airtouchStreamMotion;
 def _source(model: StreamModel) -> str:
     network, decoder = model.int8, model.decoder
     arrays, convs = [], []
-    for i, conv in enumerate(network.convs):
-        text, inside = layer(f"conv{i}", conv.layer)
+    for i, (of, int8) in enumerate(zip(network.graph[:-1], network.layers[:-1], strict=True)):
+        text, inside = layer(f"conv{i}", int8)
         arrays.append(text)
-        convs.append(f"    {{.dilation = {conv.dilation}, .zeroPoint = {conv.layer.input_zero_point}, .layer =\n"
+        convs.append(f"    {{.dilation = {of.dilation}, .zeroPoint = {int8.input_zero_point}, .layer =\n"
                      f"     {inside}}},")
     text, head = layer("head", network.head)
-    first = network.convs[0].layer
+    first = network.layers[0]
     settings = {
         "overShare": float_literal(decoder.over_share), "entryScore": "AIRTOUCH_STREAM_ENTRY_SCORE",
         "exitScore": "AIRTOUCH_STREAM_EXIT_SCORE", "lateEntry": float_literal(decoder.late_entry),
@@ -79,8 +79,9 @@ def _source(model: StreamModel) -> str:
     return "\n".join([
         '#include "airtouch_stream.h"', "", *arrays, text, "static const streamConv_t convs[] = {", *convs, "};", "",
         f"static const layerInt8_t head =\n    {head};", "",
-        "const streamInt8_t airtouchStream = {", "    .convs = convs,", f"    .convCount = {len(network.convs)},",
-        f"    .stride = {network.stride},", f"    .firstSkip = {network.first_skip},", "    .head = &head,", "};", "",
+        "const streamInt8_t airtouchStream = {", "    .convs = convs,", f"    .convCount = {len(network.layers) - 1},",
+        f"    .stride = {network.stride},", f"    .firstSkip = {network.graph[-1].reads[0]},",
+        "    .head = &head,", "};", "",
         "const streamQuantisation_t airtouchStreamQuantisation = {",
         f"    .inputScale = {float_literal(first.input_scale)},",
         f"    .outputScale = {float_literal(network.head.output_scale)},",

@@ -12,6 +12,7 @@ import numpy as np
 
 from airtouch.detector import archive
 from airtouch.detector.model_file import check_range
+from airtouch.detector.stream.network import weight_shapes
 from airtouch.detector.stream.quantisation import network_of
 from airtouch.detector.stream.recipe import CHANNELS, Recipe
 from airtouch.errors import AirTouchError
@@ -32,7 +33,7 @@ _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 
 @dataclass(frozen=True)
 class StreamModel:
-    """weights: float32 arrays (`Recipe.weight_shapes`); int8: what flies; tflite: the same over one window;
+    """weights: float32 arrays (`network.weight_shapes`); int8: what flies; tflite: the same over one window;
     metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by
     its name, in files of their own."""
 
@@ -71,18 +72,18 @@ class StreamModel:
     @property
     def digest(self) -> str:
         """SHA-256 of all that the int8 network computes with, hexadecimal."""
-        total = hashlib.sha256(repr((self.int8.stride, self.int8.first_skip, self.recipe.dilations)).encode())
+        total = hashlib.sha256(repr((self.int8.stride, self.int8.graph[-1].reads[0], self.recipe.dilations)).encode())
         for name, values in self._int8_arrays().items():
             total.update(f"{name} {values.dtype.str} {values.shape}\n".encode() + values.tobytes())
         return total.hexdigest()
 
     def _int8_arrays(self) -> dict[str, np.ndarray]:
         arrays = {}
-        for i, layer in enumerate(self.int8.layers):
+        for of, layer in zip(self.int8.graph, self.int8.layers, strict=True):
             parts = {"weights": layer.weights, "bias": layer.bias, "weight_scale": layer.weight_scale,
                      "scale": np.array([layer.input_scale, layer.output_scale], np.float32),
                      "zero_point": np.array([layer.input_zero_point, layer.output_zero_point], np.int32)}
-            arrays |= {f"int8.layer{i}.{part}": values for part, values in parts.items()}
+            arrays |= {f"int8.{of.name}.{part}": values for part, values in parts.items()}
         return arrays
 
     def to_bytes(self) -> bytes:
@@ -117,22 +118,23 @@ def parse(data: bytes, source: str) -> StreamModel:
     arrays, metadata = archive.parse(data, source)
     archive.check_kind(metadata, KIND, source)
     recipe = _recipe(metadata.pop("recipe", None), source)
-    shapes = {name: (np.float32, shape) for name, shape in recipe.weight_shapes().items()}
-    for i, (taps, before, after) in enumerate(recipe.shapes):
-        sizes = {"weights": (after, taps * before), "bias": (after,), "weight_scale": (after,),
+    shapes = {name: (np.float32, shape) for name, shape in weight_shapes(recipe.graph).items()}
+    for layer in recipe.graph:
+        sizes = {"weights": (layer.outputs, layer.taps * layer.inputs), "bias": (layer.outputs,),
+                 "weight_scale": (layer.outputs,),
                  "scale": (2,), "zero_point": (2,)}
-        shapes |= {f"int8.layer{i}.{part}": (_INT8[part], size) for part, size in sizes.items()}
+        shapes |= {f"int8.{layer.name}.{part}": (_INT8[part], size) for part, size in sizes.items()}
     archive.check_arrays(arrays, shapes, source)
     if "tflite" not in arrays or arrays["tflite"].dtype != np.uint8:
         raise AirTouchError(f"{source}: the TFLite file is missing from this model; {archive.REMEDY}")
-    layers = [{part: arrays[f"int8.layer{i}.{part}"] for part in _INT8} for i in range(len(recipe.shapes))]
+    layers = [{part: arrays[f"int8.{layer.name}.{part}"] for part in _INT8} for layer in recipe.graph]
     for layer in layers:
         positive = (layer["scale"] > 0).all() and (layer["weight_scale"] > 0).all()
         if not positive or not ((layer["zero_point"] >= -128) & (layer["zero_point"] <= 127)).all():
             raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
     int8 = network_of(layers, recipe)
     check_range(int8.layers, source)
-    model = StreamModel(recipe, {name: arrays[name] for name in recipe.weight_shapes()}, int8,
+    model = StreamModel(recipe, {name: arrays[name] for name in weight_shapes(recipe.graph)}, int8,
                         arrays["tflite"].tobytes(), metadata)
     _check_metadata(model, source)
     return model

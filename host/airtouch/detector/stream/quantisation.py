@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.detector.quantisation import convert, read_weighted
-from airtouch.detector.stream.recipe import CHANNELS, STRIDE, Recipe
-from airtouch.reference.int8_network import Int8Layer
-from airtouch.reference.stream_int8 import StreamConv, StreamNetwork
+from airtouch.detector.stream.network import Weights, window_logits
+from airtouch.detector.stream.recipe import Recipe
+from airtouch.reference.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
 FEW = 5  #: windows of a flight
@@ -30,49 +30,17 @@ def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESEN
     return np.stack(found[:count]).astype(np.float32)
 
 
-def quantise(weights: dict[str, np.ndarray], recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:
-    """The streaming int8 network, and a TFLite file that computes the last row of a window with the same bits.
+def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:
+    """The int8 network, and a TFLite file that computes the last row of a window with the same bits.
 
-    representative: windows (n, receptive samples, 12). Weights symmetric, one scale an output channel.
+    representative: windows (n, receptive samples, channels). Weights symmetric, one scale an output channel.
     """
-    content = convert(_graph(weights, recipe), (1, 1, recipe.receptive_samples, CHANNELS),
+    content = convert(window_logits(weights, recipe.graph), (1, 1, recipe.receptive_samples, recipe.graph[0].inputs),
                       representative[:, None, None])
     return network_of(read_weighted(content), recipe), content
 
 
-def _graph(weights: dict[str, np.ndarray], recipe: Recipe):
-    """The network over one window (1, 1, samples, 12): its last row only, (1, 1, 1, 3)."""
-    import tensorflow as tf
-
-    def kernel(i: int) -> np.ndarray:
-        return weights[f"layer{i}.kernel"][None]
-
-    def network(x):
-        x = tf.nn.relu(tf.nn.conv2d(x, kernel(0), (1, STRIDE), "VALID") + weights["layer0.bias"])
-        rows = []
-        for i, dilation in enumerate(recipe.dilations, start=1):
-            x = tf.nn.conv2d(x, kernel(i), 1, "VALID", dilations=(1, dilation)) + weights[f"layer{i}.bias"]
-            x = tf.nn.relu(x)
-            rows.append(x[:, :, -1:, :])
-        last = len(recipe.shapes) - 1
-        head = kernel(last).reshape(1, 1, -1, recipe.shapes[-1][-1])
-        return tf.nn.conv2d(tf.concat(rows, -1), head, 1, "VALID") + weights[f"layer{last}.bias"]
-
-    return network
-
-
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
-    """The network from each layer's arrays: weights, bias, weight_scale, scale (in, out), zero_point (in, out)."""
-    layers = [_layer(a, shape, relu=i < len(recipe.shapes) - 1)
-              for i, (a, shape) in enumerate(zip(arrays, recipe.shapes, strict=True))]
-    dilations = (1, *recipe.dilations)
-    return StreamNetwork(tuple(StreamConv(la, d) for la, d in zip(layers[:-1], dilations, strict=True)), layers[-1],
-                         STRIDE, 1)
-
-
-def _layer(arrays: dict[str, np.ndarray], shape: tuple[int, int, int], relu: bool) -> Int8Layer:
-    taps, before, after = shape
-    (scale_in, scale_out), (zero_in, zero_out) = arrays["scale"], arrays["zero_point"]
-    return Int8Layer("dense", (taps, 1, before), (1, 1, after), (1, 1), float(scale_in), int(zero_in),
-                     float(scale_out), int(zero_out), relu, arrays["weights"].reshape(after, -1),
-                     arrays["bias"], arrays["weight_scale"])
+    """The int8 network from the arrays of each layer (`reference.stream_int8.int8_layer`)."""
+    graph = recipe.graph
+    return StreamNetwork(graph, tuple(int8_layer(layer, part) for layer, part in zip(graph, arrays, strict=True)))

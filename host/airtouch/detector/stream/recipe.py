@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass, replace
 
+from airtouch.reference.edge_decoder import LOGITS
 from airtouch.reference.motion_channels import NAMES, MotionConfig
+from airtouch.reference.stream_graph import CONV, HEAD, StreamLayer, receptive_samples
 
 CHANNELS = len(NAMES)  #: values a sample
 STRIDE = 2  #: samples between two rows that are computed: 50 Hz
-OUTPUTS = 3
-OVER, ENTRY, EXIT = range(OUTPUTS)  #: the three logits
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,21 @@ class Recipe:
     free_air_share: float = 0.2
 
     @property
-    def shapes(self) -> tuple[tuple[int, int, int], ...]:
-        """(taps, channels in, channels out) of each convolution, then of the head (a tap for each layer it reads)."""
-        width = self.width
-        inner = [(self.taps, width, width)] * len(self.dilations)
-        return ((self.first_taps, CHANNELS, width), *inner, (len(self.dilations), width, OUTPUTS))
+    def graph(self) -> tuple[StreamLayer, ...]:
+        """The network: a strided convolution, dilated ones, and a head that reads a row of each of those."""
+        width, dilated = self.width, range(1, 1 + len(self.dilations))
+        return (
+            StreamLayer("layer0", CONV, self.first_taps, CHANNELS, width, stride=STRIDE),
+            *(StreamLayer(f"layer{i}", CONV, self.taps, width, width, dilation, pruned=True)
+              for i, dilation in zip(dilated, self.dilations, strict=True)),
+            StreamLayer(f"layer{len(dilated) + 1}", HEAD, len(dilated), width, len(LOGITS), relu=False,
+                        reads=tuple(dilated)),
+        )
 
     @property
     def receptive_samples(self) -> int:
         """Samples that one output depends on."""
-        return (self.taps - 1) * sum(self.dilations) * STRIDE + self.first_taps
+        return receptive_samples(self.graph)
 
     @property
     def motion(self) -> MotionConfig:
@@ -75,9 +80,3 @@ class Recipe:
         config = MotionConfig()
         scale = tuple(math.inf if i in self.muted else s for i, s in enumerate(config.scale))
         return replace(config, scale=scale)
-
-    def weight_shapes(self) -> dict[str, tuple[int, ...]]:
-        """Name and shape of each float array: kernels (taps, in, out) and biases (out,)."""
-        names = [f"layer{i}" for i in range(len(self.shapes))]
-        kernels = {f"{name}.kernel": shape for name, shape in zip(names, self.shapes, strict=True)}
-        return kernels | {f"{name}.bias": shape[-1:] for name, shape in zip(names, self.shapes, strict=True)}

@@ -10,6 +10,8 @@ import numpy as np
 
 from airtouch.detector.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.detector.stream.batches import Flight, batch
+from airtouch.detector.stream.network import keras_model, weight_names, weight_shapes
+from airtouch.detector.stream.outputs import OUTPUTS
 from airtouch.detector.stream.recipe import STRIDE, Recipe
 from airtouch.logs.files import write_bytes
 
@@ -22,28 +24,10 @@ COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "pea
 Weights = dict[str, np.ndarray]
 
 
-def build(recipe: Recipe):  # noqa: ANN201 - a keras.Model
-    """Keras model: (batch, samples, 12) -> logits (batch, samples / 2, 3). Row j sees samples up to 2 j."""
-    import keras
-
-    def conv(taps: int, **options: int) -> keras.layers.Layer:
-        return keras.layers.Conv1D(recipe.width, taps, padding="causal", activation="relu", **options)
-
-    inputs = keras.Input((None, recipe.shapes[0][1]))
-    x = conv(recipe.first_taps, strides=STRIDE)(inputs)
-    rows = []
-    for dilation in recipe.dilations:
-        x = conv(recipe.taps, dilation_rate=dilation)(x)
-        rows.append(x)
-    unlikely = keras.initializers.Constant([-2.0, -4.0, -4.0])
-    head = keras.layers.Dense(recipe.shapes[-1][-1], bias_initializer=unlikely)
-    return keras.Model(inputs, head(keras.layers.Concatenate()(rows)))
-
-
 def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
         progress: Callable[[int, int, str], None] = lambda *_: None, *,
         free_air: Sequence[Flight] = (), start: Weights | None = None, kept: Path | None = None) -> Weights:
-    """Float weights (`Recipe.weight_shapes`) trained on the flights; same arguments, same bits.
+    """Float weights (`network.weight_shapes`) trained on the flights; same arguments, same bits.
 
     free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
     kept: file in which the state is kept every KEEP_EVERY steps; a call with the same arguments goes on from there,
@@ -52,11 +36,11 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
     """
     import tensorflow as tf
 
-    rng = np.random.default_rng(seed)
-    drawn = build(recipe).get_weights()
+    rng, names = np.random.default_rng(seed), weight_names(recipe.graph)
+    drawn = keras_model(recipe.graph).get_weights()
     model, optimizer, masks, learn = _learner(recipe, drawn if start is None else [
-        start[name].reshape(value.shape) for name, value in zip(_names(recipe), drawn, strict=True)])
-    for name, variable, mask in zip(_names(recipe), model.trainable_variables, masks, strict=True):
+        start[name].reshape(value.shape) for name, value in zip(names, drawn, strict=True)])
+    for name, variable, mask in zip(names, model.trainable_variables, masks, strict=True):
         mask.assign(_mask(variable.numpy(), start is not None and name in _pruned(recipe)))
 
     losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
@@ -74,9 +58,8 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
         variable.assign(variable * mask)
     if kept:
         kept.unlink(missing_ok=True)
-    shapes = recipe.weight_shapes()  # the head's kernel has a tap for each layer that it reads
-    return {name: v.numpy().reshape(shapes[name])
-            for name, v in zip(_names(recipe), model.trainable_variables, strict=True)}
+    shapes = weight_shapes(recipe.graph)  # the head's kernel has a tap for each layer that it reads
+    return {name: v.numpy().reshape(shapes[name]) for name, v in zip(names, model.trainable_variables, strict=True)}
 
 
 def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
@@ -98,14 +81,14 @@ def _compiled(recipe: Recipe) -> tuple:
     import keras
     import tensorflow as tf
 
-    model = build(recipe)
+    model = keras_model(recipe.graph)
     rise = recipe.steps // 6
     rate = keras.optimizers.schedules.CosineDecay(
         recipe.peak_rate / 20, recipe.steps - rise, alpha=1e-3, warmup_target=recipe.peak_rate, warmup_steps=rise)
     optimizer = keras.optimizers.AdamW(rate, weight_decay=recipe.weight_decay, global_clipnorm=1.0)
     optimizer.build(model.trainable_variables)
     masks = [tf.Variable(tf.ones_like(v), trainable=False) for v in model.trainable_variables]
-    weight = tf.constant([1.0, recipe.event_weight, recipe.event_weight])
+    weight = tf.constant([output.weight(recipe) for output in OUTPUTS])
     scored = recipe.warm_up // STRIDE
 
     @tf.function(jit_compile=True)
@@ -147,15 +130,17 @@ def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa:
     sparsity = polynomial_sparsity(float(part), 1.0, 0.0, recipe.sparsity)
     if sparsity == 0.0 or position >= PRUNE_TO + 1.0 / recipe.steps:
         return
-    for layer in range(1, 1 + len(recipe.dilations)):
-        values = model.trainable_variables[2 * layer].numpy()
-        flat = values.reshape(-1, values.shape[-1])
-        masks[2 * layer].assign(keep_mask(flat, sparsity).reshape(values.shape))
+    pruned = _pruned(recipe)
+    for name, variable, mask in zip(weight_names(recipe.graph), model.trainable_variables, masks, strict=True):
+        if name in pruned:
+            values = variable.numpy()
+            flat = values.reshape(-1, values.shape[-1])
+            mask.assign(keep_mask(flat, sparsity).reshape(values.shape))
 
 
 def _pruned(recipe: Recipe) -> list[str]:
-    """The weights that pruning takes zeros of."""
-    return [f"layer{layer}.kernel" for layer in range(1, 1 + len(recipe.dilations))]
+    """The names of the weights of which pruning sets blocks to zero."""
+    return [f"{layer.name}.kernel" for layer in recipe.graph if layer.pruned]
 
 
 def _mask(values: np.ndarray, pruned: bool) -> np.ndarray:
@@ -164,9 +149,3 @@ def _mask(values: np.ndarray, pruned: bool) -> np.ndarray:
         return np.ones_like(values)
     blocks = values.reshape(-1, BLOCK, values.shape[-1]).any(axis=1)
     return np.repeat(blocks, BLOCK, axis=0).reshape(values.shape).astype(np.float32)
-
-
-def _names(recipe: Recipe) -> list[str]:
-    """The weights' names in the order of the model's variables."""
-    return [f"layer{i}.{part}" for i in range(len(recipe.shapes)) for part in ("kernel", "bias")]
-
