@@ -5,7 +5,7 @@ A training with other steps is compiled anew, which takes longer than all of SMA
 
 import numpy as np
 
-from airtouch.detector.stream.recipe import Recipe
+from airtouch.detector.best.recipe import Recipe
 from airtouch.logs.flight_log import FlightLog
 
 SMALL = Recipe(width=8, dilations=(1, 2, 4), steps=60, batch=4, crop=512, warm_up=64, sparsity=0.5)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from airtouch.detector import network, pruning, quantisation
-from airtouch.detector.model_file import Model
+from airtouch.detector.paper import network, quantisation
+from airtouch.detector.paper.model import Model
+from airtouch.detector.shared import pruning
 
 
 def random_weights(seed: int = 0, sparsity: float = 0.0) -> dict[str, np.ndarray]:

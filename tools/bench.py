@@ -15,11 +15,12 @@ from scipy.signal import ShortTimeFFT
 
 from airtouch import kernels, logs
 from airtouch.cli.flights import find_flights
-from airtouch.detector import best, dataset, paper
-from airtouch.detector.channels import nine_channels
-from airtouch.detector.features import flight_features
-from airtouch.detector.stream.batches import channels_of
-from airtouch.detector.stream.recipe import CHANNELS, STRIDE
+from airtouch.detector import best, paper
+from airtouch.detector.best.batches import channels_of
+from airtouch.detector.best.recipe import CHANNELS, STRIDE
+from airtouch.detector.evaluation import dataset
+from airtouch.detector.paper.features import flight_features
+from airtouch.detector.shared.channels import nine_channels
 from airtouch.kernels.network import run_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT

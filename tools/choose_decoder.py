@@ -17,9 +17,11 @@ from rich.progress import track
 from airtouch import kernels, logs
 from airtouch.cli import scores as show_scores
 from airtouch.cli.flights import find_flights
-from airtouch.detector import best, dataset, evaluate, sensors
-from airtouch.detector.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
-from airtouch.detector.stream.recipe import STRIDE
+from airtouch.detector import best
+from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
+from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.reference.edge_decoder import DecoderConfig
 

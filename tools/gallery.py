@@ -20,9 +20,10 @@ from PIL import Image
 import airtouch as at
 from airtouch import logs
 from airtouch.crazyflie import mission
-from airtouch.detector import baseline, best, edge_map, paper
-from airtouch.detector.dataset import Condition, FlightFile
-from airtouch.detector.evaluate import evaluate_flight
+from airtouch.detector import baseline, best, paper
+from airtouch.detector.evaluation import edge_map
+from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.evaluate import evaluate_flight
 from airtouch.logs.files import write_bytes
 from airtouch.report.figures import error_distribution, flight
 from airtouch.report.map_figure import edge_map as draw_map

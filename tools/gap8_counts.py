@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.detector import export
-from airtouch.detector.model_file import Model
-from airtouch.detector.stream.model import StreamModel
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.paper.model import Model
+from airtouch.detector.shared import export
 from tools.emulator.build import CACHE, build
 from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
@@ -59,11 +59,11 @@ class Chip:
         return Elf(self.objects[self.source]).flash_bytes()
 
 
-def compile_model(model: Model | StreamModel, core: str = RV32IMC, folder: Path | None = None) -> Chip:
+def compile_model(model: Model | BestModel, core: str = RV32IMC, folder: Path | None = None) -> Chip:
     """Export and compile; `folder`: where the sources lie or go, one for each model by default."""
     folder = folder or CACHE / "model" / model.digest[:24]
     export.export(model, folder, force=True)
-    if isinstance(model, StreamModel):
+    if isinstance(model, BestModel):
         kind, symbol, source = "stream", "airtouchStream", "airtouch_stream.c"
     elif model.scale:
         kind, symbol, source = "rolling", "airtouchRolling", "airtouch_rolling.c"

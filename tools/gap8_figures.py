@@ -20,16 +20,18 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from airtouch.cli.flights import need_flights
-from airtouch.detector import crossval, dataset, evaluate, export, paper, registry, summary
-from airtouch.detector.dataset import FlightFile
-from airtouch.detector.score import FlightScore
-from airtouch.detector.stream.export import golden_flight
+from airtouch.detector import paper, registry
+from airtouch.detector.best.export import golden_flight
+from airtouch.detector.evaluation import crossval, dataset, evaluate, summary
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.paper import export
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
 from airtouch.logs.files import write_bytes
-from airtouch.reference.int8_network import multiplications, stream_multiplications
+from airtouch.reference.int8_network import multiplications, rolling_multiplications
 from tools import gap8_counts
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -78,9 +80,9 @@ def cost(row: Row, model: Any) -> dict[str, Any]:
         found["mac"] = network.multiplications / network.stride
     elif chip.kind == "rolling":
         stride = paper.stride(model)
-        run = gap8_counts.rolling(chip, export.golden_stream(network, stride)[0][:200], stride)
+        run = gap8_counts.rolling(chip, export.golden_samples(network, stride)[0][:200], stride)
         arena, columns = rolling_size(network, stride).arena_bytes, network.input_shape[1]
-        found["mac"] = stream_multiplications(network, stride)
+        found["mac"] = rolling_multiplications(network, stride)
     else:
         run = gap8_counts.windows(chip, export.golden_vectors(network)[0])
         arena, columns, found["mac"] = arena_bytes(network), int(np.prod(network.input_shape)), multiplications(network)

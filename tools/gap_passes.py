@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import welch
 
 from airtouch import logs
-from airtouch.detector import channels
+from airtouch.detector.shared import channels
 from airtouch.logs.flight_log import FlightLog
 
 BANDS_HZ = (0.7, 2.0, 6.0, 12.0, 25.0, 50.1)

@@ -30,9 +30,10 @@ import numpy as np
 
 from airtouch import logs, vehicle
 from airtouch.cli.flights import need_flights
-from airtouch.detector import best, crossval, dataset, evaluate, simulated
-from airtouch.detector.score import FlightScore
-from airtouch.detector.summary import summarise
+from airtouch.detector import best
+from airtouch.detector.evaluation import crossval, dataset, evaluate, simulated
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import diagnose
 from airtouch.logs.files import write_bytes

@@ -29,11 +29,13 @@ from typing import Any
 import numpy as np
 
 from airtouch import vehicle
-from airtouch.detector import best, crossval, dataset, evaluate, sensors, training_set
-from airtouch.detector.dataset import FlightFile
-from airtouch.detector.score import FlightScore
-from airtouch.detector.stream.model import StreamModel
-from airtouch.detector.summary import summarise
+from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.evaluation import crossval, dataset, evaluate
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.summary import summarise
+from airtouch.detector.shared import sensors, training_set
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
@@ -70,7 +72,7 @@ def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
                         np.sum([s.bins for s in some], axis=0)) for name, some in flights.items()]
 
 
-def scored(model: StreamModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
+def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
     """Scores of the held-out flights. Raises AirTouchError where the model knows one."""
     for file in held:
         if training_set.contains(model.metadata, readable[file.path]):
@@ -96,7 +98,7 @@ def recorded_beside(folders: Sequence[Path], speed: float | None, pool: Sequence
 
 
 def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
-         pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: StreamModel | None,
+         pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: BestModel | None,
          flown: adapt.Flown | None, options: argparse.Namespace) -> list[FlightScore]:
     """One training and its scores, or what an earlier run found."""
     steps = {"start": 0, "labelled": options.steps, "alone": options.alone_steps}[row]

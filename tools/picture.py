@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 
 from airtouch import logs
 from airtouch.cli.flights import find_flights
-from airtouch.detector import best, dataset
-from airtouch.detector.score import FlightScore
+from airtouch.detector import best
+from airtouch.detector.best.batches import channels_of
+from airtouch.detector.evaluation import dataset
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
@@ -41,7 +43,7 @@ def main() -> None:
 def draw(log, model, name: str) -> bytes:
     """PNG: what the drone feels, P(over a platform) with edges, and the down range that it never saw."""
     trace, truth = best.run(log, model), logs.true_edges(log)
-    x = best.channels_of(log)[0]
+    x = channels_of(log)[0]
     t = np.arange(len(log)) * 0.01
     first, last = t[truth[0].sample] - 6, t[truth[-1].sample] + 5
     with style():

@@ -15,7 +15,7 @@ import argparse
 import json
 from pathlib import Path
 
-from airtouch.detector import sensors
+from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 

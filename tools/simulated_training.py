@@ -17,8 +17,9 @@ from typing import Any
 import airtouch.simulation
 from airtouch import vehicle as vehicles
 from airtouch.cli.flights import find_flights
-from airtouch.detector import dataset, evaluate, registry, simulated
-from airtouch.detector.summary import summarise
+from airtouch.detector import registry
+from airtouch.detector.evaluation import dataset, evaluate, simulated
+from airtouch.detector.evaluation.summary import summarise
 from airtouch.logs.files import write_bytes
 from airtouch.simulation import scenario
 

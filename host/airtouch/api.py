@@ -76,8 +76,8 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
     detector: best, paper, paper-stream, baseline or an object like those of `detector.registry.Detector`; model: a
     trained file, the shipped one for None.
     """
-    from airtouch.detector import evaluate as scoring
     from airtouch.detector import registry
+    from airtouch.detector.evaluation import evaluate as scoring
 
     chosen, log = registry.get(detector), read(flight)
     scoring.check(log, scoring.spare_of(chosen))
@@ -92,9 +92,10 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     flights: files, folders (by their manifest) or logs; speed_mps: commanded speed where no manifest and no log says
     it.
     """
-    from airtouch.detector import dataset, registry
-    from airtouch.detector import evaluate as scoring
-    from airtouch.detector.dataset import Condition, FlightFile
+    from airtouch.detector import registry
+    from airtouch.detector.evaluation import dataset
+    from airtouch.detector.evaluation import evaluate as scoring
+    from airtouch.detector.evaluation.dataset import Condition, FlightFile
 
     chosen, inputs = registry.get(detector), _several(flights)
     trained = chosen.load(Path(model) if model else None)
@@ -164,7 +165,8 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     twin: a folder of `airtouch twin`, the simulator as it is for None. Needs the extra 'train'.
     """
     from airtouch import vehicle as vehicles
-    from airtouch.detector import best, dataset
+    from airtouch.detector import best
+    from airtouch.detector.evaluation import dataset
     from airtouch.extras import need
     from airtouch.logs.files import check_free
     from airtouch.simulation import scenario

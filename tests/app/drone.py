@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.kernels.app_core import DETECTORS, HEALTH, AppCore, Gap8Core
 from airtouch.logs.flight_log import GYRO, PWM
 

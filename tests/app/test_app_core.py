@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from airtouch.detector import paper, paper_stream
-from airtouch.detector.features import pipeline
+from airtouch.detector import paper
+from airtouch.detector.paper import rolling
+from airtouch.detector.paper.features import pipeline
 from airtouch.kernels.app_core import DETECTORS, HEALTH, LINK, AppCore, Gap8Core
 from airtouch.kernels.library import call
 from app.drone import Drone
@@ -47,7 +48,7 @@ def test_a_third_of_the_packets_lost_delays_edges_and_changes_none(flight, best_
     assert drone.app.log.lost == 0
 
 
-@pytest.mark.parametrize("module", [paper, paper_stream], ids=["paper", "paper-stream"])
+@pytest.mark.parametrize("module", [paper, rolling], ids=["paper", "paper-stream"])
 def test_a_network_of_features_over_the_link_is_its_pipeline(flight, module):
     log, *_ = flight
     drone = Drone("paper-gap8" if module is paper else "paper-stream-gap8")

@@ -14,8 +14,8 @@ import pytest
 
 from airtouch import vehicle as vehicles
 from airtouch.crazyflie import flash
-from airtouch.detector import vehicle_header
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared import vehicle_header
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.kernels.app_core import DETECTORS, PARAMS, AppCore, Gap8Core
 from airtouch.kernels.library import call, ffi
 from airtouch.logs.flight_log import GYRO, PWM

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.detector import paper, paper_stream
-from airtouch.detector.features import pipeline
+from airtouch.detector import paper
+from airtouch.detector.paper import rolling
+from airtouch.detector.paper.features import pipeline
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import LINK, PARAM_TYPES, PARAMS, AppCore
 from airtouch.kernels.library import call, ffi
@@ -49,9 +50,9 @@ def test_decoding_of_paper_is_that_of_the_shipped_model():
 def test_decoding_as_shipped_is_that_of_the_detector_in_force(recorded):
     # 0.9, 0.2, 1.5 s and 1 s are `paper`'s; `paper-stream` was tuned to others, and takes what a user sets.
     log, expected = recorded[0][0], []
-    probability = paper_stream.run(log[0]).probability
+    probability = rolling.run(log[0]).probability
     for changes in ({}, {"probability_entry": 0.8}, {"probability_entry": 0.3}, {"dwell_samples": 300}):
-        settings = replace(paper.decoding(paper_stream.load(None))[0], **changes)
+        settings = replace(paper.decoding(rolling.load(None))[0], **changes)
         if settings.probability_exit >= settings.probability_entry:  # 0.4 as tuned, 0.3 as set
             settings = replace(settings, probability_exit=settings.probability_entry - 0.01)
         edges = pipeline(log[0], settings, np.append(np.nan, probability[:-1]), physical_filter=True).edge

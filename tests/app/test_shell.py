@@ -10,7 +10,7 @@ import pytest
 
 import objects
 from airtouch import vehicle as vehicles
-from airtouch.detector import vehicle_header
+from airtouch.detector.shared import vehicle_header
 from airtouch.simulation import scenario
 from airtouch.sitl import app as sitl
 from airtouch.sitl.drone import Drone

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from airtouch import vehicle as vehicles
 from airtouch.cli import export as export_command
-from airtouch.detector import vehicle_header
+from airtouch.detector.shared import vehicle_header
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import DETECTORS, HEALTH, AppCore
 from airtouch.parameters import DEFAULT

@@ -7,7 +7,8 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch.cli.crossval import command
-from airtouch.detector import baseline, crossval, dataset
+from airtouch.detector import baseline
+from airtouch.detector.evaluation import crossval, dataset
 from airtouch.errors import AirTouchError
 
 

@@ -60,7 +60,7 @@ def test_without_position_the_edges_lie_along_the_track(tmp_path):
 def test_the_picture_is_a_map_platform_scale_start_and_end():
     from shapely.geometry import Point
 
-    from airtouch.detector.edge_map import EdgePoint, Platform
+    from airtouch.detector.evaluation.edge_map import EdgePoint, Platform
     from airtouch.report import map_figure
 
     xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.zeros(500)])

@@ -11,7 +11,8 @@ from airtouch.cli import airtouch
 from airtouch.crazyflie import replay
 from airtouch.crazyflie.board import Board
 from airtouch.crazyflie.host_detector import HostDetector
-from airtouch.detector import best, dataset, evaluate
+from airtouch.detector import best
+from airtouch.detector.evaluation import dataset, evaluate
 from airtouch.simulation import batch
 
 

@@ -10,12 +10,14 @@ pytest.importorskip("unicorn", reason="pip install unicorn")
 pytest.importorskip("ziglang", reason="pip install ziglang")
 
 from airtouch import kernels, logs
-from airtouch.detector import best, model_file, paper_stream
-from airtouch.detector.dataset import collect
-from airtouch.detector.export import golden_vectors
-from airtouch.detector.features import flight_features
-from airtouch.detector.stream.batches import channels_of
-from airtouch.detector.stream.export import golden_flight
+from airtouch.detector import best
+from airtouch.detector.best.batches import channels_of
+from airtouch.detector.best.export import golden_flight
+from airtouch.detector.evaluation.dataset import collect
+from airtouch.detector.paper import model as model_file
+from airtouch.detector.paper import rolling
+from airtouch.detector.paper.export import golden_vectors
+from airtouch.detector.paper.features import flight_features
 from airtouch.kernels.network import arena_bytes, parameter_bytes, run_int8
 from airtouch.kernels.rolling import fixed_scale, rolling_size, run_rolling
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
@@ -29,7 +31,7 @@ CORES = (1, 2, 4, 8)
 
 @pytest.fixture(scope="module")
 def models():
-    return {"paper": model_file.load(), "paper-stream": paper_stream.load(None), "best": best.load(None)}
+    return {"paper": model_file.load(), "paper-stream": rolling.load(None), "best": best.load(None)}
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from airtouch import logs
-from airtouch.detector.dataset import Condition, FlightFile
-from airtouch.detector.score import EdgeScore, FlightScore
-from airtouch.detector.summary import summarise
+from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.score import EdgeScore, FlightScore
+from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.gap.candidates import _unsteady
 from airtouch.gap.diagnose import _with_random_part

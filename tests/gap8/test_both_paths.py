@@ -8,10 +8,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airtouch import kernels, logs
-from airtouch.detector import model_file
-from airtouch.detector.dataset import collect
-from airtouch.detector.features import flight_features
-from airtouch.detector.normalisation import FixedScale
+from airtouch.detector.evaluation.dataset import collect
+from airtouch.detector.paper import model as model_file
+from airtouch.detector.paper.features import flight_features
+from airtouch.detector.paper.normalisation import FixedScale
 from airtouch.errors import AirTouchError
 from airtouch.kernels import network as c_network
 from airtouch.kernels import rolling
@@ -144,7 +144,7 @@ def test_inputs_are_held_between_answers_and_unknown_after_a_gap() -> None:
     features = np.random.default_rng(0).gamma(1.0, 1e6, size=(500, 3)).astype(np.float32)
     features[:40] = np.nan
     features[300, 2] = np.inf
-    every, held = (rolling.probability_of_stream(model, features, stride) for stride in (1, 4))
+    every, held = (rolling.probability_of_samples(model, features, stride) for stride in (1, 4))
     assert np.isnan(every[:137]).all() and np.isfinite(every[137:300]).all() and np.isnan(every[300:398]).all()
     answers = np.flatnonzero(np.isfinite(held))[0] + 4 * np.arange(30)
     np.testing.assert_array_equal(held[answers], every[answers])

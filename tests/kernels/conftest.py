@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from airtouch.detector.channels import level_acceleration, nine_channels, thrust_axis
+from airtouch.detector.shared.channels import level_acceleration, nine_channels, thrust_axis
 from airtouch.logs import read
 from airtouch.logs.flight_log import GYRO, PWM
 

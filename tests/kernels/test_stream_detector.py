@@ -10,7 +10,7 @@ from test_stream import network
 
 from airtouch import kernels as c
 from airtouch import logs
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.edge_decoder import DecoderConfig, edge_decoder

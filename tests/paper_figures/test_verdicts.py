@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from airtouch.detector.dataset import Condition
-from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.paper_figures import (
     components,
     conditions,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.reference.int8_network import Int8Layer, Int8Network, multiplications, stream_multiplications
+from airtouch.reference.int8_network import Int8Layer, Int8Network, multiplications, rolling_multiplications
 
 
 def layer(kind, shape_in, shape_out, kernel=(1, 1), weights=None):
@@ -30,18 +30,18 @@ def test_a_stream_computes_a_row_as_often_as_pools_and_stride_let_it(stride, lat
         layer("max_pool", (9, 3, 4), (4, 3, 4), (2, 1)),
         layer("conv", (4, 3, 4), (3, 2, 2), (2, 2), ones(2, 2, 2, 4)),
         layer("dense", (1, 1, 12), (1, 1, 2), weights=ones(2, 12))))
-    assert stream_multiplications(network, stride) == 3 * 12 + (2 * 32 + 24) / later
+    assert rolling_multiplications(network, stride) == 3 * 12 + (2 * 32 + 24) / later
 
 
 def test_pools_one_behind_another_multiply():
     network = Int8Network((
         layer("max_pool", (8, 1, 1), (4, 1, 1), (2, 1)), layer("max_pool", (4, 1, 1), (1, 1, 1), (4, 1)),
         layer("dense", (1, 1, 1), (1, 1, 16), weights=ones(16, 1))))
-    assert stream_multiplications(network, 16) == 16 / 8 and stream_multiplications(network, 4) == 16 / 4
+    assert rolling_multiplications(network, 16) == 16 / 8 and rolling_multiplications(network, 4) == 16 / 4
 
 
 def test_pruned_layers_skip_empty_blocks_of_four():
     weights = np.zeros((4, 32), np.int8)
     weights[0, 5], weights[2, 8:12] = 1, 3
     network = Int8Network((layer("dense", (1, 1, 32), (1, 1, 4), weights=weights),))
-    assert multiplications(network) == 2 * 4 == stream_multiplications(network, 1)
+    assert multiplications(network) == 2 * 4 == rolling_multiplications(network, 1)

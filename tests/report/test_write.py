@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from airtouch.detector.dataset import Condition
-from airtouch.detector.score import score_flight
-from airtouch.detector.summary import summarise
+from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.score import score_flight
+from airtouch.detector.evaluation.summary import summarise
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs import Edge

@@ -6,8 +6,8 @@ import pytest
 
 from airtouch import logs
 from airtouch.detector import best
-from airtouch.detector.dataset import Condition
-from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.errors import AirTouchError
 from airtouch.twin import adapt
 from made_flight import SMALL, made_flight

@@ -9,9 +9,10 @@ from click.testing import CliRunner
 
 from airtouch import logs
 from airtouch.cli import airtouch
-from airtouch.detector import best, sensors
-from airtouch.detector.dataset import Condition, FlightFile
-from airtouch.detector.score import EdgeScore, FlightScore
+from airtouch.detector import best
+from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.score import EdgeScore, FlightScore
+from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.twin import adapt

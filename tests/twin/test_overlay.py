@@ -83,7 +83,7 @@ def test_a_scenario_without_platform_is_named(vehicle):
 
 def test_logs_of_overlay_flights_train(made, laid):
     """They have what the detector needs and no down range of their own."""
-    from airtouch.detector.stream.batches import channels_of
+    from airtouch.detector.best.batches import channels_of
     (log, *_), _ = overlay.flights(overlay.free_air([made[0][1]]), laid[:1], seed=1)
     assert not log.has("zrange_m")
     x, airborne = channels_of(log)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import EDGES, AppCore
 from airtouch.logs.flight_log import ATTITUDE, GYRO, PWM, FlightLog

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.detector import best
-from airtouch.detector.channels import level_acceleration, thrust_axis
+from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.logs import read
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.int8_network import quantise

@@ -8,8 +8,8 @@ from rich.table import Table
 
 from airtouch.cli import scores as show
 from airtouch.cli.flights import need_flights
-from airtouch.detector import ablation, dataset
-from airtouch.detector.ablation import ABLATIONS
+from airtouch.detector.evaluation import ablation, dataset
+from airtouch.detector.evaluation.ablation import ABLATIONS
 from airtouch.logs.files import check_free
 
 

@@ -53,7 +53,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     more over a platform are held out in turn to say what to expect. What is done is kept beside --out, in a
     folder that ends in .adapt: the same command goes on after a stop.
     """
-    from airtouch.detector import best, dataset, summary
+    from airtouch.detector import best
+    from airtouch.detector.evaluation import dataset, summary
     from airtouch.twin import adapt
 
     need("train", "training")
@@ -87,7 +88,7 @@ def _twin(folder: Path | None, vehicle: str | None, flights: Any, speed: float |
           seed: int) -> tuple[Any, Any, str]:
     """(scenario, vehicle, in words) of a twin: its folder's, one fitted now, or the simulator as it is."""
     from airtouch import vehicle as vehicles
-    from airtouch.detector import sensors
+    from airtouch.detector.shared import sensors
     from airtouch.simulation import scenario
     from airtouch.twin import calibrate, files
     from airtouch.twin import flights as recordings

@@ -9,9 +9,10 @@ import click
 
 from airtouch.cli import scores as show
 from airtouch.cli.flights import need_flights
-from airtouch.detector import crossval, dataset, evaluate, sensors
-from airtouch.detector import folds as folds_of
-from airtouch.detector import free_air as free_air_flights
+from airtouch.detector.best import free_air as free_air_flights
+from airtouch.detector.evaluation import crossval, dataset, evaluate
+from airtouch.detector.evaluation import folds as folds_of
+from airtouch.detector.shared import sensors
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 
@@ -78,7 +79,10 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     screen.print(show.table({title: result, **result["by_height"]},
                             f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}"))
     if random_windows:
-        leak = crossval.random_windows(files, seed=seed, epochs=random_epochs)
+        from airtouch.detector.paper import variants
+
+        leak = variants.random_windows(list(crossval.readable_flights(files)[0].values()), seed=seed,
+                                       epochs=random_epochs)
         result["random_windows"] = leak
         screen.print("random split of windows (leaks): balanced window accuracy "
                      f"{leak['balanced_accuracy']:.1%} on {leak['windows']} windows "

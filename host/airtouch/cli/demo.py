@@ -10,9 +10,10 @@ import click
 from airtouch import logs
 from airtouch.cli import scores as show
 from airtouch.cli.flights import find_flights
-from airtouch.detector import dataset, evaluate, registry
-from airtouch.detector.dataset import FlightFile
-from airtouch.detector.summary import summarise
+from airtouch.detector import registry
+from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 
@@ -134,7 +135,7 @@ def spread(files: list[FlightFile], most: int) -> list[FlightFile]:
 
 def readable(files: Sequence[FlightFile]) -> tuple[list[Any], list[tuple[str, str]]]:
     """Logs to train on, and what cannot be used."""
-    from airtouch.detector.crossval import readable_flights
+    from airtouch.detector.evaluation.crossval import readable_flights
 
     found, left_out = readable_flights(files)
     if not found:
@@ -161,7 +162,7 @@ def order(name: str) -> int:
 
 def export(name: str, model: Any, out: Path) -> None:
     """The model file, and the C sources made of it."""
-    from airtouch.detector import export as gap8
+    from airtouch.detector.shared import export as gap8
 
     folder = out / "model"
     folder.mkdir(exist_ok=True)

@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from airtouch.cli import scores as show
-from airtouch.detector import dataset, evaluate, registry
+from airtouch.detector import registry
+from airtouch.detector.evaluation import dataset, evaluate
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
 

@@ -5,8 +5,10 @@ from pathlib import Path
 import click
 
 from airtouch import vehicle as vehicles
-from airtouch.detector import archive, export, model_file, paper_stream, vehicle_header
-from airtouch.detector.stream import model as stream_model
+from airtouch.detector.best import model as best_model
+from airtouch.detector.paper import model as model_file
+from airtouch.detector.paper import rolling
+from airtouch.detector.shared import archive, export, vehicle_header
 from airtouch.kernels.network import parameter_bytes
 
 
@@ -35,7 +37,7 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
             click.echo(f"written: {vehicle_header.export(craft, folder, force)}")
         return
     out = out or Path("gap8/model")
-    shipped = [] if model else [model_file.load(), paper_stream.load(None), stream_model.load()]
+    shipped = [] if model else [model_file.load(), rolling.load(None), best_model.load()]
     for trained in [_load(model)] if model else shipped:
         name = model.name if model else ""
         if only_check:
@@ -50,9 +52,9 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
         export.check_nothing_else(shipped, out)
 
 
-def _load(path: Path) -> model_file.Model | stream_model.StreamModel:
+def _load(path: Path) -> model_file.Model | best_model.BestModel:
     """A model of either kind."""
     data = archive.read(path)
     _, metadata = archive.parse(data, str(path))
-    module = stream_model if metadata.get("network") == "stream" else model_file
+    module = best_model if metadata.get("network") == "stream" else model_file
     return module.parse(data, str(path))

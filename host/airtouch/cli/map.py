@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from airtouch import logs
-from airtouch.detector import dataset, evaluate, registry
+from airtouch.detector import registry
+from airtouch.detector.evaluation import dataset, evaluate
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 
@@ -35,7 +36,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     along the track only. Each edge has a 1-sigma: the detector's timing error times the speed there.
     """
     need("map", "a map")
-    from airtouch.detector import edge_map
+    from airtouch.detector.evaluation import edge_map
 
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
     picture = out.with_suffix(".png")

@@ -31,7 +31,9 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     from airtouch.crazyflie import board as boards
     from airtouch.crazyflie import replay
     from airtouch.crazyflie.host_detector import HostDetector
-    from airtouch.detector import best, dataset, evaluate, sensors
+    from airtouch.detector import best
+    from airtouch.detector.evaluation import dataset, evaluate
+    from airtouch.detector.shared import sensors
 
     files = dataset.collect([flight], flown_at)
     if len(files) != 1 or flight.is_dir():

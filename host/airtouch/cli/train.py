@@ -13,8 +13,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from airtouch import logs
 from airtouch.cli.flights import need_flights
-from airtouch.detector import dataset, evaluate, registry, sensors
-from airtouch.detector import free_air as air
+from airtouch.detector import registry
+from airtouch.detector.best import free_air as air
+from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
@@ -132,7 +134,7 @@ def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
 def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: int,
               progress: Callable[[str, int, int, str], None]) -> tuple[list[FlightLog], dict[str, Any]]:
     """Flights of the simulator, and what they are."""
-    from airtouch.detector import simulated
+    from airtouch.detector.evaluation import simulated
 
     return simulated.training_flights(count, scenario or simulated.SCENARIO, without=without, seed=seed,
                                       progress=progress)

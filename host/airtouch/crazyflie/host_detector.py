@@ -4,9 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from airtouch.detector import best, sensors
-from airtouch.detector.stream.model import StreamModel
-from airtouch.detector.stream.recipe import STRIDE
+from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection, Trace
 from airtouch.kernels.stream_session import StreamSession
 from airtouch.logs.flight_log import FlightLog
@@ -20,7 +21,7 @@ class HostDetector:
     `next` takes rows, `trace` gives what `best.run` gives of all of them.
     """
 
-    def __init__(self, model: StreamModel | None = None, missing: tuple[str, ...] = ()) -> None:
+    def __init__(self, model: BestModel | None = None, missing: tuple[str, ...] = ()) -> None:
         """missing: the sensors, one at most, that no row will have (`detector.sensors.missing`)."""
         self.model = (model or best.load(None)).serving(missing)
         self.lag_s = best.lag_s(self.model)

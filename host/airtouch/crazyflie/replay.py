@@ -8,9 +8,10 @@ import numpy as np
 
 from airtouch.crazyflie.board import Board, Felt
 from airtouch.crazyflie.host_detector import HostDetector
-from airtouch.detector import best, evaluate
-from airtouch.detector.dataset import FlightFile
-from airtouch.detector.score import SAMPLE_PERIOD_S
+from airtouch.detector import best
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.logs import airborne
 from airtouch.logs.flight_log import FlightLog
 

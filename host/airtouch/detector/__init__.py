@@ -1,0 +1,14 @@
+"""Detectors of edges: from a flight log to P(over a platform) and the edges that were crossed.
+
+registry    the detectors by name, and what a detector offers: `fit`, `run`, `load`, `lag_s`, `parameters`
+trace       what a detector returns for a flight
+paper       the paper's pipeline: band powers, fusion, int8 network, physical filter (sections 4 and 5)
+best        this project's detector: twelve motion channels, a causal int8 network that runs on a stream of samples
+baseline    the comparison of the paper without a network
+evaluation  flights with conditions, folds, scores with intervals, cross-validation, ablations, maps
+shared      what both networks use: channels, sensors, pruning, TensorFlow, model files, C sources
+
+A stream is one sample in, one row of outputs out, with the past kept between; the word stands for the network of
+`best` (`reference.stream_int8`). The network of the paper runs over windows, or rolls over samples
+(`paper.rolling`, known to users by its older name, `paper-stream`).
+"""

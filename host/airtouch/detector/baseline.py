@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from airtouch import kernels, logs
-from airtouch.detector import tuning
-from airtouch.detector.channels import nine_channels
-from airtouch.detector.score import SAMPLE_PERIOD_S
+from airtouch.detector.evaluation import tuning
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
+from airtouch.detector.shared.channels import nine_channels
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog

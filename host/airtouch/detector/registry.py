@@ -13,7 +13,7 @@ from airtouch.logs.flight_log import FlightLog
 DETECTORS = {
     "best": "airtouch.detector.best",
     "paper": "airtouch.detector.paper",
-    "paper-stream": "airtouch.detector.paper_stream",
+    "paper-stream": "airtouch.detector.paper.rolling",
     "baseline": "airtouch.detector.baseline",
 }
 

@@ -60,7 +60,7 @@ def fixed_scale(mean: np.ndarray, deviation: np.ndarray, features: np.ndarray) -
     return out
 
 
-def probability_of_stream(model: Model, features: np.ndarray, stride: int) -> np.ndarray:
+def probability_of_samples(model: Model, features: np.ndarray, stride: int) -> np.ndarray:
     """P(over a platform), (n,), from fused features (n, c), by a model on a fixed scale that rolls over them.
 
     Held between two outputs; NaN before the first one and where a feature is not finite.

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector import summary
-from airtouch.detector.score import FlightScore
-from airtouch.detector.variants import Variant
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.paper.variants import Variant
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID

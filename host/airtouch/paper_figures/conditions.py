@@ -1,7 +1,7 @@
 """Errors by height, approach angle and wind (labels Performance:1d and 1e, section 7.6)."""
 
-from airtouch.detector import summary
-from airtouch.detector.score import FlightScore
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, simulated, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict

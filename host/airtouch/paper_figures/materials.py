@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector import registry, summary
-from airtouch.detector.score import FlightScore
+from airtouch.detector import registry
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, simulated, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE

@@ -1,7 +1,7 @@
 """Overall errors over platforms, and the method against the paper's baseline (labels Performance:1a and 1c)."""
 
-from airtouch.detector import summary
-from airtouch.detector.score import FlightScore
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID
 from airtouch.paper_figures.figure import Figure, Job

@@ -4,9 +4,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from airtouch.detector import ablation, crossval, dataset, folds, free_air
+from airtouch.detector.best import free_air
+from airtouch.detector.evaluation import ablation, crossval, dataset, folds
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, get
-from airtouch.detector.score import FlightScore
 from airtouch.paper_figures.figure import Job, Missing
 
 #: of a full run and of a quick one: a detector's training options

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector import evaluate, registry
-from airtouch.detector.dataset import Condition, FlightFile
-from airtouch.detector.score import FlightScore
+from airtouch.detector import registry
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
 from airtouch.logs.flight_log import FlightLog

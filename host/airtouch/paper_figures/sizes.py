@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector import paper, summary
-from airtouch.detector.train import SPARSITY
+from airtouch.detector import paper
+from airtouch.detector.evaluation import summary
+from airtouch.detector.paper.training import SPARSITY
 from airtouch.kernels.network import infer_float, infer_int8, parameter_bytes
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, SAID, UNTESTABLE

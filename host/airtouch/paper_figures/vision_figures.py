@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from airtouch import extras
-from airtouch.detector import summary, tuning
-from airtouch.detector.score import FlightScore
+from airtouch.detector.evaluation import summary, tuning
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.logs.files import write_bytes
 from airtouch.paper_figures import pictures, recorded, simulated, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE

@@ -8,7 +8,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from airtouch.detector.stream.recipe import STRIDE
+from airtouch.detector.best.recipe import STRIDE
 from airtouch.errors import AirTouchError
 from airtouch.power.ina219 import Power, added
 

@@ -87,7 +87,7 @@ def multiplications(network: Int8Network) -> int:
     return total
 
 
-def stream_multiplications(network: Int8Network, stride: int) -> float:
+def rolling_multiplications(network: Int8Network, stride: int) -> float:
     """Multiplications a sample where the network rolls over a stream, mean over `stride` samples.
 
     A layer's row is computed on each sample, or on as few as the pools before it and the stride let it.

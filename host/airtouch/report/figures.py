@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airtouch.detector.calibration import BINS, expected_calibration_error
-from airtouch.detector.channels import NAMES
-from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore
+from airtouch.detector.evaluation.calibration import BINS, expected_calibration_error
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore
+from airtouch.detector.shared.channels import NAMES
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog

@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon as PolygonPatch
 from shapely.geometry import LineString, Point
 from shapely.plotting import patch_from_polygon
 
-from airtouch.detector.edge_map import EdgePoint, Platform
+from airtouch.detector.evaluation.edge_map import EdgePoint, Platform
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
 
 STRIP_M = 0.3  #: drawn width of a platform that a single pass crossed

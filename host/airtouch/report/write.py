@@ -10,8 +10,8 @@ from typing import Any
 import jinja2
 
 from airtouch import __version__
-from airtouch.detector import summary
-from airtouch.detector.score import FlightScore
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge
 from airtouch.logs.files import write_bytes

@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector import best, evaluate, sensors, simulated, summary
-from airtouch.detector.dataset import FlightFile
-from airtouch.detector.score import FlightScore
-from airtouch.detector.stream.model import StreamModel
-from airtouch.detector.training_set import flight_hash
+from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.evaluation import evaluate, simulated, summary
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.shared import sensors
+from airtouch.detector.shared.training_set import flight_hash
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
 from airtouch.logs.files import write_bytes
@@ -70,14 +72,14 @@ class Flown:
 class Adapted:
     """model; scores of held-out flights with all others and with half of them in training (both may be empty)."""
 
-    model: StreamModel
+    model: BestModel
     held_out: list[FlightScore]
     held_out_half: list[FlightScore]
     twin_only: list[FlightScore]
 
 
 def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,
-          start: StreamModel | None, seed: int = 0, hold_out: bool = True, withhold: bool = False,
+          start: BestModel | None, seed: int = 0, hold_out: bool = True, withhold: bool = False,
           progress: Progress | None = None, command: str = "airtouch adapt") -> Adapted:
     """A detector from flights and their twin. Same arguments, same bits.
 
@@ -129,8 +131,8 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
     return Flown(laid, list(edges)), what
 
 
-def together(start: StreamModel | None, twin: StreamModel, flights: Sequence[Flight], flown: Flown, seed: int,
-             progress: Progress | None, command: str) -> StreamModel:
+def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], flown: Flown, seed: int,
+             progress: Progress | None, command: str) -> BestModel:
     """A detector of these flights and the twin's; the twin's own without flights.
 
     With labelled flights it is trained from `start` on both, each with half of the crops: a network that goes on from
@@ -152,8 +154,8 @@ def together(start: StreamModel | None, twin: StreamModel, flights: Sequence[Fli
                     steps=TWIN_STEPS["shipped" if start else "scratch"] if labelled else TUNE_STEPS, **settings)
 
 
-def _hold_out(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: StreamModel | None,
-              twin: StreamModel, work: Path, key: str, seed: int, progress: Progress | None, command: str,
+def _hold_out(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
+              twin: BestModel, work: Path, key: str, seed: int, progress: Progress | None, command: str,
               ) -> tuple[list[FlightScore], list[FlightScore]]:
     order = np.random.default_rng([seed, 7]).permutation(len(labelled))
     others = [f for f in flights if not f.labelled]
@@ -194,7 +196,7 @@ def _without_range(flight: Flight) -> Flight:
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
 
-def _model(path: Path, make: Callable[[], StreamModel]) -> StreamModel:
+def _model(path: Path, make: Callable[[], BestModel]) -> BestModel:
     if path.is_file():
         return best.load(path)
     model = make()
@@ -202,7 +204,7 @@ def _model(path: Path, make: Callable[[], StreamModel]) -> StreamModel:
     return model
 
 
-def _scores(path: Path, flights: Sequence[Flight], model: StreamModel) -> list[FlightScore]:
+def _scores(path: Path, flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
     if path.is_file():
         return [FlightScore.from_dict(s) for s in json.loads(path.read_text())]
     scores = [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]
@@ -216,7 +218,7 @@ def _named(progress: Progress | None, name: str) -> Progress | None:
     return lambda stage, done, total, note: progress(f"{name}: {stage}", done, total, note)
 
 
-def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: StreamModel | None, seed: int) -> str:
+def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Digits that change with anything the result depends on."""
     settings = (scene.table, vehicle, seed, SIMULATED, TWIN_STEPS, TUNE_STEPS, MIXED, DECODER, MIXED_DECODER)
     total = hashlib.sha256(repr(settings).encode())

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from airtouch import vehicle as vehicles
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.logs.clock import sample_period
 from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.reference.finite import hold_finite

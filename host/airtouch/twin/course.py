@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.logs.clock import sample_period
 from airtouch.logs.edges import Edge, true_edges

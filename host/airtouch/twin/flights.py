@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import logs
-from airtouch.detector import dataset
+from airtouch.detector.evaluation import dataset
 from airtouch.errors import AirTouchError
 from airtouch.twin import course as courses
 from airtouch.twin import near_range

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch import logs
-from airtouch.detector.channels import level_acceleration
+from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
 from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog

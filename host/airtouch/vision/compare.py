@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.detector import registry, tuning
-from airtouch.detector.dataset import Condition
-from airtouch.detector.score import SAMPLE_PERIOD_S, FlightScore, match, score_flight
+from airtouch.detector import registry
+from airtouch.detector.evaluation import tuning
+from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore, match, score_flight
 from airtouch.detector.trace import Detection
 from airtouch.vision import lines
 from airtouch.vision.camera import Camera

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.detector.score import SAMPLE_PERIOD_S
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.trace import Detection
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog

@@ -52,7 +52,8 @@ def examples(count: int, seed: int = SEED) -> tuple[np.ndarray, np.ndarray]:
 
 def train(name: str, images: np.ndarray, truth: np.ndarray, steps: int = STEPS, seed: int = SEED) -> teed.Weights:
     """Weights of one size: Adam, one cycle, weighted cross-entropy on crops. Needs TensorFlow, else AirTouchError."""
-    from airtouch.detector.train import one_cycle, use_tensorflow
+    from airtouch.detector.paper.training import one_cycle
+    from airtouch.detector.shared.tensorflow import use_tensorflow
 
     use_tensorflow(seed)
     import keras

@@ -1,0 +1,133 @@
+"""Training batches of the streaming network: crops of flights, augmented."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch import kernels, logs
+from airtouch.detector.best.outputs import OUTPUTS, goals
+from airtouch.detector.best.recipe import CHANNELS, STRIDE, Recipe
+from airtouch.detector.evaluation.score import over_platform
+from airtouch.detector.shared import sensors
+from airtouch.logs.flight_log import FlightLog
+from airtouch.reference.motion_channels import MotionConfig
+
+#: Sign of each channel in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
+MIRROR = np.array([1, -1, 1, -1, 1, -1, -1, 1, -1, 1, 1, 1], dtype=np.float32)
+AHEAD, BEHIND = 300, 150  #: samples before take-off where a crop may start, and after the last one where it may end
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One training flight: x (n, 12) channels, goals (n, 3), edges (k,) samples, airborne (n,), how often it is drawn,
+    and silent: channels of sensors that it lacks, which stay exactly 0."""
+
+    x: np.ndarray
+    goals: np.ndarray
+    edges: np.ndarray
+    airborne: np.ndarray
+    weight: float = 1.0
+    silent: tuple[int, ...] = field(default=())
+
+
+def channels_of(log: FlightLog, motion: MotionConfig | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Motion channels (n, 12) and airborne (n,) of a log; those of a missing sensor are 0.
+
+    Raises AirTouchError, naming columns, where more than one sensor is missing.
+    """
+    logged = sensors.signals(log)
+    return kernels.motion_channels(logged.acc, logged.gyro, logged.pwm,
+                                   sensors.silenced(motion or MotionConfig(), logged.missing))
+
+
+def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None = None) -> Flight:
+    """A log as a training flight; its edges are those of its down range unless given.
+
+    Flights that pass over the platform at 4 cm or more are drawn more often.
+    """
+    x, airborne = channels_of(log, recipe.motion)
+    edges = logs.true_edges(log) if edges is None else edges
+    high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
+    silent = {channel for sensor in sensors.missing(log) for channel in sensors.CHANNELS_OF[sensor]}
+    return Flight(x, goals(over_platform(edges, len(log)), edges, recipe),
+                  np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
+                  tuple(sorted(silent)))
+
+
+def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
+          free_air: Sequence[Flight] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Inputs (batch, crop, 12) float32 and goals (batch, crop / 2, 3) float32.
+
+    free_air: flights without edges, the source of `recipe.free_air_share` of the crops.
+    """
+    share = np.array([f.weight for f in flights])
+    drawn = [flights[i] for i in rng.choice(len(flights), recipe.batch, p=share / share.sum())]
+    x = np.empty((recipe.batch, recipe.crop, CHANNELS), np.float32)
+    y = np.empty((recipe.batch, recipe.crop // STRIDE, len(OUTPUTS)), np.float32)
+    silent = _silent(recipe, rng)
+    for row, flight in enumerate(drawn):
+        if free_air and rng.random() < recipe.free_air_share:
+            flight = free_air[rng.integers(len(free_air))]
+        x[row], y[row] = _crop(flight, recipe, rng)
+        silent[row, list(flight.silent)] = True
+    x = _augment(x, recipe, rng)
+    np.copyto(x, 0.0, where=silent[:, None])
+    return x, y
+
+
+def _silent(recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
+    """(batch, 12) bool: channels held at 0 in each crop, one sensor's at most beside the muted ones."""
+    silent = np.zeros((recipe.batch, CHANNELS), bool)
+    silent[:, [*recipe.muted, CHANNELS - 1]] = True
+    draw = rng.random(recipe.batch)
+    shares = {sensors.ACCELERATION: recipe.silent_acceleration, sensors.RATES: recipe.silent_rates,
+              sensors.MOTORS: recipe.silent_motors}
+    low = 0.0
+    for sensor, share in shares.items():
+        rows = (draw >= low) & (draw < low + share)
+        silent[np.ix_(rows, sensors.CHANNELS_OF[sensor])] = True
+        low += share
+    return silent
+
+
+def _crop(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """One crop, its time stretched by up to `warp`; before and after the flight its first and last sample repeat."""
+    speed = 1.0 + recipe.warp * rng.uniform(-1, 1)
+    last = len(flight.x) - 1
+    start = _start(flight, recipe, speed, rng)
+    t = np.clip(start + speed * np.arange(recipe.crop), 0, last)
+    low = np.minimum(t.astype(int), last - 1)
+    part = (t - low)[:, None].astype(np.float32)
+    x = flight.x[low] * (1 - part) + flight.x[low + 1] * part
+    return x, flight.goals[np.round(t[::STRIDE]).astype(int)]
+
+
+def _start(flight: Flight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
+    """Where a crop starts, samples: before an edge, at take-off, at landing, or anywhere in the flight.
+
+    A crop that lies anywhere seldom holds the last second of its flight, so landings are drawn by themselves.
+    """
+    length = recipe.crop * speed
+    first = float(np.argmax(flight.airborne)) - AHEAD
+    final = len(flight.x) - 1 - length
+    if len(flight.edges) and rng.random() < recipe.edge_share:
+        ahead = rng.uniform(1.1 * recipe.warm_up, 0.93 * recipe.crop) * speed
+        return float(flight.edges[rng.integers(len(flight.edges))]) - ahead
+    if rng.random() < recipe.phases / max(1.0 - recipe.edge_share, recipe.phases):
+        return first - BEHIND * rng.random() if rng.random() < 0.5 else final + BEHIND * rng.random()
+    return rng.uniform(min(first, final), max(first, final))
+
+
+def _augment(x: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
+    """Mirrored, turned, scaled, offset and noisy copies within the limits of the channels."""
+    b, n, _ = x.shape
+    x *= np.where(rng.random((b, 1, 1)) < recipe.mirror, MIRROR, np.float32(1.0))
+    angle = np.radians(recipe.yaw_deg) * rng.uniform(-1, 1, (b, 1))
+    ax, ay = x[..., 0].copy(), x[..., 1].copy()
+    x[..., 0], x[..., 1] = np.cos(angle) * ax - np.sin(angle) * ay, np.sin(angle) * ax + np.cos(angle) * ay
+    gain = rng.standard_normal((b, 1, 1)) + rng.standard_normal((b, 1, CHANNELS))
+    x *= np.exp(recipe.gain * gain).astype(np.float32)
+    x += (recipe.offset * rng.standard_normal((b, 1, CHANNELS))).astype(np.float32)
+    x += np.float32(recipe.noise) * rng.standard_normal((b, n, CHANNELS), dtype=np.float32)
+    return np.clip(x, -MotionConfig.limit, MotionConfig.limit, out=x)

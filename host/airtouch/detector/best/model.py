@@ -1,0 +1,174 @@
+"""A trained streaming network as one file: float and int8 weights, decoder settings, how it came about."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector.best.network import weight_shapes
+from airtouch.detector.best.quantisation import network_of
+from airtouch.detector.best.recipe import CHANNELS, Recipe
+from airtouch.detector.shared import archive
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.reference.edge_decoder import DecoderConfig
+from airtouch.reference.stream_int8 import StreamNetwork
+
+FORMAT = 1
+SHIPPED = "best.npz"
+#: the shipped models for logs that lack a sensor
+SPARES = {"acceleration": "best_without_acceleration.npz"}
+KIND = {"format": FORMAT, "network": "stream"}
+_INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
+#: what a model's file means that does not say so, because it is older
+_BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air_share": 0.0}
+_LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
+
+
+@dataclass(frozen=True)
+class BestModel:
+    """weights: float32 arrays (`network.weight_shapes`); int8: what flies; tflite: the same over one window;
+    metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by
+    its name, in files of their own."""
+
+    recipe: Recipe
+    weights: dict[str, np.ndarray]
+    int8: StreamNetwork
+    tflite: bytes
+    metadata: dict[str, Any]
+    spares: Mapping[str, "BestModel"] = field(default_factory=dict)
+
+    def serving(self, missing: Sequence[str]) -> "BestModel":
+        """The model for a log that lacks these sensors: a spare where there is one, else this one."""
+        return next((self.spares[sensor] for sensor in missing if sensor in self.spares), self)
+
+    @property
+    def decoder(self) -> DecoderConfig:
+        """The decoder's settings."""
+        return self._settings(self.metadata.get("decoder"))
+
+    def decoder_without(self, missing: Sequence[str]) -> DecoderConfig:
+        """The decoder's settings for a log that lacks these sensors, `decoder` where there are none of their own."""
+        own = self.metadata.get("decoder_without", {})
+        for sensor in missing:
+            if sensor in own:
+                return self._settings(own[sensor])
+        return self.decoder
+
+    @staticmethod
+    def _settings(table: object) -> DecoderConfig:
+        try:
+            return DecoderConfig(**table)
+        except TypeError:
+            raise AirTouchError(f"the model's decoder settings are not those of this version; "
+                                f"{archive.REMEDY}") from None
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that the int8 network computes with, hexadecimal."""
+        total = hashlib.sha256(repr((self.int8.stride, self.int8.graph[-1].reads[0], self.recipe.dilations)).encode())
+        for name, values in self._int8_arrays().items():
+            total.update(f"{name} {values.dtype.str} {values.shape}\n".encode() + values.tobytes())
+        return total.hexdigest()
+
+    def _int8_arrays(self) -> dict[str, np.ndarray]:
+        arrays = {}
+        for of, layer in zip(self.int8.graph, self.int8.layers, strict=True):
+            parts = {"weights": layer.weights, "bias": layer.bias, "weight_scale": layer.weight_scale,
+                     "scale": np.array([layer.input_scale, layer.output_scale], np.float32),
+                     "zero_point": np.array([layer.input_zero_point, layer.output_zero_point], np.int32)}
+            arrays |= {f"int8.{of.name}.{part}": values for part, values in parts.items()}
+        return arrays
+
+    def to_bytes(self) -> bytes:
+        """The file's content; the same model gives the same bytes."""
+        arrays = {**self.weights, **self._int8_arrays(), "tflite": np.frombuffer(self.tflite, dtype=np.uint8)}
+        return archive.to_bytes(arrays, {**KIND, "recipe": asdict(self.recipe), **self.metadata})
+
+    def c_sources(self) -> dict[str, str]:
+        """File name -> text of its C sources, without the lines that say where they came from."""
+        from airtouch.detector.best import export
+
+        return export.render(self)
+
+    def save(self, path: str | Path, force: bool = False) -> None:
+        """Write it whole or not at all; AirTouchError where the file exists, unless forced."""
+        write_bytes(self.to_bytes(), Path(path), force)
+
+
+def load(path: str | Path | None = None) -> BestModel:
+    """A model from its file, the shipped one with its spares for None.
+
+    Raises AirTouchError, one line, for anything else.
+    """
+    if path is None:
+        spares = {sensor: _shipped(name) for sensor, name in SPARES.items()}
+        return replace(_shipped(SHIPPED), spares=spares)
+    return parse(archive.read(Path(path)), str(path))
+
+
+@cache
+def _shipped(name: str) -> BestModel:
+    with resources.as_file(resources.files("airtouch") / "models" / name) as path:
+        return load(path)
+
+
+def parse(data: bytes, source: str) -> BestModel:
+    """A model from a file's content; `source` names it in messages. Raises as `load` does."""
+    arrays, metadata = archive.parse(data, source)
+    archive.check_kind(metadata, KIND, source)
+    recipe = _recipe(metadata.pop("recipe", None), source)
+    shapes = {name: (np.float32, shape) for name, shape in weight_shapes(recipe.graph).items()}
+    for layer in recipe.graph:
+        sizes = {"weights": (layer.outputs, layer.taps * layer.inputs), "bias": (layer.outputs,),
+                 "weight_scale": (layer.outputs,),
+                 "scale": (2,), "zero_point": (2,)}
+        shapes |= {f"int8.{layer.name}.{part}": (_INT8[part], size) for part, size in sizes.items()}
+    archive.check_arrays(arrays, shapes, source)
+    if "tflite" not in arrays or arrays["tflite"].dtype != np.uint8:
+        raise AirTouchError(f"{source}: the TFLite file is missing from this model; {archive.REMEDY}")
+    layers = [{part: arrays[f"int8.{layer.name}.{part}"] for part in _INT8} for layer in recipe.graph]
+    for layer in layers:
+        positive = (layer["scale"] > 0).all() and (layer["weight_scale"] > 0).all()
+        if not positive or not ((layer["zero_point"] >= -128) & (layer["zero_point"] <= 127)).all():
+            raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
+    int8 = network_of(layers, recipe)
+    archive.check_range(int8.layers, source)
+    model = BestModel(recipe, {name: arrays[name] for name in weight_shapes(recipe.graph)}, int8,
+                        arrays["tflite"].tobytes(), metadata)
+    _check_metadata(model, source)
+    return model
+
+
+def _recipe(table: object, source: str) -> Recipe:
+    wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; "
+                          f"{archive.REMEDY}")
+    try:
+        recipe = Recipe(**{**_BEFORE, **table, "dilations": tuple(table["dilations"]),
+                            "muted": tuple(table["muted"])})
+        numbers = [recipe.width, recipe.first_taps, recipe.taps, *recipe.dilations, *recipe.muted]
+    except (KeyError, TypeError):
+        raise wrong from None
+    whole = all(isinstance(v, int) and not isinstance(v, bool) for v in numbers)
+    if not whole or not 1 <= len(recipe.dilations) <= 9 or not all(1 <= d <= 256 for d in recipe.dilations):
+        raise wrong
+    if not all(0 <= channel < CHANNELS for channel in recipe.muted):
+        raise wrong
+    if not all(low <= getattr(recipe, name) <= high for name, (low, high) in _LIMITS.items()) or recipe.width % 4:
+        raise wrong
+    return recipe
+
+
+def _check_metadata(model: BestModel, source: str) -> None:
+    lag, own = model.metadata.get("lag_s"), model.metadata.get("decoder_without", {})
+    if not isinstance(own, dict):
+        raise AirTouchError(f"{source}: decoder settings are not a table; {archive.REMEDY}")
+    configs = [model.decoder, *(model.decoder_without((sensor,)) for sensor in own)]
+    settings = [value for config in configs for value in asdict(config).values()]
+    if not all(isinstance(v, (int, float)) and np.isfinite(v) for v in (lag, *settings)):
+        raise AirTouchError(f"{source}: decoder settings or lag are not numbers; {archive.REMEDY}")

@@ -1,0 +1,46 @@
+"""Float weights of the streaming network to int8, with scales as TensorFlow Lite chooses them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.detector.best.network import Weights, window_logits
+from airtouch.detector.best.recipe import Recipe
+from airtouch.detector.shared.tensorflow import convert, read_weighted
+from airtouch.reference.stream_int8 import StreamNetwork, int8_layer
+
+REPRESENTATIVE = 400  #: windows that set the range of each activation
+FEW = 5  #: windows of a flight
+
+
+def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESENTATIVE) -> np.ndarray:
+    """Windows (count, receptive samples, 12), evenly spaced over the flights' channels [(n, 12), ...].
+
+    Where there are few of each flight none is at its ends, which lie on the ground.
+    """
+    length = recipe.receptive_samples
+    usable = [x for x in flights if len(x) >= length]
+    each = -(-count // max(len(usable), 1))
+    few = each < FEW
+    ends = 0.5 / each if few else 0.0
+    found = [x[s:s + length] for x in usable
+             for s in np.linspace(ends * (len(x) - length), (1 - ends) * (len(x) - length), each).astype(int)]
+    if few:
+        found = [found[i * len(found) // count] for i in range(min(count, len(found)))]
+    return np.stack(found[:count]).astype(np.float32)
+
+
+def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:
+    """The int8 network, and a TFLite file that computes the last row of a window with the same bits.
+
+    representative: windows (n, receptive samples, channels). Weights symmetric, one scale an output channel.
+    """
+    content = convert(window_logits(weights, recipe.graph), (1, 1, recipe.receptive_samples, recipe.graph[0].inputs),
+                      representative[:, None, None])
+    return network_of(read_weighted(content), recipe), content
+
+
+def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
+    """The int8 network from the arrays of each layer (`reference.stream_int8.int8_layer`)."""
+    graph = recipe.graph
+    return StreamNetwork(graph, tuple(int8_layer(layer, part) for layer, part in zip(graph, arrays, strict=True)))

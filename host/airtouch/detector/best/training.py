@@ -1,0 +1,151 @@
+"""Training the streaming network: long crops, one cycle, three goals, pruning on the way."""
+
+import io
+import json
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from airtouch.detector.best.batches import Flight, batch
+from airtouch.detector.best.network import keras_model, weight_names, weight_shapes
+from airtouch.detector.best.outputs import OUTPUTS
+from airtouch.detector.best.recipe import STRIDE, Recipe
+from airtouch.detector.shared.pruning import BLOCK, keep_mask, polynomial_sparsity
+from airtouch.logs.files import write_bytes
+
+PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
+KEEP_EVERY = 100  #: steps between two states that are kept
+RANK_EVERY = 20  #: steps between two rankings of the weights
+#: fields of a recipe that a compiled step of learning follows from; the others are of crops and pruning
+COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "peak_rate", "weight_decay", "event_weight")
+
+Weights = dict[str, np.ndarray]
+
+
+def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
+        progress: Callable[[int, int, str], None] = lambda *_: None, *,
+        free_air: Sequence[Flight] = (), start: Weights | None = None, kept: Path | None = None) -> Weights:
+    """Float weights (`network.weight_shapes`) trained on the flights; same arguments, same bits.
+
+    free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
+    kept: file in which the state is kept every KEEP_EVERY steps; a call with the same arguments goes on from there,
+    to the same bits. It is removed at the end.
+    Call `shared.tensorflow.use_tensorflow(seed)` before.
+    """
+    import tensorflow as tf
+
+    rng, names = np.random.default_rng(seed), weight_names(recipe.graph)
+    drawn = keras_model(recipe.graph).get_weights()
+    model, optimizer, masks, learn = _learner(recipe, drawn if start is None else [
+        start[name].reshape(value.shape) for name, value in zip(names, drawn, strict=True)])
+    for name, variable, mask in zip(names, model.trainable_variables, masks, strict=True):
+        mask.assign(_mask(variable.numpy(), start is not None and name in _pruned(recipe)))
+
+    losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
+    state = [*model.trainable_variables, *optimizer.variables, *masks]
+    first = _go_on(kept, state, rng) if kept else 0
+    for step in range(first, recipe.steps):
+        losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
+        if start is None and (step % RANK_EVERY == 0 or step == last_rank):
+            _rank(model, masks, recipe, step / recipe.steps)
+        if kept and (step + 1) % KEEP_EVERY == 0:
+            _keep(kept, state, rng, step + 1)
+        if (step + 1) % 50 == 0:
+            progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
+    for variable, mask in zip(model.trainable_variables, masks, strict=True):
+        variable.assign(variable * mask)
+    if kept:
+        kept.unlink(missing_ok=True)
+    shapes = weight_shapes(recipe.graph)  # the head's kernel has a tap for each layer that it reads
+    return {name: v.numpy().reshape(shapes[name]) for name, v in zip(names, model.trainable_variables, strict=True)}
+
+
+def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
+    """(model with these weights, optimizer, masks, learn(x, y) -> loss), as if nothing had been learnt yet."""
+    model, optimizer, untouched, masks, learn = _compiled(Recipe(**{name: getattr(recipe, name) for name in COMPILED}))
+    model.set_weights(weights)
+    for variable, value in zip(optimizer.variables, untouched, strict=True):
+        variable.assign(value)
+    return model, optimizer, masks, learn
+
+
+# all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
+@lru_cache(maxsize=4)
+def _compiled(recipe: Recipe) -> tuple:
+    """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning.
+
+    recipe: with nothing of its own but COMPILED.
+    """
+    import keras
+    import tensorflow as tf
+
+    model = keras_model(recipe.graph)
+    rise = recipe.steps // 6
+    rate = keras.optimizers.schedules.CosineDecay(
+        recipe.peak_rate / 20, recipe.steps - rise, alpha=1e-3, warmup_target=recipe.peak_rate, warmup_steps=rise)
+    optimizer = keras.optimizers.AdamW(rate, weight_decay=recipe.weight_decay, global_clipnorm=1.0)
+    optimizer.build(model.trainable_variables)
+    masks = [tf.Variable(tf.ones_like(v), trainable=False) for v in model.trainable_variables]
+    weight = tf.constant([output.weight(recipe) for output in OUTPUTS])
+    scored = recipe.warm_up // STRIDE
+
+    @tf.function(jit_compile=True)
+    def learn(x, y):  # noqa: ANN001, ANN202
+        with tf.GradientTape() as tape:
+            loss = tf.nn.sigmoid_cross_entropy_with_logits(y, model(x, training=True))[:, scored:]
+            loss = tf.reduce_mean(tf.reduce_sum(loss * weight, -1))
+        gradient = tape.gradient(loss, model.trainable_variables)
+        optimizer.apply_gradients(zip(gradient, model.trainable_variables, strict=True))
+        for variable, mask in zip(model.trainable_variables, masks, strict=True):
+            variable.assign(variable * mask)
+        return loss
+
+    return model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn
+
+
+def _keep(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
+    """Write where the training stands, whole or not at all."""
+    arrays = {f"v{i}": np.asarray(v) for i, v in enumerate(state)}
+    made = io.BytesIO()
+    np.savez(made, step=step, rng=json.dumps(rng.bit_generator.state), **arrays)
+    write_bytes(made.getvalue(), path, force=True)
+
+
+def _go_on(path: Path, state: Sequence, rng: np.random.Generator) -> int:
+    """Set variables and random numbers to what was kept; the step to go on with, 0 where nothing was."""
+    if not path.is_file():
+        return 0
+    with np.load(path) as kept:
+        for i, variable in enumerate(state):
+            variable.assign(kept[f"v{i}"])
+        rng.bit_generator.state = json.loads(str(kept["rng"]))
+        return int(kept["step"])
+
+
+def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001
+    """Set the masks of the inner layers to the sparsity that the schedule wants now."""
+    part = np.clip((position - PRUNE_FROM) / (PRUNE_TO - PRUNE_FROM), 0.0, 1.0)
+    sparsity = polynomial_sparsity(float(part), 1.0, 0.0, recipe.sparsity)
+    if sparsity == 0.0 or position >= PRUNE_TO + 1.0 / recipe.steps:
+        return
+    pruned = _pruned(recipe)
+    for name, variable, mask in zip(weight_names(recipe.graph), model.trainable_variables, masks, strict=True):
+        if name in pruned:
+            values = variable.numpy()
+            flat = values.reshape(-1, values.shape[-1])
+            mask.assign(keep_mask(flat, sparsity).reshape(values.shape))
+
+
+def _pruned(recipe: Recipe) -> list[str]:
+    """The names of the weights of which pruning sets blocks to zero."""
+    return [f"{layer.name}.kernel" for layer in recipe.graph if layer.pruned]
+
+
+def _mask(values: np.ndarray, pruned: bool) -> np.ndarray:
+    """float32 0 where a pruned kernel (taps, in, out) has a block of four zeros along its inputs, 1 elsewhere."""
+    if not pruned:
+        return np.ones_like(values)
+    blocks = values.reshape(-1, BLOCK, values.shape[-1]).any(axis=1)
+    return np.repeat(blocks, BLOCK, axis=0).reshape(values.shape).astype(np.float32)

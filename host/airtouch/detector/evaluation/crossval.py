@@ -1,0 +1,138 @@
+"""Cross-validation by flight: every flight is scored by a model that never saw it."""
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from airtouch import __version__
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.folds import Folds, by_fold
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.registry import Detector, get
+from airtouch.detector.shared import sensors, training_set
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
+
+Tell = Callable[[str], None]
+
+
+def crossval(
+    name: str,
+    files: Sequence[FlightFile],
+    out: Path,
+    *,
+    folds: Folds | None = None,
+    seed: int = 0,
+    options: dict[str, Any] | None = None,
+    physical_filter: bool = True,
+    silenced: tuple[str, ...] = (),
+    silent_training: bool = False,
+    free_air: Sequence[FlightLog] = (),
+    detector: Detector | None = None,
+    tell: Tell = lambda _: None,
+) -> tuple[list[FlightScore], list[dict[str, Any]], list[tuple[str, str]]]:
+    """(scores of all flights, one entry a fold, flights left out).
+
+    Finished folds are kept in `out` and not done again for the same flights, settings and version.
+    folds: which flights are held out together (`detector.folds`), the manifest's folds if left out. options go to the
+    detector's `fit`. physical_filter False chooses the decoding again without it. silenced: sensors that are taken
+    from the flights that are scored; silent_training: from those trained on too. free_air: flights without edges to
+    train on too. detector: one that is not registered, under the name given.
+    """
+    detector = detector or get(name)
+    if not physical_filter and not hasattr(detector, "retune"):
+        raise AirTouchError(f"{name} has no physical filter to switch off")
+    folds = by_fold(files) if folds is None else folds
+    out.mkdir(parents=True, exist_ok=True)
+    readable, left_out = readable_flights(files, evaluate.spare_of(detector))
+    scores: list[FlightScore] = []
+    entries: list[dict[str, Any]] = []
+    shown, given = dict(options or {}), dict(options or {})
+    if free_air:
+        shown["free_air"] = [training_set.flight_hash(log) for log in free_air]
+        given["free_air"] = free_air
+    if silent_training:
+        shown["silent"] = silenced
+    for fold, members in folds.items():
+        held = {f.path for f in members}
+        test = [f for f in members if f.path in readable]
+        train = [sensors.without(readable[f.path], silenced if silent_training else ())
+                 for f in files if f.path in readable and f.path not in held]
+        key = cache_key(name, files, members, seed, shown)
+        variant = "".join(("" if physical_filter else "-unfiltered", *(f"-no-{sensor}" for sensor in silenced)))
+        cache = out / f"{name}{variant}_fold{fold}_{key}.json"
+        entry = cached(cache)
+        if entry is None:
+            tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
+            started = time.monotonic()
+            kept = out / f"{name}_fold{fold}_{key}.npz"
+            model = model_of_fold(detector, train, kept, seed, given)
+            if not physical_filter:
+                model = detector.retune(model, train, False)
+            results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], silenced), detector, model).score
+                       for f in test]
+            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model),
+                     "parameters": detector.parameters(model),
+                     "seconds": round(time.monotonic() - started, 1),
+                     "per_flight": [s.as_dict() for s in results]}
+            write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
+        else:
+            tell(f"fold {fold}: done before, {cache.name}")
+        scores += [FlightScore.from_dict(s) for s in entry["per_flight"]]
+        entries.append({k: v for k, v in entry.items() if k != "per_flight"})
+    return scores, entries, left_out
+
+
+def readable_flights(files: Sequence[FlightFile],
+                     spare: int = 0) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
+    """Logs by path, and those that cannot be used with the reason; `spare` sensors may be missing."""
+    logs: dict[Path, FlightLog] = {}
+    left_out = []
+    for file in files:
+        try:
+            log = evaluate.read_flight(file, spare)
+            if evaluate.truth(log) is None:
+                raise AirTouchError(f"{file.path}: no down range in this log, so no true edges to train on")
+            logs[file.path] = log
+        except AirTouchError as error:
+            left_out.append((str(file.path), str(error)))
+    return logs, left_out
+
+
+def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, seed: int,
+                  options: dict[str, Any]) -> Any:
+    """The fold's model from `path`, else trained now and kept there, where it can be saved."""
+    if path.exists():
+        return detector.load(path)
+    model = detector.fit(flights, seed=seed, **options)
+    if hasattr(model, "save"):
+        model.save(path, force=True)
+    return model
+
+
+def cache_key(name: str, files: Sequence[FlightFile], held: Sequence[FlightFile], seed: int,
+              options: dict[str, Any]) -> str:
+    """Twelve hexadecimal digits that change with anything a fold's result depends on."""
+    total = hashlib.sha256(f"{__version__} {name} {seed} {sorted(options.items())}".encode())
+    for file in files:
+        stat = os.stat(file.path) if file.path.exists() else None
+        content = stat and (stat.st_size, stat.st_mtime_ns)
+        total.update(f"{file.path.name} {file.condition} {content} {file in held}".encode())
+    return total.hexdigest()[:12]
+
+
+def cached(path: Path) -> dict[str, Any] | None:
+    """A finished fold, or None where there is none or it is damaged."""
+    try:
+        entry = json.loads(path.read_text())
+        for score in entry["per_flight"]:
+            FlightScore.from_dict(score)
+        return entry
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

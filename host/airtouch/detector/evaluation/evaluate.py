@@ -1,0 +1,156 @@
+"""A detector over many flights: bad ones set aside, the others scored."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore, score_flight
+from airtouch.detector.registry import Detector
+from airtouch.detector.shared import sensors, training_set
+from airtouch.detector.shared.channels import ACCELERATIONS, RATES, logged_channels
+from airtouch.detector.trace import Trace
+from airtouch.errors import AirTouchError
+from airtouch.logs.clock import sample_period
+from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.quality import clock_steps, nothing_logged
+
+SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air
+MOST_MISSING = 0.1  #: share of samples of a channel that may be NaN; they hold the last value
+
+
+@dataclass(frozen=True)
+class Result:
+    """One flight, what the detector said of it, and how good that was."""
+
+    log: FlightLog
+    trace: Trace
+    score: FlightScore
+
+
+def read_flight(file: FlightFile, spare: int = 0) -> FlightLog:
+    """A log that can be scored; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
+    log = logs.read(file.path)
+    check(log, spare)
+    if truth(log) and file.condition.speed_mps is None:
+        raise AirTouchError(f"{file.path}: speed unknown, so errors in metres are too: "
+                            "give --speed, or speed_mps in a manifest.csv beside the flight")
+    return log
+
+
+def spare_of(detector: Detector) -> int:
+    """How many of the three sensors a detector can do without: its SPARE_SENSORS, else none."""
+    return getattr(detector, "SPARE_SENSORS", 0)
+
+
+def check(log: FlightLog, spare: int = 0) -> None:
+    """Raise AirTouchError, one line, for a log that a detector cannot use which can do without `spare` sensors."""
+    period = sample_period(log)
+    if abs(period - SAMPLE_PERIOD_S) > 0.02 * SAMPLE_PERIOD_S:
+        raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, the detectors need 100 Hz: "
+                            "airtouch logs convert --rate 100")
+    if nothing_logged(log):
+        raise AirTouchError(f"{log.source}: nothing was logged: every value of every channel is missing (NaN)")
+    names, channels = logged_channels(log, sensors.missing(log) if spare else ())
+    if spare:
+        sensors.signals(log)  # names what is missing, where that is too much
+    if len(log) * SAMPLE_PERIOD_S < SHORTEST_S:
+        raise AirTouchError(f"{log.source}: {len(log) * SAMPLE_PERIOD_S:.2f} s of data (it may be cut off); "
+                            f"at least {SHORTEST_S:g} s are needed")
+    finite = np.isfinite(channels)
+    for name, missing in zip(names, 1.0 - finite.mean(axis=0), strict=True):
+        if missing > MOST_MISSING:
+            raise AirTouchError(f"{log.source}: {name} is missing (NaN) in {missing:.0%} of the samples; "
+                                "log the flight again or leave it out")
+    flying = logs.airborne(log)
+    if np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:
+        raise AirTouchError(f"{log.source}: no flight in this log (mean PWM above 15000 for less than 1 s)")
+    used = np.where(finite, channels, 0.0)[flying]
+    for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
+        if spread == 0.0:
+            raise AirTouchError(f"{log.source}: {name} is constant in flight; the sensor or the log is stuck")
+    for rate, acceleration in zip(RATES, ACCELERATIONS, strict=True):
+        if {rate, acceleration} <= set(names):
+            pair = used[:, names.index(rate)], used[:, names.index(acceleration)]
+            if np.corrcoef(*pair)[0, 1] > 0.999999:
+                raise AirTouchError(f"{log.source}: {rate} is a copy of {acceleration}; log the gyro or leave it out")
+
+
+def remarks(log: FlightLog) -> list[str]:
+    """What `airtouch logs check` knows of a log that a score may suffer from: its clock, and what the reader found."""
+    back = int((clock_steps(log) < 0).sum())
+    clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
+    return [str(w) for w in log.meta.get("warnings", [])] + clock
+
+
+def truth(log: FlightLog) -> list[logs.Edge] | None:
+    """True edges, None where the log holds no down range."""
+    if not log.has("zrange_m") or not np.isfinite(log["zrange_m"]).any():
+        return None
+    return logs.true_edges(log)
+
+
+def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model: Any) -> Result:
+    """Run the detector on one flight and score it."""
+    if hasattr(detector, "model_for"):
+        model = detector.model_for(model, log)
+    return result_of(file, log, detector.run(log, model), detector, model)
+
+
+def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
+    """The score of a trace that the detector gave with this model."""
+    score = score_flight(file.path.name, file.condition, truth(log), logs.airborne(log), trace.probability,
+                         trace.edges, detector.lag_s(model))
+    note = "; ".join(text for text in (score.note, trace.note) if text)
+    trained = training_set.contains(getattr(model, "metadata", {}), log)
+    return Result(log, trace, replace(score, note=note, in_training=trained))
+
+
+def evaluate(
+    files: Iterable[FlightFile],
+    detector: Detector,
+    model: Any,
+    on_result: Callable[[Result | AirTouchError], None] = lambda _: None,
+) -> tuple[list[FlightScore], list[tuple[str, str]]]:
+    """(scores, flights left out with the reason). One flight is held in memory at a time.
+
+    on_result gets each result, or the AirTouchError of a flight that cannot be used.
+    """
+    scores: list[FlightScore] = []
+    left_out: list[tuple[str, str]] = []
+    for file in files:
+        try:
+            result = evaluate_flight(file, read_flight(file, spare_of(detector)), detector, model)
+        except AirTouchError as error:
+            left_out.append((str(file.path), str(error)))
+            on_result(error)
+            continue
+        scores.append(result.score)
+        on_result(result)
+    return scores, left_out
+
+
+def as_json(
+    name: str,
+    scores: Sequence[FlightScore],
+    left_out: Sequence[tuple[str, str]],
+    lag_s: float | list[float],
+    parameters: dict[str, Any],
+) -> dict[str, Any]:
+    """The JSON of `airtouch evaluate`: plain numbers or null, intervals apart."""
+    return {
+        "detector": name,
+        **summary.summarise(scores),
+        "lag_s": lag_s,
+        "parameters": parameters,
+        "by_height": summary.by_height(scores),
+        "by_angle": summary.by_angle(scores),
+        "by_wind": summary.by_wind(scores),
+        "in_training": [score.file for score in scores if score.in_training],
+        "left_out": [{"file": file, "reason": reason} for file, reason in left_out],
+        "per_flight": [score.as_dict() for score in scores],
+    }

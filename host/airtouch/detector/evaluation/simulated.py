@@ -1,0 +1,66 @@
+"""Flights to train on, flown in the simulator instead of recorded."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from airtouch import logs
+from airtouch.detector.evaluation import evaluate
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import batch, scenario
+from airtouch.simulation.flight import Diverged, choose
+from airtouch.simulation.scenario import Scenario
+from airtouch.vehicle import Vehicle
+
+SCENARIO = "paper-mixed"
+SPARE = 2  #: flights tried for each one wanted, at most
+
+#: progress(stage, done, total, note)
+Progress = Callable[[str, int, int, str], None]
+
+
+def training_flights(
+    count: int, name: str | Scenario = SCENARIO, *, vehicle: Vehicle | None = None, without: Sequence[str] = (),
+    seed: int = 0, progress: Progress | None = None,
+) -> tuple[list[FlightLog], dict[str, Any]]:
+    """(the first `count` flights that end well and cross an edge, what they are, for a model's metadata).
+
+    name: a built-in scenario, a .toml file or a scenario. vehicle: the default one if left out. without: effects of
+    it to switch off. Same arguments, same flights. Held in memory: about 0.5 MB each.
+    Raises AirTouchError for an effect that the scenario does not switch on, and where too few
+    flights can be trained on.
+    """
+    if count < 1 or seed < 0:
+        raise AirTouchError("simulated flights: at least one, with seed 0 or more")
+    told = progress or (lambda *_: None)
+    scene = name if isinstance(name, Scenario) else scenario.load(name)
+    on = list(dict.fromkeys(effect for effect, _ in scenario.draw_flight(scene, seed, 0).effects))
+    choose(scenario.draw_flight(scene, seed, 0), (), without)  # an unknown effect is named
+    absent = [effect for effect in without if effect not in on]
+    if absent:
+        raise AirTouchError(f"{absent[0]} is off in {scene.name} already; on are: {', '.join(on) or 'none'}")
+    kept: list[FlightLog] = []
+    left_out = 0
+    for flown in batch.flights(scene, range(SPARE * count), vehicle=vehicle, without=without, seed=seed):
+        if _usable(flown):
+            kept.append(flown)
+            told("simulated flights", len(kept), count, "")
+        else:
+            left_out += 1
+        if len(kept) == count:
+            break
+    if len(kept) < count:
+        raise AirTouchError(f"{scene.name}: only {len(kept)} of {SPARE * count} flights ended well and "
+                            "crossed an edge; choose another scenario")
+    return kept, {"scenario": scene.name, "flights": count, "seed": seed, "left_out": left_out,
+                  "effects": [effect for effect in on if effect not in without], "without": list(without)}
+
+
+def _usable(flown: FlightLog | Diverged) -> bool:
+    if isinstance(flown, Diverged) or not logs.true_edges(flown):
+        return False
+    try:
+        evaluate.check(flown)
+    except AirTouchError:
+        return False
+    return True

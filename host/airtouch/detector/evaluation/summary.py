@@ -1,0 +1,147 @@
+"""Scores of many flights as one table, each figure with its interval."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from airtouch.detector.evaluation.bootstrap import Sums, bootstrap
+from airtouch.detector.evaluation.calibration import expected_calibration_error
+from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.score import HIT_RADII_M, FlightScore
+
+#: Height classes also reported together: 75 to 85 mm, where the lift is too weak to carry the edge.
+HIGH = ("h82", "h85")
+
+
+def summarise(scores: Sequence[FlightScore], *, replicates: int = 2000, seed: int = 0) -> dict:
+    """Figures over all flights, NaN-free (None where there is nothing to count).
+
+    Keys: flights, edges, matched, mean_abs_error_m and _s (matched edges; also
+    entry_ and exit_), mean_error_s (signed, positive early), missed (share of the
+    true edges) and missed_count, false_count, false_per_minute (of airborne time,
+    flights with known truth), hit (share of all true edges within 0.05/0.10/0.25 m),
+    kind_mistakes, balanced_accuracy, ece, airborne_minutes, detections, intervals
+    (95 %, by flight, same names).
+    """
+    table = {key: np.array([_totals(s)[key] for s in scores], float) for key in _totals_keys()}
+    whole = _statistics({key: values.sum(keepdims=True) for key, values in table.items()})
+    intervals = bootstrap(table, _statistics, replicates=replicates, seed=seed)
+    number = {name: _plain(values[0]) for name, values in whole.items()}
+    radii = [f"{radius:.2f}" for radius in HIT_RADII_M]
+    hit = {r: number.pop(f"hit_{r}") for r in radii}
+    hit_intervals = {r: _pair(intervals.pop(f"hit_{r}")) for r in radii}
+    counts = {name: int(table[key].sum()) for name, key in (
+        ("flights", "flights"), ("edges", "true"), ("matched", "matched"), ("missed_count", "missed"),
+        ("false_count", "false"), ("kind_mistakes", "kind"), ("detections", "detections"))}
+    return {
+        **counts,
+        **number,
+        "hit": hit,
+        "airborne_minutes": float(sum(s.airborne_s for s in scores)) / 60.0,
+        "intervals": {**{name: _pair(value) for name, value in intervals.items()}, "hit": hit_intervals},
+    }
+
+
+def breakdown(scores: Sequence[FlightScore], key: Callable[[FlightScore], str | None]) -> dict[str, dict]:
+    """`summarise` for each value of key, sorted; flights whose key is None are left out."""
+    groups: dict[str, list[FlightScore]] = {}
+    for score in scores:
+        value = key(score)
+        if value is not None:
+            groups.setdefault(value, []).append(score)
+    return {value: summarise(groups[value]) for value in sorted(groups, key=_order)}
+
+
+def _order(value: str) -> tuple[bool, float, str]:
+    """Numbers by value, before names."""
+    try:
+        return False, float(value), value
+    except ValueError:
+        return True, 0.0, value
+
+
+def by_height(scores: Sequence[FlightScore]) -> dict[str, dict]:
+    """By the manifest's height class; "h82+h85" is 75 to 85 mm together."""
+    groups = breakdown(scores, lambda s: s.condition.height)
+    high = [s for s in scores if s.condition.height in HIGH]
+    return {**groups, "+".join(HIGH): summarise(high)} if high else groups
+
+
+def by_angle(scores: Sequence[FlightScore]) -> dict[str, dict]:
+    """By the approach angle in degrees."""
+    def angle(score: FlightScore) -> str | None:
+        return None if score.condition.angle_deg is None else f"{score.condition.angle_deg:+g}"
+
+    return breakdown(scores, angle)
+
+
+def by_wind(scores: Sequence[FlightScore]) -> dict[str, dict]:
+    """By where a fan blew."""
+    return breakdown(scores, lambda s: s.condition.wind)
+
+
+def _totals(score: FlightScore) -> dict[str, float]:
+    """What is added up over flights."""
+    matched = [e for e in score.edges if e.error_s is not None]
+    judged = score.false is not None
+    totals = {
+        "flights": 1,
+        "detections": score.detections,
+        "true": len(score.edges),
+        "matched": len(matched),
+        "missed": len(score.edges) - len(matched),
+        "false": len(score.false) if judged else 0,
+        "minutes": score.airborne_s / 60.0 if judged else 0.0,
+        "kind": sum(e.detected_kind not in (e.kind, "edge") for e in matched),
+        "signed_s": sum(e.error_s for e in matched),
+    }
+    for name in ("", "entry", "exit"):
+        some = [e for e in matched if name in ("", e.kind)]
+        totals[f"n{name}"] = len(some)
+        totals[f"s{name}"] = sum(abs(e.error_s) for e in some)
+        totals[f"m{name}"] = sum(abs(e.error_m) if e.error_m is not None else np.nan for e in some)
+    for radius in HIT_RADII_M:
+        totals[f"hit_{radius:.2f}"] = sum(e.error_m is not None and abs(e.error_m) <= radius for e in matched)
+    for name, value in zip(("over_found", "over", "rest_found", "rest"), score.windows, strict=True):
+        totals[name] = value
+    for index, value in enumerate(score.bins.ravel()):
+        totals[f"bin_{index}"] = value
+    return totals
+
+
+def _totals_keys() -> list[str]:
+    return list(_totals(FlightScore("", Condition(), (), (), 0, 0.0)))
+
+
+def _statistics(sums: Sums) -> dict[str, np.ndarray]:
+    """Every figure as a function of the sums, shapes (...,) in and out."""
+    figures = {
+        "mean_abs_error_m": _ratio(sums["m"], sums["n"]),
+        "mean_abs_error_s": _ratio(sums["s"], sums["n"]),
+        "mean_error_s": _ratio(sums["signed_s"], sums["n"]),
+        "missed": _ratio(sums["missed"], sums["true"]),
+        "false_per_minute": _ratio(sums["false"], sums["minutes"]),
+        "balanced_accuracy": 0.5 * (
+            _ratio(sums["over_found"], sums["over"]) + _ratio(sums["rest_found"], sums["rest"])),
+    }
+    for kind in ("entry", "exit"):
+        for unit in ("m", "s"):
+            figures[f"{kind}_mean_abs_error_{unit}"] = _ratio(sums[f"{unit}{kind}"], sums[f"n{kind}"])
+    for radius in HIT_RADII_M:
+        figures[f"hit_{radius:.2f}"] = _ratio(sums[f"hit_{radius:.2f}"], sums["true"])
+    bins = np.stack([sums[f"bin_{i}"] for i in range(sum(k.startswith("bin_") for k in sums))], axis=-1)
+    figures["ece"] = expected_calibration_error(bins.reshape(*bins.shape[:-1], -1, 3))
+    return figures
+
+
+def _ratio(upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+    upper, lower = np.asarray(upper, float), np.asarray(lower, float)
+    return np.divide(upper, lower, out=np.full_like(upper, np.nan), where=lower > 0)
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _pair(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)

@@ -1,0 +1,34 @@
+"""The paper's detector, a `registry.Detector`: fused features, int8 network, edges, physical filter.
+
+detector      run, fit, tune, load (section 5); `rolling` is the same network a sample at a time, `paper-stream`
+features      nine channels to three fused features, disturbance force and FR-CFAR alerts (section 4)
+normalisation features to network inputs
+network       the layers, once; Keras and C views of them (section 5.2)
+losses        cross-entropy and the disturbance-force loss
+training      windows of flights, one cycle of the learning rate, pruning (sections 5.2, 5.3 and 7.1)
+quantisation  float weights to int8 (section 5.3)
+decoding      probabilities to edges
+model         the model file
+export        C sources for `gap8/kernels/network_int8.h` and `rolling_int8.h`
+variants      the pipeline with one of its choices changed, for ablations
+"""
+
+from airtouch.detector.paper.detector import (
+    candidates,
+    decoding,
+    fit,
+    lag_s,
+    load,
+    parameters,
+    probability_of,
+    retune,
+    run,
+    run_float,
+    signals,
+    stride,
+    tune,
+)
+from airtouch.detector.paper.model import Model
+
+__all__ = ["Model", "candidates", "decoding", "fit", "lag_s", "load", "parameters", "probability_of", "retune", "run",
+           "run_float", "signals", "stride", "tune"]

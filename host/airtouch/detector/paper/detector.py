@@ -1,0 +1,161 @@
+"""The paper's pipeline, faithfully: fused features, int8 network, edges, physical filter.
+
+All of it through the C that flies: `kernels.edge_pipeline` for features, disturbance
+force, FR-CFAR, decoding and filter, `kernels.network` for the int8 network.
+"""
+
+import itertools
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector.evaluation import tuning
+from airtouch.detector.paper import model as model_file
+from airtouch.detector.paper.decoding import decode, detections
+from airtouch.detector.paper.decoding import physical_filter as filtered
+from airtouch.detector.paper.features import Features, feature_windows, flight_features, pipeline
+from airtouch.detector.paper.model import Model
+from airtouch.detector.trace import Detection, Trace
+from airtouch.errors import AirTouchError
+from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
+from airtouch.kernels.rolling import probability_of_samples
+from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT, Parameters
+from airtouch.reference.int8_network import multiplications
+
+#: What `tune` chooses from: P at entry, P at exit, samples between edges, samples an alert counts.
+ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+EXIT = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
+DWELL = (25, 50, 100, 150)
+HOLD = (25, 50, 100, 200)
+
+
+def run(log: FlightLog, model: Model | None = None) -> Trace:
+    """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
+    model = model or load(None)
+    features = flight_features(log, parameters=decoding(model)[0])
+    return _trace(log, model, features, probability_of(model, features.fused))
+
+
+def probability_of(model: Model, fused: np.ndarray) -> np.ndarray:
+    """P(over a platform), (n,), of a flight's fused features (n, 3); NaN where there is none."""
+    if model.scale is None:
+        return probability_of_flight(model, fused)
+    return probability_of_samples(model, fused, stride(model))
+
+
+def stride(model: Model) -> int:
+    """Samples to one answer where the model runs as a stream."""
+    value = model.metadata.get("stride", 1)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+        raise AirTouchError(f"the model's stride must be a whole number from 1, not {value!r}; train it again")
+    return value
+
+
+def run_float(log: FlightLog, model: Model) -> Trace:
+    """As `run`, with the float network as trained: what quantisation is measured against."""
+    features = flight_features(log, parameters=decoding(model)[0])
+    windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
+    logits = infer_float(model.float_layers, windows).astype(np.float64)
+    probability = np.full(len(log), np.nan)
+    probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
+    return _trace(log, model, features, probability)
+
+
+def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
+    settings, physical = decoding(model)
+    events = pipeline(log, settings, probability, physical_filter=physical)
+    return Trace(probability, detections(events.edge, probability), signals(features))
+
+
+def fit(
+    flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, **options: Any
+) -> Model:
+    """Train, prune and quantise the network, then choose decoding and lag on flights it has not fitted.
+
+    Those are the training flights that were held out for early stopping (all of them
+    where none were). options: of `train.train_paper` (epochs, sparsity, df_lambda, progress, ...).
+    """
+    from airtouch.detector.paper.training import train_paper
+
+    return retune(train_paper(flights, seed=seed, **options), flights, physical_filter)
+
+
+def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
+    """The same network with decoding and lag chosen again, from the flights it was trained with."""
+    unseen = set(model.metadata["held_out"])
+    chosen = [log for log in flights if os.path.basename(log.source) in unseen]
+    return tune(model, chosen or flights, physical_filter)
+
+
+def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
+    """The model with decoding settings and lag for the best timed F1 over the flights."""
+    truth = [logs.true_edges(log) for log in flights]
+    seen: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for log in flights:
+        features = flight_features(log)
+        seen.append((probability_of(model, features.fused), features.armed, features.alert))
+
+    @cache
+    def unfiltered(entry: float, leave: float, dwell: int, i: int) -> list[Detection]:
+        settings = replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell)
+        return decode(seen[i][0], seen[i][1], None, settings)
+
+    def detect(settings: Parameters, i: int) -> list[Detection]:
+        edges = unfiltered(settings.probability_entry, settings.probability_exit, settings.dwell_samples, i)
+        return filtered(edges, seen[i][2], settings.alert_hold) if physical_filter else edges
+
+    settings, lag, score = tuning.choose(candidates(physical_filter), truth, detect)
+    return replace(model, metadata={
+        **model.metadata, "parameters": asdict(settings), "lag_s": lag, "physical_filter": physical_filter,
+        "tuned_on": [os.path.basename(log.source) for log in flights], "tuned_timed_f1": score})
+
+
+def candidates(physical_filter: bool) -> list[Parameters]:
+    """The decoding settings that tuning chooses from."""
+    return [
+        replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell, alert_hold=hold)
+        for entry, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, HOLD if physical_filter else HOLD[:1])
+        if leave < entry
+    ]
+
+
+def load(path: Path | None) -> Model:
+    """A model from its file, the shipped one for None; AirTouchError for any other file."""
+    return model_file.load(path)
+
+
+def lag_s(model: Model | None) -> float:
+    """The lag learnt in training, seconds; 0 where the model was not tuned."""
+    return float((model or load(None)).metadata.get("lag_s", 0.0))
+
+
+def parameters(model: Model | None) -> dict[str, Any]:
+    """Size, cost, pipeline and decoding settings, and how the network was trained."""
+    model = model or load(None)
+    metadata = model.metadata
+    size = {"parameter_bytes": parameter_bytes(model.int8), "state_bytes": arena_bytes(model.int8),
+            "mac_per_sample": multiplications(model.int8)}
+    named = ("seed", "epochs", "epochs_run", "sparsity", "block", "lambda", "physical_filter",
+             "tuned_timed_f1")
+    return {**size, **metadata.get("parameters", asdict(DEFAULT)), **{k: metadata[k] for k in named if k in metadata}}
+
+
+def decoding(model: Model) -> tuple[Parameters, bool]:
+    """The model's settings, and whether its physical filter is on."""
+    try:
+        return Parameters(**model.metadata["parameters"]), bool(model.metadata.get("physical_filter", True))
+    except (KeyError, TypeError):
+        raise AirTouchError("the model's parameters are not those of this version; train it again") from None
+
+
+def signals(features: Features) -> dict[str, np.ndarray]:
+    """What reports plot."""
+    names = ("channels", "band_power", "fused", "force", "cfar_power", "threshold", "alert")
+    return {name: getattr(features, name) for name in names}

@@ -1,0 +1,95 @@
+"""Float weights to the int8 network (section 5.3), with scales as TensorFlow Lite chooses them."""
+
+
+import numpy as np
+
+from airtouch.detector.paper.network import GRAPH, INPUT_SHAPE, KERNEL_SHAPES, WEIGHTED, Weights
+from airtouch.detector.shared.tensorflow import convert, read_weighted
+from airtouch.reference.int8_network import Int8Layer, Int8Network
+
+REPRESENTATIVE = 500  #: windows that set the range of each activation
+
+
+def quantise(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]:
+    """The int8 network and the TFLite file of it.
+
+    weights: float32 (`network.weight_shapes`). windows: (n, 100, 3) normalised; REPRESENTATIVE
+    of them, evenly spaced, set the activations' ranges. Weights are symmetric, one scale per
+    output channel. The network and the file compute the same bits. Needs TensorFlow.
+    """
+    chosen = windows[np.linspace(0, len(windows) - 1, min(REPRESENTATIVE, len(windows))).astype(int)]
+    content = _tflite(weights, chosen.astype(np.float32).reshape(-1, 1, *INPUT_SHAPE))
+    return read_tflite(content), content
+
+
+def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
+    import tensorflow as tf
+
+    def network(x):
+        for kind, name, _, _, kernel, relu in GRAPH:
+            if kind == "max_pool":
+                x = tf.nn.max_pool2d(x, kernel, kernel, "VALID")
+                continue
+            values, bias = weights[f"{name}.kernel"], weights[f"{name}.bias"]
+            if kind == "conv":
+                x = tf.nn.conv2d(x, values, 1, "VALID") + bias
+            else:
+                x = tf.matmul(tf.reshape(x, (1, values.shape[0])), values) + bias
+            x = tf.nn.relu(x) if relu else x
+        return x
+
+    return convert(network, (1, *INPUT_SHAPE), windows)
+
+
+def read_tflite(content: bytes) -> Int8Network:
+    """The paper's int8 network out of a TFLite file that `quantise` made."""
+    layers = read_weighted(content)
+    arrays: dict[str, np.ndarray] = {}
+    for name, layer in zip(WEIGHTED, layers, strict=True):
+        for part in ("weights", "bias", "weight_scale"):
+            arrays[f"{name}.{part}"] = layer[part]
+    for part in ("scale", "zero_point"):
+        arrays[part] = np.array([layers[0][part][0], *(layer[part][1] for layer in layers)])
+    return network_of_arrays(arrays)
+
+
+def network_of_arrays(arrays: dict[str, np.ndarray]) -> Int8Network:
+    """The int8 network from the arrays of `int8_shapes`; activations are input, then each weighted layer."""
+    layers = []
+    at = 0  # which activation the layer reads
+    for kind, name, before, after, kernel, relu in GRAPH:
+        scale, zero_point = float(arrays["scale"][at]), int(arrays["zero_point"][at])
+        if name is None:
+            layers.append(Int8Layer(kind, before, after, kernel, scale, zero_point, scale, zero_point))
+            continue
+        at += 1
+        layers.append(Int8Layer(kind, before, after, kernel, scale, zero_point,
+                                float(arrays["scale"][at]), int(arrays["zero_point"][at]), relu,
+                                arrays[f"{name}.weights"], arrays[f"{name}.bias"],
+                                arrays[f"{name}.weight_scale"]))
+    return Int8Network(tuple(layers))
+
+
+def arrays_of_network(network: Int8Network) -> dict[str, np.ndarray]:
+    """The inverse of `network_of_arrays`."""
+    weighted = [layer for layer in network.layers if layer.kind != "max_pool"]
+    arrays = {}
+    for name, layer in zip(WEIGHTED, weighted, strict=True):
+        arrays[f"{name}.weights"], arrays[f"{name}.bias"] = layer.weights, layer.bias
+        arrays[f"{name}.weight_scale"] = layer.weight_scale
+    first = weighted[0]
+    arrays["scale"] = np.array([first.input_scale] + [la.output_scale for la in weighted], dtype=np.float32)
+    zero_points = [first.input_zero_point] + [la.output_zero_point for la in weighted]
+    arrays["zero_point"] = np.array(zero_points, dtype=np.int32)
+    return arrays
+
+
+def int8_shapes() -> dict[str, tuple[type, tuple[int, ...]]]:
+    """dtype and shape of each array of `network_of_arrays`."""
+    shapes: dict[str, tuple[type, tuple[int, ...]]] = {}
+    for name, shape in KERNEL_SHAPES.items():
+        shapes[f"{name}.weights"] = (np.int8, (shape[-1], *shape[:-1]))
+        shapes[f"{name}.bias"] = (np.int32, shape[-1:])
+        shapes[f"{name}.weight_scale"] = (np.float32, shape[-1:])
+    activations = (len(KERNEL_SHAPES) + 1,)
+    return {**shapes, "scale": (np.float32, activations), "zero_point": (np.int32, activations)}

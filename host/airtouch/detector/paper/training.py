@@ -1,0 +1,254 @@
+"""Training the paper's network on flights (sections 5.2, 5.3 and 7.1)."""
+
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from airtouch import __version__, logs
+from airtouch.detector.evaluation.score import over_platform
+from airtouch.detector.paper import network, normalisation, quantisation
+from airtouch.detector.paper.features import Features, feature_windows, flight_features
+from airtouch.detector.paper.losses import DEFAULT_LAMBDA, edge_loss
+from airtouch.detector.paper.model import Model
+from airtouch.detector.shared import pruning
+from airtouch.detector.shared.tensorflow import use_tensorflow
+from airtouch.errors import AirTouchError
+from airtouch.kernels.network import infer_float, infer_int8
+from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT
+
+EPOCHS = 10
+BATCH = 128
+SPARSITY = 0.8
+HELD_OUT = 0.15  #: share of the flights that decide when to stop
+PRUNED_BY = 0.6  #: share of the steps after which the zeros stay where they are
+PATIENCE = 3  #: epochs without a lower loss on the held-out flights
+PEAK_RATE = 2e-3  #: learning rate at the top of the one cycle
+BATCHES_A_CALL = 50
+STRIDE = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
+
+#: progress(stage, done, total, note), stage "features" (flights) or "epochs"
+Progress = Callable[[str, int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Windows:
+    """n training windows.
+
+    x: (n, 100, 3) float32, each column z-scored. over: (n,) 1.0 where the last sample is over a
+    platform. alert: (n,) 1.0 where the disturbance force reached its threshold there.
+    flight: (n,) index of the flight.
+    """
+
+    x: np.ndarray
+    over: np.ndarray
+    alert: np.ndarray
+    flight: np.ndarray
+
+    def select(self, chosen: np.ndarray) -> "Windows":
+        """The windows where `chosen` (n,) is True."""
+        return Windows(self.x[chosen], self.over[chosen], self.alert[chosen], self.flight[chosen])
+
+
+def train_paper(
+    flights: Sequence[FlightLog],
+    *,
+    seed: int = 0,
+    epochs: int = EPOCHS,
+    sparsity: float = SPARSITY,
+    block: int = pruning.BLOCK,
+    df_lambda: float = DEFAULT_LAMBDA,
+    conv_sparsity: float = 0.0,
+    fixed_scale: bool = False,
+    progress: Progress | None = None,
+    command: str = "airtouch.detector.train.train_paper",
+) -> Model:
+    """Train, prune and quantise; the same arguments give the same bits on one machine.
+
+    flights: with down range, for the true edges. sparsity: share of zeros in the first dense
+    layer, in blocks of `block` inputs (4, or 1 for single weights); conv_sparsity: in the second
+    convolution. df_lambda: weight of the disturbance-force loss. fixed_scale: inputs on a fixed scale
+    instead of z-scored windows, so that the network can run as a stream. Training stops early on
+    flights held out by seed.
+    Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
+    """
+    _check(epochs, sparsity, block, df_lambda, conv_sparsity)
+    use_tensorflow(seed)
+    told = progress or (lambda *_: None)
+    features = features_of(flights, told)
+    scale = None
+    if fixed_scale:
+        scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features, strict=True)])
+    windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features, strict=True))])
+    held = held_out(len(flights), seed)
+    kept = ~np.isin(windows.flight, held)
+    if not kept.any() or len(np.unique(windows.over[kept])) < 2:
+        raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
+                            "give more flights")
+    weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block,
+                               df_lambda, told, conv_sparsity)
+    int8, tflite = quantisation.quantise(weights, windows.x[kept])
+    model = Model(weights, int8, tflite, {
+        "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
+        "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block,
+        "lambda": df_lambda, "conv_sparsity": conv_sparsity,
+        "flights": [os.path.basename(log.source) for log in flights],
+        "held_out": [os.path.basename(flights[i].source) for i in held], "data_sha256": data_hash(windows),
+    }, scale)
+    judged = accuracy(model, windows.select(~kept))
+    return replace(model, metadata={**model.metadata, "held_out_accuracy": judged})
+
+
+def features_of(flights: Sequence[FlightLog], progress: Progress) -> list[Features]:
+    """The features of every flight."""
+    found = []
+    for index, log in enumerate(flights):
+        found.append(flight_features(log))
+        progress("features", index + 1, len(flights), os.path.basename(log.source))
+    return found
+
+
+def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Windows:
+    """Every full window of every flight that ends in the air, z-scored by itself."""
+    return join([windows_of(log, f, i)
+                 for i, (log, f) in enumerate(zip(flights, features_of(flights, progress), strict=True))])
+
+
+def join(parts: Sequence[Windows]) -> Windows:
+    """All windows of several flights. Raises AirTouchError without any."""
+    if not sum(len(part.x) for part in parts):
+        raise AirTouchError("training: no flight holds a full window in the air; "
+                            "3 s of flight at 100 Hz are needed")
+    return Windows(*(np.concatenate([getattr(part, name) for part in parts])
+                     for name in ("x", "over", "alert", "flight")))
+
+
+def windows_of(log: FlightLog, features: Features, index: int = 0,
+               scale: normalisation.FixedScale | None = None) -> Windows:
+    """The training windows of one flight, z-scored by themselves or on a fixed scale."""
+    x, ends = feature_windows(features.fused, DEFAULT.feature_window, scale)
+    flying = logs.airborne(log)[ends]
+    x, ends = x[flying], ends[flying]
+    over = over_platform(logs.true_edges(log), len(log))
+    return Windows(x, over[ends].astype(np.float32), features.alert[ends].astype(np.float32),
+                   np.full(len(ends), index, np.int32))
+
+
+def held_out(flights: int, seed: int) -> np.ndarray:
+    """Indices of the flights that decide when to stop, in order; none of fewer than four."""
+    if flights < 4:
+        return np.zeros(0, dtype=int)
+    return np.sort(np.random.default_rng(seed).permutation(flights)[:max(1, round(HELD_OUT * flights))])
+
+
+def accuracy(model: Model, windows: Windows) -> dict[str, float | int | None]:
+    """Balanced window accuracy of the float and the int8 network, 0 to 1; None without both classes."""
+    result: dict[str, float | int | None] = {"windows": len(windows.x), "float": None, "int8": None}
+    if len(np.unique(windows.over)) == 2:
+        for name, logits in (("float", infer_float(model.float_layers, windows.x)),
+                             ("int8", infer_int8(model, windows.x))):
+            said = logits[:, 1] > logits[:, 0]
+            result[name] = float(np.mean([np.mean(said[windows.over == c] == c) for c in (0.0, 1.0)]))
+    return result
+
+
+def data_hash(windows: Windows) -> str:
+    """SHA-256 of the training windows and their labels."""
+    total = hashlib.sha256()
+    for values in (windows.x, windows.over, windows.alert, windows.flight):
+        total.update(np.ascontiguousarray(values).tobytes())
+    return total.hexdigest()
+
+
+def class_weights(over: np.ndarray) -> tuple[float, float]:
+    """What a window beside and over a platform counts, so that both classes count alike."""
+    share = float(np.clip(np.mean(over), 1e-3, 1.0 - 1e-3))
+    return 0.5 / (1.0 - share), 0.5 / share
+
+
+def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
+    """Learning rate: cosine from peak / 25 up over 30 % of the steps, down to peak / 10^4 (Smith 2018)."""
+    position = min(step / steps, 1.0)
+    if position < 0.3:
+        start, stop, part = peak / 25.0, peak, position / 0.3
+    else:
+        start, stop, part = peak, peak / 1e4, (position - 0.3) / 0.7
+    return stop + (start - stop) * 0.5 * (1.0 + float(np.cos(np.pi * part)))
+
+
+def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+                progress: Progress, conv_sparsity: float = 0.0) -> tuple[network.Weights, int]:
+    """The trained weights, and after how many epochs."""
+    model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
+    return network.weights_of_keras(model), len(losses)
+
+
+def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+              progress: Progress, conv_sparsity: float = 0.0):
+    """The trained Keras model and the loss on the held-out windows after each epoch (on the training
+    windows where none are held out). Windows may be of any length where sparsity is 0."""
+    import keras
+
+    train, held = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, held))
+    batches = max(len(train.x) // BATCH, 1)
+    pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
+    constraints, callbacks = {}, []
+    shares = {network.PRUNED: sparsity, network.PRUNED_CONV: conv_sparsity}
+    shares = {name: share for name, share in shares.items() if share > 0}
+    if shares:
+        constraints, schedule = network.pruning_of(shares, batches * pruned_epochs, block)
+        callbacks = [schedule]
+    model = network.build_keras(constraints, train.x.shape[1])
+    rate = _rate_table(batches * epochs)
+    model.compile(keras.optimizers.Adam(rate), loss=edge_loss(df_lambda, class_weights(train.over)),
+                  steps_per_execution=min(BATCHES_A_CALL, batches))
+    stopping = keras.callbacks.EarlyStopping(patience=PATIENCE, restore_best_weights=True,
+                                             start_from_epoch=pruned_epochs)
+    told = keras.callbacks.LambdaCallback(
+        on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
+    callbacks += [told] + ([stopping] if len(held.x) else [])
+    history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
+                        shuffle=False,
+                        validation_data=_batches(held, shuffle=False) if len(held.x) else None)
+    return model, history.history["val_loss" if len(held.x) else "loss"]
+
+
+def _rate_table(steps: int):
+    import keras
+    from keras import ops
+
+    table = np.array([one_cycle(step, steps) for step in range(steps + 1)], dtype=np.float32)
+
+    class OneCycle(keras.optimizers.schedules.LearningRateSchedule):
+        def __call__(self, step):
+            return ops.take(table, ops.minimum(ops.cast(step, "int32"), steps))
+
+    return OneCycle()
+
+
+def _batches(windows: Windows, shuffle: bool):
+    """Cached windows in batches; the order of each epoch follows from the seed."""
+    import tensorflow as tf
+
+    x = tf.constant(windows.x[..., None])
+    target = tf.constant(np.column_stack([windows.over, windows.alert]))
+    order = tf.data.Dataset.range(len(windows.x)).cache()
+    if shuffle:
+        order = order.shuffle(len(windows.x), reshuffle_each_iteration=True)
+    order = order.batch(BATCH, drop_remainder=shuffle and len(windows.x) >= BATCH)
+    return order.map(lambda i: (tf.gather(x, i), tf.gather(target, i))).prefetch(4)
+
+
+def _check(epochs: int, sparsity: float, block: int, df_lambda: float, conv_sparsity: float) -> None:
+    if epochs < 1:
+        raise AirTouchError(f"training: epochs must be at least 1, not {epochs}")
+    for share in (sparsity, conv_sparsity):
+        if not 0.0 <= share < 1.0:
+            raise AirTouchError(f"training: sparsity must lie in 0..1, below 1, not {share}")
+    if block not in (1, pruning.BLOCK):
+        raise AirTouchError(f"training: blocks of 1 or {pruning.BLOCK} weights, not {block}")
+    if not (np.isfinite(df_lambda) and df_lambda >= 0):
+        raise AirTouchError(f"training: lambda must be 0 or more, not {df_lambda}")

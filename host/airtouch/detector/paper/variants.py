@@ -1,0 +1,140 @@
+"""The paper's pipeline with one of its choices changed, in float, for ablations only."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.detector import paper
+from airtouch.detector.evaluation import tuning
+from airtouch.detector.evaluation.score import over_platform
+from airtouch.detector.paper import training
+from airtouch.detector.paper.decoding import decode
+from airtouch.detector.paper.features import feature_windows, flight_features
+from airtouch.detector.paper.losses import DEFAULT_LAMBDA
+from airtouch.detector.paper.network import float_layers
+from airtouch.detector.shared.pruning import BLOCK
+from airtouch.detector.shared.tensorflow import use_tensorflow
+from airtouch.detector.trace import Detection, Trace
+from airtouch.errors import AirTouchError
+from airtouch.kernels.network import infer_float
+from airtouch.logs.flight_log import FlightLog
+from airtouch.parameters import DEFAULT, Parameters
+
+CONVERGED = 0.01  #: share above the lowest held-out loss that counts as converged
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A `Detector` (see registry): the paper's, unpruned, with these choices.
+
+    df_lambda: weight of the disturbance-force loss. band_window: STFT window, samples. centred: take each
+    band power half a window early, as a plot would; it looks into the future and cannot fly.
+    rows: network input, samples.
+    """
+
+    df_lambda: float = DEFAULT_LAMBDA
+    band_window: int = DEFAULT.band_window
+    centred: bool = False
+    rows: int = DEFAULT.feature_window
+    physical_filter: bool = True
+
+    def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = training.EPOCHS) -> "VariantModel":
+        """Weights from the training flights, decoding and lag from those held out among them."""
+        use_tensorflow(seed)
+        parts = [self._windows(log, index) for index, log in enumerate(flights)]
+        windows = training.Windows(*(np.concatenate([getattr(p, name) for p in parts])
+                                  for name in ("x", "over", "alert", "flight")))
+        held = training.held_out(len(flights), seed)
+        kept = ~np.isin(windows.flight, held)
+        network, losses = training.fit_keras(windows.select(kept), windows.select(~kept), epochs, 0.0, BLOCK,
+                                          self.df_lambda, lambda *_: None)
+        converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
+        unseen = [flights[i] for i in held] or list(flights)
+        model = VariantModel(network, DEFAULT, 0.0, converged)
+        seen = [self._seen(log, model) for log in unseen]
+
+        def detect(settings: Parameters, i: int) -> list[Detection]:
+            return decode(seen[i][0], seen[i][1], seen[i][2] if self.physical_filter else None, settings)
+
+        truth = [logs.true_edges(log) for log in unseen]
+        settings, lag, _ = tuning.choose(paper.candidates(self.physical_filter), truth, detect)
+        return replace(model, settings=settings, lag_s=lag)
+
+    def run(self, log: FlightLog, model: "VariantModel | None" = None) -> Trace:
+        """P(over a platform) and edges of one flight."""
+        if model is None:
+            raise AirTouchError("a variant has no shipped model")
+        probability, armed, alert = self._seen(log, model)
+        return Trace(probability, decode(probability, armed, alert if self.physical_filter else None, model.settings))
+
+    def load(self, path: Path | None) -> "VariantModel":
+        """Variants are not saved."""
+        raise AirTouchError(f"{path}: a variant's model is not saved")
+
+    def lag_s(self, model: "VariantModel") -> float:
+        """The lag learnt in training, seconds."""
+        return model.lag_s
+
+    def parameters(self, model: "VariantModel") -> dict[str, Any]:
+        """What an ablation reports of training."""
+        return {"converged_after_epochs": model.converged}
+
+    def _features(self, log: FlightLog) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Fused features (n, 3), armed (n,) and alerts (n,)."""
+        features = flight_features(log, parameters=replace(DEFAULT, band_window=self.band_window))
+        fused = features.fused
+        if self.centred:
+            early = self.band_window // 2
+            fused = np.vstack([fused[early:], np.full((early, fused.shape[1]), np.nan, fused.dtype)])
+        return fused, features.armed, features.alert
+
+    def _windows(self, log: FlightLog, index: int) -> training.Windows:
+        """Training windows of one flight."""
+        fused, _, alert = self._features(log)
+        x, ends = feature_windows(fused, self.rows)
+        flying = logs.airborne(log)[ends]
+        x, ends = x[flying], ends[flying]
+        over = over_platform(logs.true_edges(log), len(log)).astype(np.float32)
+        return training.Windows(x, over[ends], alert[ends].astype(np.float32), np.full(len(ends), index, np.int32))
+
+    def _seen(self, log: FlightLog, model: "VariantModel") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """P(over) (n,), armed (n,), alerts (n,)."""
+        fused, armed, alert = self._features(log)
+        x, ends = feature_windows(fused, self.rows)
+        logits = np.asarray(model.network.predict(x[..., None], batch_size=2048, verbose=0), dtype=np.float64)
+        probability = np.full(len(log), np.nan)
+        probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
+        return probability, armed, alert
+
+
+@dataclass(frozen=True)
+class VariantModel:
+    """A trained Keras network, its decoding, its lag in seconds, and the epochs it took to converge."""
+
+    network: Any
+    settings: Parameters
+    lag_s: float
+    converged: int
+
+
+def random_windows(flights: Sequence[FlightLog], *, seed: int = 0, epochs: int = 10,
+                   share: float = 0.2) -> dict[str, float | int]:
+    """The paper's split, which leaks: windows of all flights dealt at random into training and test.
+
+    Neighbouring windows share 99 of 100 samples, so the test set was as good as seen. share: of the windows, for the
+    test. Returns balanced_accuracy of the float network on the test windows, windows tested, epochs.
+    """
+    use_tensorflow(seed)
+    windows = training.training_windows(flights, lambda *_: None)
+    test = np.random.default_rng(seed).uniform(size=len(windows.x)) < share
+    nothing = windows.select(np.zeros(len(test), bool))  # to stop early on: the paper trains to the end
+    weights, _ = training.fit_windows(windows.select(~test), nothing, epochs, 0.0, BLOCK, DEFAULT_LAMBDA,
+                                   lambda *_: None)
+    logits = infer_float(float_layers(weights), windows.x[test])
+    said, over = logits[:, 1] > logits[:, 0], windows.over[test] > 0.5
+    return {"balanced_accuracy": float(0.5 * (said[over].mean() + (~said[~over]).mean())),
+            "windows": int(test.sum()), "epochs": epochs}

@@ -1,0 +1,100 @@
+"""Model files: named arrays and JSON metadata in one `.npz`, read without trusting a byte of it."""
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.reference.int8_network import Int8Layer
+
+LARGEST = 8 << 20  #: bytes of the file, and of all its arrays
+REMEDY = "train it again with `airtouch train`"
+
+Shapes = Mapping[str, tuple[type, tuple[int, ...]]]  #: dtype and shape of each array that must be there
+
+
+def to_bytes(arrays: Mapping[str, np.ndarray], metadata: Mapping[str, Any]) -> bytes:
+    """The file's content; the same arrays and metadata give the same bytes."""
+    text = json.dumps(dict(metadata), sort_keys=True, allow_nan=False)
+    content = io.BytesIO()
+    np.savez_compressed(content, allow_pickle=False, **dict(sorted(arrays.items())),
+                        metadata=np.frombuffer(text.encode(), dtype=np.uint8))
+    return content.getvalue()
+
+
+def read(path: Path) -> bytes:
+    """A file's bytes; AirTouchError where it cannot be read or is too large."""
+    try:
+        if path.stat().st_size > LARGEST:
+            raise AirTouchError(f"{path}: too large for a model file")
+        return path.read_bytes()
+    except OSError as error:
+        raise AirTouchError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+
+def parse(data: bytes, source: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Arrays and metadata of a file's content; AirTouchError for anything that is not one."""
+    not_one = AirTouchError(f"{source}: not a model file (.npz written by `airtouch train`); {REMEDY}")
+    if not data.startswith(b"PK"):
+        raise not_one
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
+                raise not_one
+        with np.load(io.BytesIO(data), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+    except AirTouchError:
+        raise
+    except Exception:  # a damaged zip or array header raises nearly anything
+        raise not_one from None
+    if not all(isinstance(values, np.ndarray) for values in arrays.values()):
+        raise not_one
+    try:
+        metadata = json.loads(arrays.pop("metadata").tobytes().decode())
+    except (KeyError, ValueError, RecursionError):
+        metadata = None
+    if not isinstance(metadata, dict):
+        raise AirTouchError(f"{source}: this model says nothing of how it was made; {REMEDY}")
+    return arrays, metadata
+
+
+def check_kind(metadata: dict[str, Any], wanted: Mapping[str, Any], source: str) -> None:
+    """Take `wanted` keys out of the metadata; AirTouchError where one is another value."""
+    for key, value in wanted.items():
+        found = metadata.pop(key, None)
+        if found != value:
+            raise AirTouchError(f"{source}: model {key} {found!r}, this detector needs {value!r}; {REMEDY}")
+
+
+def check_arrays(arrays: Mapping[str, np.ndarray], shapes: Shapes, source: str) -> None:
+    """AirTouchError for an array that is missing, of another shape or type, or not finite."""
+    for name, (dtype, shape) in shapes.items():
+        values = arrays.get(name)
+        if values is None:
+            raise AirTouchError(f"{source}: no array {name!r} in this model; {REMEDY}")
+        if values.shape != shape:
+            raise AirTouchError(f"{source}: a model of another shape: {name} is {values.shape}, "
+                                f"this network needs {shape}; {REMEDY}")
+        if values.dtype != dtype:
+            raise AirTouchError(f"{source}: {name} is {values.dtype}, {np.dtype(dtype)} is needed; {REMEDY}")
+        if values.dtype.kind == "f" and not np.isfinite(values).all():
+            raise AirTouchError(f"{source}: {name} holds values that are not finite; {REMEDY}")
+
+
+def check_range(layers: Sequence[Int8Layer], source: str) -> None:
+    """No accumulator may leave what the kernels' rounding takes, 2^28, whatever the input; AirTouchError where one may.
+    An output whose weights pruning took is a constant; its bias may fill int32, its scale must be below one."""
+    for layer in layers:
+        if layer.kind == "max_pool":
+            continue
+        real = layer.weight_scale.astype(np.float64) * (layer.input_scale / layer.output_scale)
+        weights = np.abs(layer.weights.astype(np.int64)).reshape(len(layer.bias), -1).sum(axis=1)
+        largest = np.abs(layer.bias.astype(np.int64)) + 256 * weights
+        too_large = largest * np.maximum(real, 1.0) >= 2.0**28
+        if np.where(weights > 0, too_large, real > 1.0).any():
+            raise AirTouchError(f"{source}: int8 biases or scales out of range; {REMEDY}")

@@ -1,1 +1,0 @@
-"""The streaming network of the `best` detector: shape, training, quantisation, model file."""

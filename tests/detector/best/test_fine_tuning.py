@@ -1,0 +1,133 @@
+"""Training that goes on from a model, with labels of its own, and free air; which flights a model knows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.detector import best
+from airtouch.detector.best import free_air
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.shared import sensors, training_set
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from made_flight import SMALL, made_flight
+
+
+def blind(log: FlightLog) -> FlightLog:
+    return FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta)
+
+
+def test_labels_that_are_given_train_like_the_down_range(small):
+    """The same edges, once read from the down range and once given, lead to the same bits."""
+    flights = [made_flight(0), made_flight(1)]
+    labels = [[logs.Edge(e.sample, e.kind, np.nan, np.nan) for e in logs.true_edges(log)] for log in flights]
+    given = best.fit([blind(log) for log in flights], seed=3, recipe=replace(SMALL, balance=1.0), pseudo_labels=labels)
+    read = best.fit(flights, seed=3, recipe=replace(SMALL, balance=1.0))
+    assert given.to_bytes() == read.to_bytes()
+
+
+def test_training_goes_on_from_a_model(small):
+    flights = [made_flight(2)]
+    tuned = best.fit(flights, start=small, steps=30, peak_rate=1e-3)
+    assert tuned.recipe.steps == 30 and tuned.recipe.width == small.recipe.width
+    moved = [np.abs(tuned.weights[name] - small.weights[name]).max() for name in small.weights]
+    assert 0 < max(moved) < 0.5
+    for i in range(1, 1 + len(SMALL.dilations)):
+        kernel = small.weights[f"layer{i}.kernel"]
+        zero = ~kernel.reshape(-1, 4, kernel.shape[-1]).any(axis=1)
+        blocks = tuned.weights[f"layer{i}.kernel"].reshape(-1, 4, kernel.shape[-1])
+        assert zero.any() and not blocks.any(axis=1)[zero].any()
+    assert best.fit(flights, start=small, steps=30, peak_rate=1e-3).to_bytes() == tuned.to_bytes()
+    assert training_set.contains(tuned.metadata, made_flight(0)) and training_set.contains(tuned.metadata, flights[0])
+
+
+def test_without_a_step_of_learning_the_weights_stay(small):
+    tuned = best.fit([made_flight(2)], start=small, steps=2, peak_rate=1e-12, weight_decay=0.0)
+    assert all(np.allclose(tuned.weights[name], small.weights[name], atol=1e-9) for name in small.weights)
+
+
+def test_wrong_calls_are_one_line(small):
+    with pytest.raises(AirTouchError, match="another shape"):
+        best.fit([made_flight(2)], start=small, width=16)
+    with pytest.raises(AirTouchError, match="1 pseudo-labels for 2 flights"):
+        best.fit([made_flight(2), made_flight(3)], pseudo_labels=[None])
+
+
+def test_pseudo_labels_are_the_detections_without_the_lag(small):
+    model = replace(small, metadata={**small.metadata, "lag_s": 0.2, "decoder": {
+        **small.metadata["decoder"], "entry_score": -6.0, "exit_score": -6.0}})
+    log = blind(made_flight(7))
+    labels, own = best.pseudo_labels([log, made_flight(7)], model)
+    found = best.run(log, model).edges
+    assert own is None and found and [e.sample for e in labels] == [max(e.sample - 20, 0) for e in found]
+    assert [e.kind for e in labels] == [e.kind for e in found]
+
+
+def test_free_air_is_drawn_and_has_no_goals():
+    from airtouch.detector.best import batches
+
+    recipe = best.Recipe(batch=16, crop=64, warm_up=16, free_air_share=0.5, edge_share=1.0)
+    flight = batches.flight_of(made_flight(0), recipe)
+    calm = batches.flight_of(made_flight(1), recipe, ())
+    assert not calm.goals.any() and not len(calm.edges)
+    _, y = batches.batch([flight], recipe, np.random.default_rng(0), [calm])
+    without = [batches.batch([flight], recipe, np.random.default_rng(k))[1].any(axis=(1, 2)).mean() for k in range(20)]
+    mixed = [batches.batch([flight], recipe, np.random.default_rng(k), [calm])[1].any(axis=(1, 2)).mean()
+             for k in range(20)]
+    assert np.mean(mixed) == pytest.approx(0.5 * np.mean(without), abs=0.12)
+
+
+def test_free_air_folders(tmp_path):
+    calm = made_flight(0)
+    calm.columns["zrange_m"] = np.full(len(calm), 0.8)
+    logs.write(calm, tmp_path / "calm.csv")
+    logs.write(sensors.without(calm, ("rates",)), tmp_path / "no_gyro.csv")
+    logs.write(sensors.without(calm, ("rates", "motors")), tmp_path / "bare.csv")
+    (tmp_path / "manifest.csv").write_text("file\n")
+    told = []
+    assert len(free_air.read([tmp_path], told.append)) == 2 and len(told) == 1 and "bare.csv" in told[0]
+    logs.write(made_flight(1), tmp_path / "edge.csv")
+    with pytest.raises(AirTouchError, match="edge.csv.*not free air"):
+        free_air.read([tmp_path])
+    with pytest.raises(AirTouchError, match="no such folder"):
+        free_air.read([tmp_path / "nowhere"])
+
+
+def test_a_score_says_that_the_model_knows_the_flight(small, tmp_path):
+    for i, name in ((0, "renamed.csv"), (5, "new.csv")):
+        logs.write(made_flight(i), tmp_path / name)
+    files = [FlightFile(tmp_path / name, Condition(speed_mps=0.3)) for name in ("renamed.csv", "new.csv")]
+    scores, _ = evaluate.evaluate(files, best, small)
+    assert [s.in_training for s in scores] == [True, False]
+    assert evaluate.as_json("best", scores, (), 0.0, {})["in_training"] == ["renamed.csv"]
+
+
+def test_a_model_without_hashes_knows_names():
+    log = made_flight(0)
+    assert training_set.contains({"flights": ["made0.csv"]}, log)
+    assert not training_set.contains({"flights": ["made0.csv"], "flight_hashes": ["0" * 16]}, log)
+    assert not training_set.contains({}, log)
+
+
+def test_a_training_that_was_stopped_goes_on_to_the_same_bits(small, tmp_path, monkeypatch):
+    from airtouch.detector.best import training
+
+    monkeypatch.setattr(training, "KEEP_EVERY", 10)
+    flights = [made_flight(0), made_flight(1)]
+    seen = []
+
+    def stop(stage, done, _total, _note):
+        seen.append((stage, done))
+        if (stage, done) == ("steps", 50):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
+    assert len(list(tmp_path.iterdir())) == 1 and ("steps", 50) in seen
+    seen.clear()
+    again = best.fit(flights, seed=3, recipe=SMALL, work=tmp_path, progress=stop)
+    assert ("steps", 50) not in seen and not list(tmp_path.iterdir())
+    assert again.to_bytes() == small.to_bytes()

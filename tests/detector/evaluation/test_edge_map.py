@@ -1,0 +1,89 @@
+"""The edge map against shapes whose outline is known."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+
+from airtouch.detector.evaluation import edge_map
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+
+PERIOD, SPEED = 0.01, 0.3
+
+
+def zigzag(width: float, rows: np.ndarray) -> np.ndarray:
+    """Track that flies the rows to and fro from -width to width, (n, 2)."""
+    steps = np.arange(-width, width, SPEED * PERIOD)
+    legs = [np.column_stack((steps if i % 2 == 0 else -steps, np.full(len(steps), y))) for i, y in enumerate(rows)]
+    return np.vstack(legs)
+
+
+def felt(shape: Polygon, xy: np.ndarray, sigma_s: float = 0.0, seed: int = 0) -> list[edge_map.EdgePoint]:
+    """Edge points of an ideal detector with Gaussian timing error on the true outline."""
+    over = shapely.contains_xy(shape, xy[:, 0], xy[:, 1])
+    change = np.flatnonzero(np.diff(over.astype(int))) + 1
+    kinds = ["entry" if over[i] else "exit" for i in change]
+    late = np.random.default_rng(seed).normal(0, sigma_s, len(change)) / PERIOD
+    return edge_map.edge_points(xy, change + np.round(late), kinds, period_s=PERIOD, sigma_s=max(sigma_s, 0.01))
+
+
+def overlap(a: Polygon, b: Polygon) -> float:
+    return a.intersection(b).area / a.union(b).area
+
+
+ROWS = np.arange(-0.6, 0.61, 0.05)
+SHAPES = {
+    "square": Polygon([(-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)]),
+    "circle": Point(0, 0).buffer(0.4),
+    "L": Polygon([(-0.4, -0.4), (0.4, -0.4), (0.4, 0.0), (0.0, 0.0), (0.0, 0.4), (-0.4, 0.4)]),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_zigzag_finds_the_shape(name):
+    found = edge_map.platforms(felt(SHAPES[name], zigzag(1.0, ROWS), sigma_s=0.05))
+    assert len(found) == 1
+    assert overlap(found[0].outline, SHAPES[name]) > 0.88
+
+
+def test_the_uncertainty_is_the_timing_error_times_the_speed():
+    points = felt(SHAPES["square"], zigzag(1.0, ROWS), sigma_s=0.1)
+    assert np.allclose([p.sigma_m for p in points], 0.1 * SPEED, rtol=1e-6)
+    beside = np.array([min(abs(p.x_m - 0.4), abs(p.x_m + 0.4)) for p in points])
+    assert 0.6 < np.sqrt(np.mean(beside**2)) / 0.03 < 1.4
+
+
+def test_two_platforms_stay_two():
+    two = SHAPES["square"].union(shapely.affinity.translate(SHAPES["square"], xoff=1.4))
+    xy = zigzag(1.0, ROWS) * [1.5, 1.0] + [0.7, 0.0]
+    assert len(edge_map.platforms(felt(two, xy))) == 2
+
+
+def test_a_single_sweep_gives_points_only():
+    xy = zigzag(1.0, np.array([0.0]))
+    found = edge_map.platforms(felt(SHAPES["square"], xy))
+    assert len(found) == 1 and found[0].outline is None
+    assert found[0].far.x - found[0].near.x == pytest.approx(0.8, abs=0.01)
+
+
+def test_dead_reckoning_needs_a_speed():
+    log = FlightLog({"t_s": np.arange(100) * PERIOD})
+    with pytest.raises(AirTouchError, match="--speed"):
+        edge_map.track(log)
+    xy, measured = edge_map.track(log, speed_mps=0.2, heading_deg=90)
+    assert not measured and np.allclose(xy[-1], [0, 0.2 * 0.99])
+
+
+def test_geojson_can_be_read_back():
+    points = felt(SHAPES["L"], zigzag(1.0, ROWS), sigma_s=0.02)
+    text = json.dumps(edge_map.geojson(points, edge_map.platforms(points), {"flight": "a"}))
+    features = json.loads(text)["features"]
+    shapes = [shapely.geometry.shape(f["geometry"]) for f in features]
+    assert all(shape.is_valid for shape in shapes)
+    outline = next(s for s, f in zip(shapes, features, strict=True) if f["properties"]["role"] == "outline")
+    assert overlap(outline, SHAPES["L"]) > 0.85
+    assert {f["properties"]["role"] for f in features} >= {"edge", "outline", "rectangle", "near side"}
+    assert isinstance(shapes[0], Point) and any(isinstance(s, LineString) for s in shapes)

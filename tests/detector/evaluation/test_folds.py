@@ -1,0 +1,43 @@
+"""Which flights are held out together."""
+
+from pathlib import Path
+
+import pytest
+
+from airtouch.detector.evaluation import folds
+from airtouch.detector.evaluation.dataset import Condition, FlightFile, collect, day_of
+from airtouch.errors import AirTouchError
+
+
+def files(days: str) -> list[FlightFile]:
+    return [FlightFile(Path(f"/flights/house/{i}.csv"), Condition(day=day)) for i, day in enumerate(days)]
+
+
+def test_days_are_held_out_whole_in_even_groups():
+    groups = folds.by_day(files("aaaabbbccdefg"))
+    assert len(groups) == 5 and sum(map(len, groups.values())) == 13
+    days = [{f.condition.day for f in members} for members in groups.values()]
+    assert sum(map(len, days)) == len(set.union(*days)) == 7
+    assert max(map(len, groups.values())) == 4
+
+
+def test_the_authors_days_are_in_the_names(flights):
+    groups = folds.by_day(collect([flights / "airtouch"]))
+    found = {f.condition.day for members in groups.values() for f in members}
+    assert found == {"0102", "0103", "0108", "0126", "0127", "0128", "0201"}
+    assert day_of(Path("f0.csv.gz")) is None
+
+
+def test_one_group_against_all_others():
+    some = files("aab")
+    assert folds.only(some, "b") == {0: some[2:]}
+    for group in ("house", "c"):
+        with pytest.raises(AirTouchError, match="of 3 flights are of this folder or day"):
+            folds.only(some, group)
+
+
+def test_days_are_needed():
+    with pytest.raises(AirTouchError, match="add a column 'day'"):
+        folds.by_day([FlightFile(Path("f.csv"), Condition())])
+    with pytest.raises(AirTouchError, match="at least two days"):
+        folds.by_day(files("aaa"))

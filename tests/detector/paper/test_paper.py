@@ -1,0 +1,95 @@
+"""The paper's pipeline with the shipped model, on a simulated flight."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+import short_flights
+from airtouch import logs, reference, vehicle
+from airtouch.detector import paper, registry
+from airtouch.detector.paper.decoding import detections
+from airtouch.detector.shared.channels import level_acceleration, thrust_axis
+from airtouch.detector.trace import Trace
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import GYRO, PWM
+from airtouch.parameters import DEFAULT
+from airtouch.reference.edge_pipeline import EdgePipelineConfig
+
+
+@pytest.fixture(scope="module")
+def log():
+    return short_flights.fly(1)[0]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return paper.load(None)
+
+
+def easy(model, **changes):
+    """The model with settings under which edges are plenty."""
+    parameters = asdict(replace(DEFAULT, probability_entry=0.5, probability_exit=0.45, **changes))
+    return replace(model, metadata={**model.metadata, "parameters": parameters, "physical_filter": False})
+
+
+def test_edges_are_those_of_the_reference_pipeline(log, model):
+    loose = easy(model)
+    trace = paper.run(log, loose)
+    settings, physical = paper.decoding(loose)
+    events = reference.edge_pipeline(
+        level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle.load(), vbat_v=log["vbat_V"],
+        thrust_axis=thrust_axis(log), probability=trace.probability,
+        config=EdgePipelineConfig(settings, physical_filter=physical))
+    assert trace.edges and trace.edges == detections(events.edge, trace.probability)
+    assert not physical
+
+
+def test_the_filter_drops_edges_and_changes_no_probability(log, model):
+    loose = easy(model)
+    strict = replace(loose, metadata={**loose.metadata, "physical_filter": True})
+    without, with_it = paper.run(log, loose), paper.run(log, strict)
+    assert set(with_it.edges) <= set(without.edges)
+    assert np.array_equal(without.probability, with_it.probability, equal_nan=True)
+
+
+def test_causal(log, model):
+    loose = easy(model)
+    cut = 1200
+    whole, part = paper.run(log, loose), paper.run(log.slice(0, cut), loose)
+    assert np.array_equal(whole.probability[:cut], part.probability, equal_nan=True)
+    assert part.edges == [e for e in whole.edges if e.sample < cut]
+
+
+def test_the_down_range_is_no_input(log, model):
+    blind = log.with_columns({"zrange_m": np.zeros(len(log))})
+    assert paper.run(blind, easy(model)).edges == paper.run(log, easy(model)).edges
+
+
+def test_tuning_states_what_it_chose(log, model):
+    tuned = paper.tune(model, [log])
+    assert tuned.metadata["tuned_on"] == [log.source.rsplit("/", 1)[-1]]
+    assert 0.0 <= tuned.metadata["tuned_timed_f1"] <= 1.0 and np.isfinite(paper.lag_s(tuned))
+    off = paper.tune(model, [log], physical_filter=False)
+    assert off.metadata["physical_filter"] is False
+    assert off.metadata["tuned_timed_f1"] >= 0.0 and paper.decoding(off)[1] is False
+
+
+def test_a_model_of_another_version_is_refused(log, model):
+    foreign = replace(model, metadata={**model.metadata, "parameters": {"window": 3}})
+    with pytest.raises(AirTouchError, match="train it again"):
+        paper.run(log, foreign)
+
+
+def test_every_registered_detector_offers_all(log):
+    for name in registry.DETECTORS:
+        module = registry.get(name)
+        assert all(callable(getattr(module, what)) for what in ("run", "fit", "load", "lag_s", "parameters")), name
+    with pytest.raises(AirTouchError, match="known: "):
+        registry.get("oracle")
+
+
+def test_baseline_gives_a_trace(log):
+    trace = registry.get("baseline").run(log)
+    assert isinstance(trace, Trace) and {e.kind for e in trace.edges} <= {"edge"}
+    assert logs.true_edges(log)
