@@ -74,7 +74,7 @@ static void wait(edgeDecoder_t *decoder) {
   }
 }
 
-uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airborne) {
+uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[EDGE_DECODER_LOGITS], bool airborne) {
   const decoderConfig_t *config = &decoder->config;
   if (!airborne) {
     decoder->airborne = 0;

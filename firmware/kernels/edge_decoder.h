@@ -50,7 +50,7 @@ void edgeDecoderInit(edgeDecoder_t *decoder, const decoderConfig_t *config);
  * @return 0 nothing, 1 entry, 2 exit
  * Costs about 130 instructions of a Cortex-M4, where an edge is seen up to 800 more. Never fails.
  */
-uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[3], bool airborne);
+uint8_t edgeDecoderStep(edgeDecoder_t *decoder, const float logits[EDGE_DECODER_LOGITS], bool airborne);
 
 #ifdef __cplusplus
 }

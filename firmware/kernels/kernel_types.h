@@ -12,6 +12,11 @@
 
 #include <stdint.h>
 
+enum {
+  MOTION_CHANNELS = 12,    ///< what the streaming detector sees of a sample (motion_channels.h); the last one is empty
+  EDGE_DECODER_LOGITS = 3  ///< what its network says of a step (edge_decoder.h): over, entry, exit
+};
+
 /** What the disturbance force needs to know of a vehicle; SI units, PWM 0..65535. */
 typedef struct {
   float mass;            ///< kg
@@ -72,13 +77,13 @@ typedef struct {
 /** Settings of the motion channels (motion_channels.h). */
 typedef struct {
   airtouchVehicle_t vehicle;
-  float inverseScale[11];  ///< 1 over each channel's usual swing
-  float limit;             ///< channels are clamped to this magnitude, in usual swings
-  float armPwm;            ///< airborne while the mean PWM is above this
-  float slowGain;          ///< of the slow means, a sample
-  float lagGain;           ///< of the thrust's lag, a sample
-  float leastThrust;       ///< N; the usual thrust is never taken to be less
-  uint32_t settleSamples;  ///< after take-off the slow means follow at once for so long
+  float inverseScale[MOTION_CHANNELS - 1];  ///< 1 over each channel's usual swing
+  float limit;                              ///< channels are clamped to this magnitude, in usual swings
+  float armPwm;                             ///< airborne while the mean PWM is above this
+  float slowGain;                           ///< of the slow means, a sample
+  float lagGain;                            ///< of the thrust's lag, a sample
+  float leastThrust;                        ///< N; the usual thrust is never taken to be less
+  uint32_t settleSamples;                   ///< after take-off the slow means follow at once for so long
 } motionConfig_t;
 
 /** Settings of the streaming detector's decoder (edge_decoder.h); scores are logits. */
@@ -105,8 +110,8 @@ typedef struct {
 
 /** What the streaming detector says at one sample. */
 typedef struct {
-  float logits[3];   ///< over, entry, exit: the last ones computed
-  uint8_t ready;     ///< they are new
-  uint8_t edge;      ///< 0 none, 1 entry, 2 exit
-  uint8_t airborne;  ///< whether the drone flies
+  float logits[EDGE_DECODER_LOGITS];  ///< over, entry, exit: the last ones computed
+  uint8_t ready;                      ///< they are new
+  uint8_t edge;                       ///< 0 none, 1 entry, 2 exit
+  uint8_t airborne;                   ///< whether the drone flies
 } streamEvent_t;

@@ -68,7 +68,7 @@ void motionChannelsStep(motionChannels_t *motion, const float acc[3], const floa
   }
   channels[2] -= gravity;
   channels[10] = a[2] - gravity * motion->lagged / usual;
-  channels[11] = 0.0f;
+  channels[MOTION_CHANNELS - 1] = 0.0f;
   for (int i = 0; i < MOTION_CHANNELS - 1; i++) {
     channels[i] = clampFloat(channels[i] * config->inverseScale[i], -config->limit, config->limit);
   }

@@ -25,7 +25,6 @@
 extern "C" {
 #endif
 
-#define MOTION_CHANNELS 12
 #define MOTION_THRUST_DELAY 2  ///< samples from a command to its thrust
 
 /** The channels' memory; plain values, no pointers. */

@@ -10,7 +10,7 @@
 bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
                         const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena) {
   if (streamInt8Check(network) >= 0 || network->convs[0].layer.inChannels != MOTION_CHANNELS ||
-      network->head->outChannels != 3) {
+      network->head->outChannels != EDGE_DECODER_LOGITS) {
     return false;
   }
   detector->network = network;
@@ -18,7 +18,7 @@ bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion
   motionChannelsInit(&detector->motion, motion);
   edgeDecoderInit(&detector->decoder, decoder);
   streamInt8Reset(network, &detector->state, arena);
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {
     detector->logits[i] = 0.0f;
   }
   return true;
@@ -44,13 +44,13 @@ bool streamDetectorStep(streamDetector_t *detector, const float acc[3], const fl
   const bool airborne = detector->motion.airborne > 0;
   *event = (streamEvent_t){.ready = output != NULL, .airborne = airborne};
   if (output != NULL) {
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {
       detector->logits[i] =
           detector->quantisation.outputScale * (float)(output[i] - detector->quantisation.outputZeroPoint);
     }
     event->edge = edgeDecoderStep(&detector->decoder, detector->logits, airborne);
   }
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {
     event->logits[i] = detector->logits[i];
   }
   return event->edge != 0;

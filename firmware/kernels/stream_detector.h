@@ -29,13 +29,13 @@ typedef struct {
   motionChannels_t motion;
   edgeDecoder_t decoder;
   streamState_t state;
-  float logits[3];
+  float logits[EDGE_DECODER_LOGITS];
 } streamDetector_t;
 
 /**
  * Sets a detector up; the settings are copied.
  * @param arena  streamInt8ArenaBytes(network) bytes, aligned to 4, used by nothing else
- * @return false for a network that does not take MOTION_CHANNELS channels or give three logits
+ * @return false for a network that does not take MOTION_CHANNELS channels or give EDGE_DECODER_LOGITS logits
  */
 bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
                         const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena);

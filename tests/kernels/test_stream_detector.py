@@ -12,10 +12,11 @@ from airtouch import kernels as c
 from airtouch import logs
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
+from airtouch.kernels.library import lib
 from airtouch.logs.flight_log import GYRO, PWM
-from airtouch.reference.edge_decoder import DecoderConfig, edge_decoder
+from airtouch.reference.edge_decoder import LOGITS, DecoderConfig, edge_decoder
 from airtouch.reference.int8_network import quantise
-from airtouch.reference.motion_channels import motion_channels
+from airtouch.reference.motion_channels import NAMES, motion_channels
 from airtouch.reference.stream_int8 import run_stream
 
 ODD = st.sampled_from([0.0, -0.0, 1e-42, 1e30, -1e38, np.nan, np.inf, -np.inf, 65535.0, 65536.0, -1.0])
@@ -27,6 +28,12 @@ def flight(seed: int, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     pwm = 46000 + 2000 * rng.standard_normal((n, 4))
     pwm[:min(n, 100)] = 0
     return rng.normal([0, 0, 9.81], 0.4, (n, 3)), rng.normal(0, 0.3, (n, 3)), pwm
+
+
+def test_c_and_the_references_agree_on_the_number_of_channels_and_logits():
+    assert (lib.MOTION_CHANNELS, lib.EDGE_DECODER_LOGITS) == (len(NAMES), len(LOGITS))
+    with pytest.raises(AirTouchError, match="12 channels and give 3 logits"):
+        c.stream_detector(*flight(0, 10), network(0, channels=12, outputs=4))
 
 
 @settings(max_examples=50, deadline=None)

@@ -71,7 +71,7 @@ int32_t stepStreamInt8(const int8_t quantised[MOTION_CHANNELS], int8_t *unused) 
   return streamInt8Step(&airtouchStream, &streamDetectorState.state, quantised) != NULL;
 }
 
-int32_t stepEdgeDecoder(const float logits[3], uint8_t *edge) {
+int32_t stepEdgeDecoder(const float logits[EDGE_DECODER_LOGITS], uint8_t *edge) {
   *edge = edgeDecoderStep(&edgeDecoderState, logits, true);
   return 1;
 }

@@ -7,7 +7,9 @@ import numpy as np
 
 from airtouch.kernels.edge_pipeline import _event_dtype, config_struct
 from airtouch.kernels.library import ffi
+from airtouch.reference.edge_decoder import LOGITS
 from airtouch.reference.edge_pipeline import EdgePipelineConfig
+from airtouch.reference.motion_channels import NAMES
 from airtouch.vehicle import Vehicle, load
 from tools.emulator.build import ROOT, Program, build
 from tools.emulator.elf import Elf
@@ -22,8 +24,9 @@ INCLUDE = [FIRMWARE, GAP8, MODEL]
 SAMPLE = np.dtype([("acc", "<f4", 3), ("gyro", "<f4", 3), ("pwm", "<f4", 4), ("vbat", "<f4"),
                    ("thrust_axis", "<f4", 3), ("probability", "<f4")])
 EVENT = _event_dtype()
-STREAM_EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"], "formats": [("<f4", 3), "u1", "u1", "u1"],
-                         "offsets": [0, 12, 13, 14], "itemsize": 16})
+STREAM_EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
+                         "formats": [("<f4", len(LOGITS)), "u1", "u1", "u1"],
+                         "offsets": [0, *(4 * len(LOGITS) + i for i in range(3))], "itemsize": 4 * len(LOGITS) + 4})
 
 
 @dataclass(frozen=True)
@@ -49,10 +52,10 @@ KERNELS = {
     "edge_pipeline": Kernel("stepEdgePipeline", SAMPLE, EVENT,
                             (*_BAND, "cross_spectrum", *_FORCE, "fr_cfar", "feature_window", "edge_pipeline"),
                             ("edgePipelineState",)),
-    "motion_channels": Kernel("stepMotionChannels", SAMPLE, np.dtype(("<f4", 12)), ("motion_channels", *_FORCE),
+    "motion_channels": Kernel("stepMotionChannels", SAMPLE, np.dtype(("<f4", len(NAMES))), ("motion_channels", *_FORCE),
                               ("motionChannelsState",)),
-    "stream_int8": Kernel("stepStreamInt8", np.dtype(("i1", 12)), np.dtype("i1"), _NET, ("streamArena",)),
-    "edge_decoder": Kernel("stepEdgeDecoder", np.dtype(("<f4", 3)), np.dtype("u1"), ("edge_decoder",),
+    "stream_int8": Kernel("stepStreamInt8", np.dtype(("i1", len(NAMES))), np.dtype("i1"), _NET, ("streamArena",)),
+    "edge_decoder": Kernel("stepEdgeDecoder", np.dtype(("<f4", len(LOGITS))), np.dtype("u1"), ("edge_decoder",),
                            ("edgeDecoderState",)),
     "stream_detector": Kernel("stepStreamDetector", SAMPLE, STREAM_EVENT,
                               ("motion_channels", *_FORCE, "stream_detector", "edge_decoder", *_NET),

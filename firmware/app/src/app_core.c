@@ -160,7 +160,7 @@ static void report(appCore_t *core, uint8_t kind) {
 static float sigmoid(float x) { return 1.0f / (1.0f + expf(-x)); }
 
 /** The logits of one step of the streaming network become log values and, where they say so, an edge. */
-static void takeLogits(appCore_t *core, const float logits[3], bool airborne, uint8_t edge) {
+static void takeLogits(appCore_t *core, const float logits[EDGE_DECODER_LOGITS], bool airborne, uint8_t edge) {
   memcpy(core->log.logit, logits, sizeof core->log.logit);
   core->log.probability = airborne ? sigmoid(logits[0]) : 0.0f;
   core->log.answers++;
@@ -202,7 +202,7 @@ static void takeAnswer(appCore_t *core, const linkAnswer_t *answer) {
     return;
   }
   const streamQuantisation_t *quantisation = &core->best.quantisation;
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {
     core->best.logits[i] = quantisation->outputScale * (float)(answer->output[i] - quantisation->outputZeroPoint);
   }
   const bool airborne = lag < LINK_HISTORY && wasAirborne(core, answer->sequence);

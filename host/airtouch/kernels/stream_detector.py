@@ -8,14 +8,17 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import float32, pointer, vehicle_struct
 from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.stream import arena_bytes, flat_stream
-from airtouch.reference.edge_decoder import DecoderConfig
-from airtouch.reference.motion_channels import MotionConfig
+from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
+from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.stream_int8 import StreamNetwork
+
+#: what is said of a network that the detector cannot run
+OTHER_NETWORK = f"stream detector: the network must take {len(NAMES)} channels and give {len(LOGITS)} logits"
 
 
 @dataclass(frozen=True)
 class StreamEvents:
-    """One event a sample: logits (n, 3) over, entry, exit, held between steps; ready, airborne (n,) bool;
+    """One event a sample: logits (n, 3), columns as LOGITS, held between steps; ready, airborne (n,) bool;
     edge (n,): 0 none, 1 entry, 2 exit."""
 
     logits: np.ndarray
@@ -27,9 +30,9 @@ class StreamEvents:
 def motion_channels(
     acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray, config: MotionConfig | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Channels (n, 12) float32 and airborne (n,) bool; see `airtouch.reference.motion_channels`."""
+    """Channels (n, k) float32, k = len(NAMES), and airborne (n,) bool; see `airtouch.reference.motion_channels`."""
     acc, rate, motors = check_signals(acc_level, gyro, pwm)
-    channels = np.empty((len(acc), 12), dtype=np.float32)
+    channels = np.empty((len(acc), len(NAMES)), dtype=np.float32)
     airborne = np.empty(len(acc), dtype=np.uint8)
     lib.motionChannelsBatch(pointer(acc), pointer(rate), pointer(motors), len(acc),
                             motion_struct(config or MotionConfig()), pointer(channels),
@@ -38,10 +41,11 @@ def motion_channels(
 
 
 def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig = DecoderConfig()) -> np.ndarray:
-    """Edges (n,) of logits (n, 3) and airborne (n,); see `airtouch.reference.edge_decoder`."""
+    """Edges (n,) of logits (n, 3), columns as LOGITS, and airborne (n,); see `airtouch.reference.edge_decoder`."""
     values, flags = float32(logits), np.ascontiguousarray(airborne, dtype=np.uint8)
-    if values.shape != (len(flags), 3):
-        raise AirTouchError(f"edge decoder: needs logits (n, 3) and airborne (n,), not {values.shape}, {flags.shape}")
+    if values.shape != (len(flags), len(LOGITS)):
+        raise AirTouchError(f"edge decoder: needs logits (n, {len(LOGITS)}) and airborne (n,), "
+                            f"not {values.shape}, {flags.shape}")
     edges = np.empty(len(flags), dtype=np.uint8)
     lib.edgeDecoderBatch(pointer(values), pointer(flags, "uint8_t *"), len(flags), decoder_struct(config),
                          pointer(edges, "uint8_t *"))
@@ -54,8 +58,7 @@ def stream_detector(
 ) -> StreamEvents:
     """A flight through the whole detector, sample by sample as the drone runs it.
 
-    Raises AirTouchError for signals of another shape and for a network that does not take twelve
-    channels or give three logits.
+    Raises AirTouchError for signals of another shape and for a network of another number of channels or logits.
     """
     acc, rate, motors = check_signals(acc_level, gyro, pwm)
     flat, keep = flat_stream(network)
@@ -69,14 +72,14 @@ def stream_detector(
         pointer(acc), pointer(rate), pointer(motors), len(acc), motion_struct(motion or MotionConfig()), flat,
         quantisation, decoder_struct(decoder), arena, events)
     if not fits:
-        raise AirTouchError("stream detector: the network must take 12 channels and give 3 logits")
+        raise AirTouchError(OTHER_NETWORK)
     table = np.frombuffer(ffi.buffer(events), dtype=EVENT)[:len(acc)]
     return StreamEvents(table["logits"].copy(), table["ready"] > 0, table["edge"].copy(), table["airborne"] > 0)
 
 
 #: streamEvent_t as NumPy sees it
 EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
-                  "formats": [("<f4", 3), "u1", "u1", "u1"],
+                  "formats": [("<f4", len(LOGITS)), "u1", "u1", "u1"],
                   "offsets": [ffi.offsetof("streamEvent_t", name) for name in ("logits", "ready", "edge", "airborne")],
                   "itemsize": ffi.sizeof("streamEvent_t")})
 

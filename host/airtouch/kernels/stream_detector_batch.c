@@ -20,7 +20,7 @@ void edgeDecoderBatch(const float *logits, const uint8_t *airborne, int64_t step
   edgeDecoder_t decoder;
   edgeDecoderInit(&decoder, config);
   for (int64_t i = 0; i < steps; i++) {
-    edges[i] = edgeDecoderStep(&decoder, logits + 3 * i, airborne[i] != 0);
+    edges[i] = edgeDecoderStep(&decoder, logits + EDGE_DECODER_LOGITS * i, airborne[i] != 0);
   }
 }
 

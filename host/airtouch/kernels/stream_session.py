@@ -6,7 +6,14 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import call, ffi
 from airtouch.kernels.stream import arena_bytes, flat_stream
-from airtouch.kernels.stream_detector import EVENT, StreamEvents, check_signals, decoder_struct, motion_struct
+from airtouch.kernels.stream_detector import (
+    EVENT,
+    OTHER_NETWORK,
+    StreamEvents,
+    check_signals,
+    decoder_struct,
+    motion_struct,
+)
 from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.motion_channels import MotionConfig
 from airtouch.reference.stream_int8 import StreamNetwork
@@ -15,7 +22,7 @@ from airtouch.reference.stream_int8 import StreamNetwork
 class StreamSession:
     """`stream_detector` in pieces: the same events whatever the pieces are.
 
-    Raises AirTouchError for a network that does not take twelve channels or give three logits.
+    Raises AirTouchError for a network of another number of channels or logits.
     """
 
     def __init__(self, network: StreamNetwork, motion: MotionConfig | None = None,
@@ -32,7 +39,7 @@ class StreamSession:
         fits = call("streamSessionOpen")(self._state, motion_struct(motion or MotionConfig()), flat,
                                          quantisation, decoder_struct(decoder), arena)
         if not fits:
-            raise AirTouchError("stream detector: the network must take 12 channels and give 3 logits")
+            raise AirTouchError(OTHER_NETWORK)
 
     def next(self, acc_level: np.ndarray, gyro: np.ndarray, pwm: np.ndarray) -> StreamEvents:
         """Events of the next samples: (n, 3) m/s^2 in level axes, (n, 3) rad/s, (n, 4) PWM.

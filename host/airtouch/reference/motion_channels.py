@@ -9,8 +9,39 @@ from airtouch.errors import AirTouchError
 from airtouch.reference.finite import ACC_LIMIT, PWM_MAX, RATE_LIMIT, hold_finite
 from airtouch.vehicle import Vehicle
 
-NAMES = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "motor roll", "motor pitch", "motor yaw",
-         "motor mean", "unexplained az", "zero")
+ACCELERATION, RATES, MOTORS = "acceleration", "rates", "motors"  #: the sensors
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One motion channel.
+
+    swing: its usual swing, the unit of its values: m/s^2, rad/s or PWM. mirror: its sign where the flight is reflected
+    left to right. sensors: those that it needs.
+    """
+
+    name: str
+    swing: float
+    mirror: int
+    sensors: tuple[str, ...]
+
+
+#: The channels in the order of their columns, as motion_channels.c computes them, but the last one, which is 0.
+CHANNEL_TABLE = (
+    Channel("ax", 0.5, 1, (ACCELERATION,)),
+    Channel("ay", 0.5, -1, (ACCELERATION,)),
+    Channel("az", 0.5, 1, (ACCELERATION,)),
+    Channel("gyro x", 0.2618, -1, (RATES,)),
+    Channel("gyro y", 0.2618, 1, (RATES,)),
+    Channel("gyro z", 0.08727, -1, (RATES,)),
+    Channel("motor roll", 4000.0, -1, (MOTORS,)),
+    Channel("motor pitch", 4000.0, 1, (MOTORS,)),
+    Channel("motor yaw", 4000.0, -1, (MOTORS,)),
+    Channel("motor mean", 1500.0, 1, (MOTORS,)),
+    Channel("unexplained az", 0.5, 1, (ACCELERATION, MOTORS)),
+)
+#: Names of all columns: the last one is 0, so that they come in blocks of four.
+NAMES = (*(channel.name for channel in CHANNEL_TABLE), "zero")
 THRUST_DELAY = 2  #: samples from a command to its thrust
 
 
@@ -18,11 +49,11 @@ THRUST_DELAY = 2  #: samples from a command to its thrust
 class MotionConfig:
     """Settings; the samples are those of a 100 Hz log.
 
-    scale: usual swing of each channel: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
+    scale: usual swing of each of CHANNEL_TABLE: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
     clamped to that many swings. slow_samples: time constant of the motors' slow means.
     """
 
-    scale: tuple[float, ...] = (0.5, 0.5, 0.5, 0.2618, 0.2618, 0.08727, 4000.0, 4000.0, 4000.0, 1500.0, 0.5)
+    scale: tuple[float, ...] = tuple(channel.swing for channel in CHANNEL_TABLE)
     limit: float = 4.0
     arm_pwm: float = 15000.0
     slow_samples: float = 300.0

@@ -15,9 +15,9 @@ typedef struct {
   uint32_t reports;   // in this flight
 } flight_t;
 
-static uint8_t step(flight_t *flight, const float logits[3], bool airborne) {
+static uint8_t step(flight_t *flight, const float logits[EDGE_DECODER_LOGITS], bool airborne) {
   const decoderConfig_t *config = &flight->decoder->config;
-  float *exact = exactCopy(logits, 3 * sizeof *logits);
+  float *exact = exactCopy(logits, EDGE_DECODER_LOGITS * sizeof *logits);
   const uint8_t edge = edgeDecoderStep(flight->decoder, exact, airborne);
   free(exact);
   if (!airborne) {
@@ -74,8 +74,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
       landed = true;
       edgeDecoderInit(fresh.decoder, &config);
     }
-    float logits[3];
-    for (int i = 0; i < 3; i++) {
+    float logits[EDGE_DECODER_LOGITS];
+    for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {
       logits[i] = what & 1 ? takeFloat(&bytes, 3.0f) : 3.0f * noise(&seed);
     }
     for (int run = what / 32 * (what & 2 ? 8 : 1); run >= 0; run--, count++) {

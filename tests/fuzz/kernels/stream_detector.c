@@ -35,7 +35,7 @@ static void checkEvent(const streamEvent_t *event, bool reported, int count) {
   CHECK(reported == (event->edge != 0) && event->edge <= 2 && event->airborne <= 1, "an edge is none, entry or exit");
   CHECK(event->ready == (count % airtouchStream.stride == 0), "the network runs on every stride-th sample");
   CHECK(!event->edge || (event->airborne && event->ready), "an edge comes in the air, from new logits");
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < EDGE_DECODER_LOGITS; i++) {
     const double steps = event->logits[i] / (double)scale->outputScale + scale->outputZeroPoint;
     CHECK(fabs(steps - rint(steps)) < 1e-3 && steps > -128.5 && steps < 127.5, "a logit is an int8 of the network");
   }

@@ -11,17 +11,21 @@ from airtouch.detector.best.recipe import CHANNELS, STRIDE, Recipe
 from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
-from airtouch.reference.motion_channels import MotionConfig
+from airtouch.reference.motion_channels import CHANNEL_TABLE, NAMES, MotionConfig
 
-#: Sign of each channel in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
-MIRROR = np.array([1, -1, 1, -1, 1, -1, -1, 1, -1, 1, 1, 1], dtype=np.float32)
+#: Sign of each column in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
+MIRROR = np.array([*(channel.mirror for channel in CHANNEL_TABLE), 1], dtype=np.float32)
+FORWARD, LEFT, EMPTY = (NAMES.index(name) for name in ("ax", "ay", "zero"))
 AHEAD, BEHIND = 300, 150  #: samples before take-off where a crop may start, and after the last one where it may end
 
 
 @dataclass(frozen=True)
 class Flight:
-    """One training flight: x (n, 12) channels, goals (n, 3), edges (k,) samples, airborne (n,), how often it is drawn,
-    and silent: channels of sensors that it lacks, which stay exactly 0."""
+    """One training flight of n samples.
+
+    x: (n, channels). goals: (n, outputs). edges: (k,) samples. airborne: (n,) bool. weight: how often it is drawn
+    against the others. silent: channels of sensors that it lacks, which stay exactly 0.
+    """
 
     x: np.ndarray
     goals: np.ndarray
@@ -32,7 +36,7 @@ class Flight:
 
 
 def channels_of(log: FlightLog, motion: MotionConfig | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Motion channels (n, 12) and airborne (n,) of a log; those of a missing sensor are 0.
+    """Motion channels (n, channels) and airborne (n,) of a log; those of a missing sensor are 0.
 
     Raises AirTouchError, naming columns, where more than one sensor is missing.
     """
@@ -57,7 +61,7 @@ def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None 
 
 def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
           free_air: Sequence[Flight] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """Inputs (batch, crop, 12) float32 and goals (batch, crop / 2, 3) float32.
+    """Inputs (batch, crop, channels) and goals (batch, crop / stride, outputs), float32.
 
     free_air: flights without edges, the source of `recipe.free_air_share` of the crops.
     """
@@ -77,9 +81,9 @@ def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
 
 
 def _silent(recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
-    """(batch, 12) bool: channels held at 0 in each crop, one sensor's at most beside the muted ones."""
+    """(batch, channels) bool: channels held at 0 in each crop, one sensor's at most beside the muted ones."""
     silent = np.zeros((recipe.batch, CHANNELS), bool)
-    silent[:, [*recipe.muted, CHANNELS - 1]] = True
+    silent[:, [*recipe.muted, EMPTY]] = True
     draw = rng.random(recipe.batch)
     shares = {sensors.ACCELERATION: recipe.silent_acceleration, sensors.RATES: recipe.silent_rates,
               sensors.MOTORS: recipe.silent_motors}
@@ -124,8 +128,9 @@ def _augment(x: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndar
     b, n, _ = x.shape
     x *= np.where(rng.random((b, 1, 1)) < recipe.mirror, MIRROR, np.float32(1.0))
     angle = np.radians(recipe.yaw_deg) * rng.uniform(-1, 1, (b, 1))
-    ax, ay = x[..., 0].copy(), x[..., 1].copy()
-    x[..., 0], x[..., 1] = np.cos(angle) * ax - np.sin(angle) * ay, np.sin(angle) * ax + np.cos(angle) * ay
+    ax, ay = x[..., FORWARD].copy(), x[..., LEFT].copy()
+    x[..., FORWARD] = np.cos(angle) * ax - np.sin(angle) * ay
+    x[..., LEFT] = np.sin(angle) * ax + np.cos(angle) * ay
     gain = rng.standard_normal((b, 1, 1)) + rng.standard_normal((b, 1, CHANNELS))
     x *= np.exp(recipe.gain * gain).astype(np.float32)
     x += (recipe.offset * rng.standard_normal((b, 1, CHANNELS))).astype(np.float32)

@@ -29,7 +29,7 @@ def render(model: BestModel) -> dict[str, str]:
 
 
 def golden_flight(network: StreamNetwork) -> tuple[np.ndarray, np.ndarray]:
-    """int8 samples (GOLDEN, 12) of made-up smooth channels and NumPy's rows (GOLDEN / stride, 3)."""
+    """int8 samples (GOLDEN, channels) of made-up smooth channels and NumPy's rows (GOLDEN / stride, outputs)."""
     walk = np.random.default_rng(0).normal(scale=0.3, size=(GOLDEN, network.channels)).cumsum(axis=0)
     first = network.layers[0]
     inputs = quantise(4.0 * np.sin(walk), first.input_scale, first.input_zero_point)

@@ -14,7 +14,7 @@ FEW = 5  #: windows of a flight
 
 
 def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESENTATIVE) -> np.ndarray:
-    """Windows (count, receptive samples, 12), evenly spaced over the flights' channels [(n, 12), ...].
+    """Windows (count, receptive samples, channels), evenly spaced over the flights' channels [(n, channels), ...].
 
     Where there are few of each flight none is at its ends, which lie on the ground.
     """

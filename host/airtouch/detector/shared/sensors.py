@@ -8,12 +8,12 @@ import numpy as np
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
-from airtouch.reference.motion_channels import MotionConfig
+from airtouch.reference.motion_channels import ACCELERATION, CHANNEL_TABLE, MOTORS, RATES, MotionConfig
 
-ACCELERATION, RATES, MOTORS = "acceleration", "rates", "motors"
 SENSORS = (ACCELERATION, RATES, MOTORS)
-#: motion channels that need each sensor (`reference.motion_channels.NAMES`)
-CHANNELS_OF = {ACCELERATION: (0, 1, 2, 10), RATES: (3, 4, 5), MOTORS: (6, 7, 8, 9, 10)}
+#: motion channels that need each sensor, as indices of `reference.motion_channels.CHANNEL_TABLE`
+CHANNELS_OF = {sensor: tuple(i for i, channel in enumerate(CHANNEL_TABLE) if sensor in channel.sensors)
+               for sensor in SENSORS}
 
 GRAVITY_MPS2 = 9.81  #: what a missing acceleration reads: rest
 FLYING_PWM = 40000.0  #: what missing motors read in the air; their channels are silent, so only "in the air" counts
