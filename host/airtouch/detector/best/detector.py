@@ -1,4 +1,4 @@
-"""The `best` detector: a small causal network over twelve motion channels, in streaming form.
+"""The `best` detector: a small causal network that runs on a stream of motion channels.
 
 One step a sample in C (`firmware/kernels/stream_detector.h`): motion channels, int8 network
 (`gap8/kernels/stream_int8.h`), decoder. Nothing waits for a window to fill.
@@ -16,7 +16,7 @@ import numpy as np
 from airtouch import __version__, kernels, logs
 from airtouch.detector.best import model as model_file
 from airtouch.detector.best import sensor_note
-from airtouch.detector.best.batches import channels_of, flight_of
+from airtouch.detector.best.batches import Flight, channels_of, flight_of
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.network import float_logits
 from airtouch.detector.best.recipe import STRIDE, Recipe
@@ -124,7 +124,7 @@ def fit(
     from airtouch.detector.best import quantisation, training
     from airtouch.detector.shared.tensorflow import use_tensorflow
 
-    told = progress or (lambda *_: None)
+    report = progress or (lambda *_: None)
     labels = list(pseudo_labels) if pseudo_labels is not None else [None] * len(flights)
     if len(labels) != len(flights):
         raise AirTouchError(f"training: {len(labels)} pseudo-labels for {len(flights)} flights; give one a flight")
@@ -140,27 +140,33 @@ def fit(
     if start is not None and start.recipe.graph != recipe.graph:
         raise AirTouchError("training: the model to start from has another shape; leave width, taps and dilations "
                             "alone")
-    prepared = []
-    for i, (log, edges) in enumerate(zip(flights, labels, strict=True)):
-        prepared.append(flight_of(log, recipe, edges))
-        told("features", i + 1, len(flights), os.path.basename(log.source))
-    if emphasis is not None:
-        prepared = [replace(f, weight=f.weight * share) for f, share in zip(prepared, emphasis, strict=True)]
-    if not sum(len(f.edges) for f in prepared):
-        raise AirTouchError("training: the flights hold no edges; give flights over a platform, with down range")
-    weights = training.fit(prepared, recipe, seed, lambda done, total, note: told("steps", done, total, note),
+    examples = _examples(flights, labels, emphasis, recipe, report)
+    weights = training.fit(examples, recipe, seed, lambda done, total, note: report("steps", done, total, note),
                            free_air=[flight_of(log, recipe, ()) for log in free_air],
                            start=start.weights if start else None,
-                           kept=_kept(work, flights, free_air, [labels, emphasis], recipe, seed, start))
-    int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in prepared], recipe))
-    settings = _decoders(decoder, start)
+                           resume=_resume_file(work, flights, free_air, [labels, emphasis], recipe, seed, start))
+    int8, tflite = quantisation.quantise(weights, recipe, quantisation.windows([f.x for f in examples], recipe))
     model = BestModel(recipe, weights, int8, tflite, {
         "detector": "best", "version": __version__, "command": command, "seed": seed, "lag_s": 0.0,
-        "sigma_s": TIMING_SIGMA_S, **settings, **training_set.of(flights, start),
+        "sigma_s": TIMING_SIGMA_S, **_decoders(decoder, start), **training_set.of(flights, start),
         "free_air": len(free_air)})
-    found = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
+    pairs = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
              for log, edges in zip(flights, labels, strict=True)]
-    return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(found)})
+    return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(pairs)})
+
+
+def _examples(flights: Sequence[FlightLog], labels: Sequence[Sequence[logs.Edge] | None],
+              emphasis: Sequence[float] | None, recipe: Recipe, report: Progress) -> list[Flight]:
+    """The flights as the trainer takes them; AirTouchError where none has an edge."""
+    examples = []
+    for i, (log, edges) in enumerate(zip(flights, labels, strict=True)):
+        examples.append(flight_of(log, recipe, edges))
+        report("features", i + 1, len(flights), os.path.basename(log.source))
+    if emphasis is not None:
+        examples = [replace(f, weight=f.weight * share) for f, share in zip(examples, emphasis, strict=True)]
+    if not sum(len(f.edges) for f in examples):
+        raise AirTouchError("training: the flights hold no edges; give flights over a platform, with down range")
+    return examples
 
 
 def pseudo_labels(flights: Sequence[FlightLog], model: BestModel) -> list[list[logs.Edge] | None]:
@@ -174,15 +180,15 @@ def pseudo_labels(flights: Sequence[FlightLog], model: BestModel) -> list[list[l
             for log in flights]
 
 
-def _kept(work: Path | None, flights: Sequence[FlightLog], free_air: Sequence[FlightLog], labels: Sequence[Any],
-          recipe: Recipe, seed: int, start: BestModel | None) -> Path | None:
-    """The file of a training with these arguments, None without a folder."""
+def _resume_file(work: Path | None, flights: Sequence[FlightLog], free_air: Sequence[FlightLog], labels: Sequence[Any],
+                 recipe: Recipe, seed: int, start: BestModel | None) -> Path | None:
+    """The file that keeps the state of a training with these arguments; None without a folder."""
     if work is None:
         return None
     work.mkdir(parents=True, exist_ok=True)
-    said = [repr(recipe), str(seed), repr(labels), *(training_set.flight_hash(f) for f in (*flights, *free_air))]
+    parts = [repr(recipe), str(seed), repr(labels), *(training_set.flight_hash(f) for f in (*flights, *free_air))]
     weights = b"" if start is None else b"".join(np.ascontiguousarray(v).tobytes() for v in start.weights.values())
-    return work / f"training_{hashlib.sha256('|'.join(said).encode() + weights).hexdigest()[:16]}.npz"
+    return work / f"training_{hashlib.sha256('|'.join(parts).encode() + weights).hexdigest()[:16]}.npz"
 
 
 def _decoders(decoder: DecoderConfig | None, start: BestModel | None) -> dict[str, Any]:

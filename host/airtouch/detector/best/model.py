@@ -1,4 +1,8 @@
-"""A trained streaming network as one file: float and int8 weights, decoder settings, how it came about."""
+"""A trained model of `best` as one `.npz` file: float and int8 weights, decoder settings, how it came about.
+
+Arrays: "<layer>.kernel" and "<layer>.bias" float32; "int8.<layer>.weights", ".bias", ".weight_scale", ".scale" and
+".zero_point" (input, output); "tflite"; "metadata" (JSON, UTF-8). Nothing in the file is ever executed.
+"""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -21,20 +25,24 @@ from airtouch.reference.stream_int8 import StreamNetwork
 
 FORMAT = 1
 SHIPPED = "best.npz"
-#: the shipped models for logs that lack a sensor
+#: sensor -> shipped model for logs that lack it
 SPARES = {"acceleration": "best_without_acceleration.npz"}
 KIND = {"format": FORMAT, "network": "stream"}
 _INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
-#: what a model's file means that does not say so, because it is older
+#: settings of files written before these fields existed
 _BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air_share": 0.0}
+#: smallest and largest value of a setting that the C kernels run
 _LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
 
 
 @dataclass(frozen=True)
 class BestModel:
-    """weights: float32 arrays (`network.weight_shapes`); int8: what flies; tflite: the same over one window;
-    metadata: plain JSON: decoder, lag_s, flights, seed, command, ...; spares: models for logs that lack a sensor, by
-    its name, in files of their own."""
+    """A trained model of `best`.
+
+    weights: float32 arrays by name (`network.weight_shapes`). int8: the network that flies. tflite: the same network
+    over one window, as a TFLite file. metadata: plain JSON: decoder, lag_s, flights, seed, command, ... spares: models
+    for logs that lack a sensor, by the sensor's name; each has a file of its own.
+    """
 
     recipe: Recipe
     weights: dict[str, np.ndarray]

@@ -1,4 +1,4 @@
-"""Shape of the streaming network and how it is trained."""
+"""The recipe of `best`: the shape of its network, as a list of layers, and every number of its training."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,49 +13,46 @@ STRIDE = 2  #: samples between two rows that are computed: 50 Hz
 
 @dataclass(frozen=True)
 class Recipe:
-    """Everything that a trained network follows from, beside flights and seed.
+    """The settings of a trained network: with the flights and the seed they give its bits.
 
-    width: channels of each layer. dilations: rows between the taps of each layer after the first.
-    sparsity: share of zero blocks of four in those layers. delay: samples after an edge at which the
-    event logits are to peak, spread over event_sigma; the over logit is to change over_delay after it.
-    The rest: learning (steps, batch, crop in samples of which warm_up are not scored, one-cycle peak,
-    weight decay, loss weights), channels that are muted (held at 0, for ablations) and augmentation (share of crops
-    around an edge, flights of the rare heights drawn `balance` times as often, gains, offsets and noise in usual
-    swings, yaw in degrees, time warp, share mirrored left to right). silent_acceleration, silent_rates, silent_motors:
-    shares of the crops in which that sensor's channels are held at 0, so that one network also runs without it; a
-    sensor that no training flight has is always silent. phases: share of the crops that hold take-off or landing.
-    free_air_share: share of the crops from flights without edges, where there are such.
+    Samples are those of a 100 Hz log. A crop is a piece of a flight, one row of a training batch.
     """
 
-    width: int = 24
-    first_taps: int = 4
-    taps: int = 3
-    dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 32)
-    sparsity: float = 0.5
-    steps: int = 2000
-    batch: int = 16
-    crop: int = 1024
-    warm_up: int = 256
-    peak_rate: float = 4e-3
-    weight_decay: float = 1e-4
-    delay: int = 10
-    over_delay: int = 4
-    event_sigma: float = 6.0
-    event_weight: float = 3.0
-    muted: tuple[int, ...] = ()
-    edge_share: float = 0.6
-    balance: float = 3.0
-    gain: float = 0.15
-    noise: float = 0.05
-    offset: float = 0.1
-    yaw_deg: float = 20.0
-    warp: float = 0.08
-    mirror: float = 0.5
-    silent_acceleration: float = 0.15
-    silent_rates: float = 0.05
-    silent_motors: float = 0.1
-    phases: float = 0.15
-    free_air_share: float = 0.2
+    # Shape
+    width: int = 24  #: values of a row of each layer but the last
+    first_taps: int = 4  #: samples that the first layer reads
+    taps: int = 3  #: rows that each later layer reads
+    dilations: tuple[int, ...] = (1, 2, 4, 8, 16, 32)  #: rows between the taps of each layer after the first
+    sparsity: float = 0.5  #: share of the blocks of four weights that are zero, in the layers after the first
+    # Learning
+    steps: int = 2000  #: batches
+    batch: int = 16  #: crops of a batch
+    crop: int = 1024  #: samples of a crop
+    warm_up: int = 256  #: samples at the start of a crop that have no part in the loss
+    peak_rate: float = 4e-3  #: learning rate at the top of the one cycle
+    weight_decay: float = 1e-4  #: of AdamW
+    # Goals (outputs.py)
+    delay: int = 10  #: samples from an edge to the peak of its event's goal
+    over_delay: int = 4  #: samples from an edge to the change of the goal of "over"
+    event_sigma: float = 6.0  #: width of an event's goal, samples
+    event_weight: float = 3.0  #: weight of an event's loss against that of "over"
+    muted: tuple[int, ...] = ()  #: channels that are always 0, for ablations
+    # Choice of crops (batches.py)
+    edge_share: float = 0.6  #: share of the crops that lie around an edge
+    balance: float = 3.0  #: how often flights with edges of 4 cm or more are drawn against the others
+    # Augmentation
+    gain: float = 0.15  #: standard deviation of the logarithm of a gain that all channels share, and of each one's own
+    noise: float = 0.05  #: standard deviation of white noise, in usual swings of a channel
+    offset: float = 0.1  #: standard deviation of a constant offset, in usual swings of a channel
+    yaw_deg: float = 20.0  #: largest turn about the vertical, degrees
+    warp: float = 0.08  #: largest stretch of time, share
+    mirror: float = 0.5  #: share of the crops that are mirrored left to right
+    # Missing sensors, phases and free air
+    silent_acceleration: float = 0.15  #: share of the crops without acceleration, so that the network runs without it
+    silent_rates: float = 0.05  #: share of the crops without rates
+    silent_motors: float = 0.1  #: share of the crops without motors
+    phases: float = 0.15  #: share of the crops that hold take-off or landing
+    free_air_share: float = 0.2  #: share of the crops from flights without edges, where there are such
 
     @property
     def graph(self) -> tuple[StreamLayer, ...]:

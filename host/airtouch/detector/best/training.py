@@ -1,4 +1,4 @@
-"""Training the streaming network: long crops, one cycle, three goals, pruning on the way."""
+"""Training the network of `best`: long crops, one cycle of the learning rate, pruning on the way."""
 
 import io
 import json
@@ -16,9 +16,9 @@ from airtouch.detector.shared.pruning import BLOCK, keep_mask, polynomial_sparsi
 from airtouch.logs.files import write_bytes
 
 PRUNE_FROM, PRUNE_TO = 0.3, 0.75  #: shares of the steps between which the zeros grow
-KEEP_EVERY = 100  #: steps between two states that are kept
+KEEP_EVERY = 100  #: steps between two saved states
 RANK_EVERY = 20  #: steps between two rankings of the weights
-#: fields of a recipe that a compiled step of learning follows from; the others are of crops and pruning
+#: fields of a recipe that the compiled training step depends on; the others are of crops and pruning
 COMPILED = ("width", "first_taps", "taps", "dilations", "warm_up", "steps", "peak_rate", "weight_decay", "event_weight")
 
 Weights = dict[str, np.ndarray]
@@ -26,12 +26,12 @@ Weights = dict[str, np.ndarray]
 
 def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
         progress: Callable[[int, int, str], None] = lambda *_: None, *,
-        free_air: Sequence[Flight] = (), start: Weights | None = None, kept: Path | None = None) -> Weights:
+        free_air: Sequence[Flight] = (), start: Weights | None = None, resume: Path | None = None) -> Weights:
     """Float weights (`network.weight_shapes`) trained on the flights; same arguments, same bits.
 
     free_air: flights without edges. start: weights to go on from; their zeros stay, and nothing more is pruned.
-    kept: file in which the state is kept every KEEP_EVERY steps; a call with the same arguments goes on from there,
-    to the same bits. It is removed at the end.
+    resume: file that holds the state, written every KEEP_EVERY steps; a call with the same arguments goes on from
+    there, to the same bits. It is removed at the end.
     Call `shared.tensorflow.use_tensorflow(seed)` before.
     """
     import tensorflow as tf
@@ -45,25 +45,25 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
 
     losses, last_rank = [], int(np.ceil(PRUNE_TO * recipe.steps))
     state = [*model.trainable_variables, *optimizer.variables, *masks]
-    first = _go_on(kept, state, rng) if kept else 0
+    first = _resumed(resume, state, rng) if resume else 0
     for step in range(first, recipe.steps):
         losses.append(float(learn(*map(tf.constant, batch(flights, recipe, rng, free_air)))))
         if start is None and (step % RANK_EVERY == 0 or step == last_rank):
             _rank(model, masks, recipe, step / recipe.steps)
-        if kept and (step + 1) % KEEP_EVERY == 0:
-            _keep(kept, state, rng, step + 1)
+        if resume and (step + 1) % KEEP_EVERY == 0:
+            _save_state(resume, state, rng, step + 1)
         if (step + 1) % 50 == 0:
             progress(step + 1, recipe.steps, f"loss {np.mean(losses[-50:]):.3f}")
     for variable, mask in zip(model.trainable_variables, masks, strict=True):
         variable.assign(variable * mask)
-    if kept:
-        kept.unlink(missing_ok=True)
+    if resume:
+        resume.unlink(missing_ok=True)
     shapes = weight_shapes(recipe.graph)  # the head's kernel has a tap for each layer that it reads
     return {name: v.numpy().reshape(shapes[name]) for name, v in zip(names, model.trainable_variables, strict=True)}
 
 
 def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
-    """(model with these weights, optimizer, masks, learn(x, y) -> loss), as if nothing had been learnt yet."""
+    """(model with these weights, optimizer, masks, learn(x, y) -> loss), before the first step."""
     model, optimizer, untouched, masks, learn = _compiled(Recipe(**{name: getattr(recipe, name) for name in COMPILED}))
     model.set_weights(weights)
     for variable, value in zip(optimizer.variables, untouched, strict=True):
@@ -105,16 +105,16 @@ def _compiled(recipe: Recipe) -> tuple:
     return model, optimizer, [v.numpy() for v in optimizer.variables], masks, learn
 
 
-def _keep(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
-    """Write where the training stands, whole or not at all."""
+def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
+    """Write the state of the training, whole or not at all."""
     arrays = {f"v{i}": np.asarray(v) for i, v in enumerate(state)}
     made = io.BytesIO()
     np.savez(made, step=step, rng=json.dumps(rng.bit_generator.state), **arrays)
     write_bytes(made.getvalue(), path, force=True)
 
 
-def _go_on(path: Path, state: Sequence, rng: np.random.Generator) -> int:
-    """Set variables and random numbers to what was kept; the step to go on with, 0 where nothing was."""
+def _resumed(path: Path, state: Sequence, rng: np.random.Generator) -> int:
+    """Set variables and random numbers to the saved state; the next step, 0 without a saved state."""
     if not path.is_file():
         return 0
     with np.load(path) as kept:
