@@ -40,9 +40,14 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
     assert found.shrink.value > 0.8
     assert abs(found.control["shrink"]["value"]) < 0.2
+    (switch_on,) = [step.command for step in found.next if "magnet" in step.text]
+    assert "magnet.py --effect magnet:force=" in switch_on  # without its file the command would be refused
     left_out = brief(found.held[0], list(measure.usable(real, vehicle, [])), ("magnet",))  # the same calibration
     assert "magnet" not in [r.name for r in left_out.ranking]
     assert left_out.gap["after"] > found.gap["after"]
+    unknown, nearest, *_ = left_out.ranking
+    assert left_out.verdict == unknown.name == "unknown" and unknown.shrink.value == 0.0  # as nothing is named
+    assert re.match(r"a model without names gains \d+ nats beside it, up to \d+ may be left", nearest.why)
 
 
 STIFF = '''"""A height loop tuned otherwise: nothing of it is in what the logged commands lead to expect."""

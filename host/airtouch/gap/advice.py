@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from airtouch.gap import candidates
 from airtouch.gap.flight import Flight
 from airtouch.gap.result import Cell, Found, Step
-from airtouch.simulation.effects import EFFECTS
+from airtouch.simulation.effects import EFFECTS, source_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"
@@ -59,7 +59,8 @@ def switched_on(effects: Sequence[Found], vehicle: str) -> str:
     for e in effects:
         given = [f"{k}={_value(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
                  for k, q in e.parameters.items()]
-        words += ["--effect", e.name + (":" + ",".join(given) if given else "")]
+        words += [*(("--effect-file", file) if (file := source_of(e.name)) else ()),
+                  "--effect", e.name + (":" + ",".join(given) if given else "")]
     return shlex.join(words)
 
 

@@ -241,7 +241,7 @@ def _ranking(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranke
     for name, p in chance.items():
         one = selection.singles.get(name)
         share = Quantity(0.0)
-        if name == answer and selection.chosen is not None and len(selection.named) == 1:
+        if name == answer and effects and len(selection.named) == 1:
             share = overall.share
         elif one is not None and one.full and one.gain > FIRST_GAIN:
             share = shrink_of(data, parts, one, cells).share

@@ -51,22 +51,25 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
 
 
 def nearest(selection: Selection) -> list[dict[str, str]]:
-    """The effects that gain most and were not named, each with what speaks against it."""
-    named = {t.name for t in selection.chosen.terms} if selection.chosen else set()
-    others = sorted((j for n, j in selection.singles.items() if n not in named and j.gain > 0.0), key=lambda j: -j.gain)
-    return [{"name": j.name, "fails": fails(selection, j)} for j in others[:NEAREST]]
+    """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
+    most = sorted((j for j in selection.singles.values() if j.gain > 0.0), key=lambda j: -j.gain)
+    return [{"name": j.name, "fails": fails(selection, j)} for j in most[:NEAREST]]
 
 
 def fails(selection: Selection, judged: Judged) -> str:
-    """Why a candidate was not named, in nats of held-out log likelihood."""
+    """Why a candidate is not the answer, in nats of held-out log likelihood."""
     least = selection.least[judged.name]
+    if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
+        return (f"a model without names gains {selection.free_after:.0f} nats beside it, up to {selection.allowed:.0f} "
+                "may be left")
     if judged.gain < least:
         return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
     if judged.evidence < least:
         return (f"as strong as it often seems to be in nominal flights: {judged.gain:.0f} nats, of which "
                 f"{max(judged.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
     if selection.chosen:
-        return f"gains {judged.gain:.0f} nats, the effects named {selection.chosen.gain:.0f}"
+        return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
+                f"{selection.chosen.gain:.0f}")
     return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
 
 

@@ -16,7 +16,7 @@ from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
 __all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_file", "load_text", "parse",
            "register",
-           "unregister", "wrench"]
+           "source_of", "unregister", "wrench"]
 
 NAMES = (
     "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise",
@@ -40,6 +40,7 @@ def unregister(name: str) -> None:
     """Take an effect out (the diagnosis is tested on effects that it does not know)."""
     get(name)
     del EFFECTS[name]
+    _SOURCE.pop(name, None)
     for key in [k for k, found in _LOADED.items() if any(e.name == name for e in found)]:
         del _LOADED[key]
 
@@ -107,7 +108,9 @@ def load_file(path: str | Path) -> list[Effect]:
     """Register every `Effect` that a Python file defines at its top level, and return them."""
     if not Path(path).is_file():
         raise AirTouchError(f"{path}: no such file of effects")
-    return load_text(Path(path).read_text(encoding="utf-8"), str(path))
+    found = load_text(Path(path).read_text(encoding="utf-8"), str(path))
+    _SOURCE.update(dict.fromkeys((e.name for e in found), str(path)))
+    return found
 
 
 def load_text(text: str, source: str = "effect file") -> list[Effect]:
@@ -131,6 +134,11 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
     return _LOADED[key]
 
 
+def source_of(name: str) -> str:
+    """The file that an effect of a user's own was loaded from, "" for one of the package."""
+    return _SOURCE.get(name, "")
+
+
 def _line_of(error: Exception, source: str) -> str:
     """`:12`, the line of the file in which an error was raised, "" where it is not known."""
     if isinstance(error, SyntaxError):
@@ -140,3 +148,4 @@ def _line_of(error: Exception, source: str) -> str:
 
 
 _LOADED: dict[int, list[Effect]] = {}
+_SOURCE: dict[str, str] = {}
