@@ -68,3 +68,29 @@ def test_tables_and_lists_stand_apart_for_the_site(page):
         if above.strip() and not above.startswith(("#", "<!--")):
             assert not line.startswith("|") or above.startswith("|"), line
             assert not re.match(r"(- |1\. )", line) or re.match(r"(- |\d+\. |  )", above), line
+
+
+#: pages that tell a newcomer which files to open
+MAPS = ("architecture", "add-an-effect", "unknown", "port")
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_files_and_names_that_a_page_sends_to_are_there(name):
+    text = (DOCS / f"{name}.md").read_text("utf-8")
+    paths = re.findall(r"`((?:[\w-]+/)+[\w.-]*)`", text)
+    assert len(paths) >= 3
+    for path in paths:
+        assert any((root / path).exists() for root in (ROOT, ROOT / "host/airtouch")), path
+    for path, names in re.findall(r"`((?:[\w-]+/)+\w+\.py)`(?: \||:) ((?:`\w+`(?:, )?)+)", text):
+        source = next(root / path for root in (ROOT, ROOT / "host/airtouch") if (root / path).exists()).read_text("utf-8")
+        for wanted in re.findall(r"`(\w+)`", names):
+            assert re.search(rf"^(def |class |)?{wanted}\b|^[A-Z_, ]*\b{wanted}\b.* = ", source, re.M), (path, wanted)
+
+
+@pytest.mark.parametrize("name", MAPS[1:])
+def test_a_task_has_at_most_five_files_to_open_and_shows_a_command(name):
+    text = (DOCS / f"{name}.md").read_text("utf-8")
+    assert text.splitlines()[1].startswith("After this page ")
+    rows = re.search(r"^\| file \| .*\n\|[-|]*\n((?:\|.*\n)+)", text, re.M)
+    assert rows and 1 <= len(rows.group(1).splitlines()) <= 5
+    assert text.count("```") >= 4  # a command and what it prints

@@ -1,4 +1,4 @@
-"""Errors by height, approach angle and wind (labels Performance:1d and 1e, section 7.6)."""
+"""Errors by height, approach angle and wind (labels Performance:1d and 1e, section 7.7)."""
 
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore

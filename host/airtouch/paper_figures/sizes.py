@@ -1,4 +1,4 @@
-"""Sizes, speed and accuracy after pruning and int8 (section 7.5)."""
+"""Sizes, speed and accuracy after pruning and int8 (section 7.6)."""
 
 import time
 from typing import Any

@@ -22,7 +22,7 @@ class Camera:
     efficiency: float = 0.4  #: electrons a photon, lens and fill factor included; assumed
     full_well_e: float = 5000.0  #: assumed
     read_noise_e: float = 8.0  #: rms, assumed
-    frame_hz: float = 6.0  #: what the AI-deck sends (the paper, section 7.7)
+    frame_hz: float = 6.0  #: what the AI-deck sends (the paper, section 7.8)
     longest_s: float = 1.0 / 30.0  #: exposure, of a sensor that runs at 30 frames a second; assumed
     target: float = 0.3  #: share of the full well that the exposure control aims at; assumed
 

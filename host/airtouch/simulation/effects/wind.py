@@ -25,7 +25,7 @@ def wind(p, s, memory, stream, out):
 
 EFFECT = Effect(
     "wind", "steady wind, through the rotors' horizontal drag",
-    (Parameter("x", "m/s", 0.3, -10.0, 10.0, 0.0, "towards world x", "paper, section 7.6: 0 to 0.3 m/s"),
+    (Parameter("x", "m/s", 0.3, -10.0, 10.0, 0.0, "towards world x", "paper, section 7.7: 0 to 0.3 m/s"),
      Parameter("y", "m/s", 0.0, -10.0, 10.0, 0.0, "towards world y"),
      Parameter("z", "m/s", 0.0, -10.0, 10.0, 0.0, "upwards"),
      Parameter("drag", "N s/m", 0.0147, 0.0, 2.0, None, "horizontal drag at hover", "drone-models"),
