@@ -82,7 +82,8 @@ def test_files_and_names_that_a_page_sends_to_are_there(name):
     for path in paths:
         assert any((root / path).exists() for root in (ROOT, ROOT / "host/airtouch")), path
     for path, names in re.findall(r"`((?:[\w-]+/)+\w+\.py)`(?: \||:) ((?:`\w+`(?:, )?)+)", text):
-        source = next(root / path for root in (ROOT, ROOT / "host/airtouch") if (root / path).exists()).read_text("utf-8")
+        file = next(root / path for root in (ROOT, ROOT / "host/airtouch") if (root / path).exists())
+        source = file.read_text("utf-8")
         for wanted in re.findall(r"`(\w+)`", names):
             assert re.search(rf"^(def |class |)?{wanted}\b|^[A-Z_, ]*\b{wanted}\b.* = ", source, re.M), (path, wanted)
 
