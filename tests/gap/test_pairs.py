@@ -1,10 +1,15 @@
-"""Two effects in one flight: both are found beside each other."""
+"""What is named beside what: two effects of one flight, and effects of the loop that close next to nothing."""
+
+from dataclasses import replace
 
 import pytest
 
+from airtouch.gap import diagnose
 from airtouch.gap.candidates import every
 from airtouch.gap.data import Data
+from airtouch.gap.result import Quantity
 from airtouch.gap.select import select
+from airtouch.gap.shrink import Shrink
 from gap_flights import flown
 
 
@@ -20,3 +25,14 @@ def test_both_effects_are_named_and_nothing_else(study, effects):
     alike = {"mass": "thrust_coefficient"}  # one thing in these logs
     assert {alike.get(s.name, s.name) for s in chosen.named} == set(effects)
     assert chosen.free_after < chosen.allowed
+
+
+@pytest.mark.parametrize("closes", [True, False])
+def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(study, monkeypatch, closes):
+    """It is named with the share of the gap that it takes away; with less than the loop model's error it is not."""
+    recorded = replace(study, scatter=replace(study.scatter, exact=False))
+    if not closes:
+        monkeypatch.setattr(diagnose, "shrink_of", lambda *_: Shrink(1.4, 1.36, Quantity(0.1)))
+    found = diagnose.brief(recorded, flown(1, 93, {"actuator_delay": {"delay": 0.005}}))
+    assert [e.name for e in found.effects] == (["actuator_delay"] if closes else [])
+    assert (found.verdict == "effect") == closes

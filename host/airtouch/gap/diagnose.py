@@ -15,9 +15,9 @@ from airtouch.gap.fit import Fit, fit, judge, strength_variance
 from airtouch.gap.flight import Flight
 from airtouch.gap.gap_map import gap_map, where
 from airtouch.gap.judging import FIRST_GAIN, halves
-from airtouch.gap.problem import Part, whole_of
+from airtouch.gap.problem import LOOP, Part, whole_of
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
-from airtouch.gap.select import select
+from airtouch.gap.select import LOOP_SHARE, select
 from airtouch.gap.selection import Judged, Selection, probabilities
 from airtouch.gap.shrink import Cells, Shrink, cells_of, shrink_of
 from airtouch.gap.spectra import AIR
@@ -65,9 +65,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
             else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
     data = _data(study, some)
-    selection = select(data, candidates.every(without), say, without)
+    selection, gap_cells = _selected(data, without, say)
     say("how far")
-    gap_cells = cells_of(data, selection.parts, selection.chosen)
     ranking, overall, verdict, effects = _ranking(data, selection, gap_cells)
     named = [candidates.term_of(e) for e in effects]
     made = gap_map(study, seen, nominal, named)
@@ -100,8 +99,7 @@ def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), 
     data: of an earlier call with the same flights, whose spectra are used again. Raises as `diagnose`.
     """
     data = _data(study, flights) if data is None else data
-    selection = select(data, candidates.every(without), without=tuple(without))
-    gap_cells = cells_of(data, selection.parts, selection.chosen)
+    selection, gap_cells = _selected(data, tuple(without))
     ranking, overall, verdict, effects = _ranking(data, selection, gap_cells)
     named = verdict == "effect"
     return Diagnosis(
@@ -118,6 +116,30 @@ def _data(study: Study, flights: Sequence[Flight]) -> Data:
         raise AirTouchError(f"{flights[0].name}: too short to be judged on other data than it is fitted on; at least "
                             "5 s in the air without a hole are needed")
     return data
+
+
+def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = lambda _: None,
+              ) -> tuple[Selection, Cells]:
+    """What is chosen among the candidates, and the cells in which the gap is measured.
+
+    In recorded flights an effect of the loop must take away as much of the gap as the loop model may be wrong by: the
+    gains of two days differ a little, and that is not what a gap comes from.
+    """
+    selection = select(data, candidates.every(without), say, without)
+    cells = cells_of(data, selection.parts, selection.chosen)
+    scatter = data.study.scatter
+    if scatter is not None and not scatter.exact and _of_the_loop(data, selection) \
+            and shrink_of(data, selection.parts, selection.chosen, cells).share.value < LOOP_SHARE:
+        selection = replace(selection, steps=(), free_after=selection.free_before, assumed=False)
+        cells = cells_of(data, selection.parts, None)
+    return selection, cells
+
+
+def _of_the_loop(data: Data, selection: Selection) -> bool:
+    """Whether one effect is named, and it is one of the control loop."""
+    law, one = data.study.controller, len(selection.named) == 1
+    terms = [t for t in selection.chosen.terms if t.kind == candidates.MEAN and not t.gate] if law and one else []
+    return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
 
 
 def _some(flights: Sequence[Flight]) -> list[Flight]:
