@@ -35,9 +35,12 @@ class Group:
 
 
 GROUPS = {
-    "reference": Group(("reference/*.py",), (
-        "reference", "kernels/test_equal_on_made_inputs.py", "kernels/test_network.py", "kernels/test_stream.py",
-        "app/test_floor_height.py")),
+    "reference": Group(tuple(f"reference/{name}.py" for name in (
+        "band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
+        "finite", "floor_height", "fr_cfar", "motion_channels")), ("reference",)),
+    "int8": Group(("reference/int8_network.py", "reference/stream_int8.py"), (
+        "reference/test_multiplications.py", "kernels/test_network.py", "kernels/test_stream.py",
+        "gap8/test_requantise.py")),
     "score": Group(("detector/score.py",), ("detector/test_score.py",)),
     "selection": Group(("gap/select.py", "gap/judging.py"), ("gap/test_select.py",)),
 }
