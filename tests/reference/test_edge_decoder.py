@@ -130,3 +130,12 @@ def test_logits_that_are_no_number_say_no():
     with_exit[20, 2] = -4.1
     assert edges(with_exit) == [(12, 1)]
     assert edges(np.zeros((0, 3))) == []
+
+
+def test_logits_are_clamped_at_eight():
+    """An over logit of 100 counts as 8: half of it does not outweigh an entry logit of -5, nor one of -8 of -100."""
+    assert edges(logits(20, [(10, (100.0, -5.0, -9.0))])) == []
+    assert edges(logits(20, [(10, (100.0, -3.9, -9.0))])) == [(10, 1)]
+    high = DecoderConfig(0.5, 11.5, 0.0, 99.0, -99.0, arm_steps=5)
+    assert edges(logits(20, [(10, (8.0, 100.0, -9.0))]), high) == [(10, 1)]
+    assert edges(logits(20, [(10, (-100.0, 3.9, -9.0))])) == [] and edges(logits(20, [(10, (-100.0, 4.1, -9.0))]))
