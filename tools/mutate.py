@@ -41,7 +41,7 @@ GROUPS = {
     "int8": Group(("reference/int8_network.py", "reference/stream_int8.py"), (
         "reference/test_multiplications.py", "kernels/test_network.py", "kernels/test_stream.py",
         "gap8/test_requantise.py")),
-    "score": Group(("detector/score.py",), ("detector/test_score.py",)),
+    "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
     "selection": Group(("gap/select.py", "gap/judging.py"), ("gap/test_select.py",)),
 }
 #: mutmut's exit codes, by what they say
