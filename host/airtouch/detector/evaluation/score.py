@@ -136,7 +136,7 @@ def over_platform(edges: Sequence[TrueEdge] | Sequence[Detection], samples: int)
     over = np.zeros(samples, bool)
     if edges and edges[0].kind == "exit":
         over[: edges[0].sample] = True
-    state = bool(edges) and edges[0].kind == "exit"
+    state = False
     for edge in edges:
         state = not state if edge.kind == "edge" else edge.kind == "entry"
         over[edge.sample :] = state
