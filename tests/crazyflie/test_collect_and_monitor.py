@@ -15,7 +15,7 @@ from airtouch.crazyflie import blocks, collect, mission
 from airtouch.crazyflie.drone import Drone, drain
 from airtouch.crazyflie.guard import Guard
 from airtouch.errors import AirTouchError
-from airtouch.simulation import loop
+from airtouch.simulation import log_row
 from airtouch.sitl.variables import log_variables
 
 pytest.importorskip("cflib", reason="flying needs cflib")
@@ -69,7 +69,7 @@ def comes_to_rest(virtual):
     """Whether it stands with its motors off, now or within a second."""
     def rests():
         row = virtual.drone.row
-        return (row[loop.PLACE + 2] < 0.1 and not row[loop.PWM:loop.PWM + 4].any()
+        return (row[log_row.POSITION + 2] < 0.1 and not row[log_row.PWM:log_row.PWM + 4].any()
                 and not virtual.drone.info() >> 7 & 1)
 
     return virtual.clock.wait_for(rests, 1.0)
@@ -104,7 +104,7 @@ def test_a_second_collect_starts_where_the_first_did(serve, hop, cache, tmp_path
         for number in (1, 2):  # the first lands behind the platform
             shown = fly(virtual, hop, cache, tmp_path, "--number", str(number))
             assert shown.exit_code == 0, shown.output
-            assert comes_to_rest(virtual) and virtual.drone.row[loop.PLACE] > 1.5
+            assert comes_to_rest(virtual) and virtual.drone.row[log_row.POSITION] > 1.5
     kinds = [[e.kind for e in logs.true_edges(logs.read(tmp_path / f"hop_000{n}.csv.gz"))] for n in (1, 2)]
     assert kinds == [["entry", "exit"]] * 2
     assert [row.split(",")[1] for row in (tmp_path / "manifest.csv").read_text().splitlines()[1:]] == ["clean"] * 2
@@ -114,7 +114,7 @@ def test_a_killed_flight_in_mid_air_is_followed_by_one_from_the_ground(serve, ho
     with serve() as virtual:
         virtual.drone.commander.planner.command(bytes([7, 0]) + struct.pack("<ff?ff", 0.5, 0.0, True, 0.0, 1.0),
                                                 virtual.drone.now_s)
-        virtual.clock.wait_for(lambda: virtual.drone.row[loop.PLACE + 2] > 0.4, 5.0)
+        virtual.clock.wait_for(lambda: virtual.drone.row[log_row.POSITION + 2] > 0.4, 5.0)
         shown = fly(virtual, hop, cache, tmp_path)
         assert shown.exit_code == 0, shown.output
     log = logs.read(tmp_path / "hop_0001.csv.gz")

@@ -18,7 +18,7 @@ from airtouch.cli import airtouch
 from airtouch.crazyflie import blocks
 from airtouch.crazyflie.drone import Drone
 from airtouch.errors import AirTouchError
-from airtouch.simulation import loop
+from airtouch.simulation import log_row
 from airtouch.sitl import serve
 
 pytest.importorskip("cflib", reason="flying needs cflib")
@@ -42,13 +42,13 @@ def cache(tmp_path_factory):
 
 
 def height(virtual):
-    return virtual.drone.row[loop.PLACE + 2]
+    return virtual.drone.row[log_row.POSITION + 2]
 
 
 def on_the_ground(virtual):
     """Whether it stands with its motors off."""
     row = virtual.drone.row
-    return height(virtual) < 0.1 and not row[loop.PWM:loop.PWM + 4].any() and not virtual.drone.info() >> 7 & 1
+    return height(virtual) < 0.1 and not row[log_row.PWM:log_row.PWM + 4].any() and not virtual.drone.info() >> 7 & 1
 
 
 def start(virtual, hop, cache, out):

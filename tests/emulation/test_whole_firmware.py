@@ -142,7 +142,7 @@ def counts_of_flow(x, distance, top):
     drone["flow_noise"] = 0.0
     total = 0.0
     for _ in range(300):
-        state = plant.memory["state"]
+        state = plant.state["body"]["state"]
         state[:3] = x, 0.0, top + distance + float(drone["range_below_rotors"])
         state[3:6], state[6:10], state[10:13] = (0.3, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0
         plant.step(np.full(4, 40_000.0))

@@ -6,7 +6,7 @@ from scipy.signal import welch
 
 from airtouch.logs import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM
-from airtouch.simulation import flight, radio, scenario, sensors
+from airtouch.simulation import filters, flight, radio, scenario
 from airtouch.simulation.firmware import controller
 from airtouch.simulation.plant import from_vehicle
 
@@ -78,9 +78,9 @@ def test_vibration_folds_to_the_rotors_alias(steady):
 
 def test_latency_of_a_ring_is_exact_and_continuous():
     ring = np.arange(64.0)[:, None]
-    assert sensors.delayed(ring, 40, 0.0, 0) == 40.0
-    assert sensors.delayed(ring, 40, 7.25, 0) == pytest.approx(32.75)
-    assert sensors.delayed(ring, 2, 3.0, 0) == 63.0
+    assert filters.delayed(ring, 40, 0.0, 0) == 40.0
+    assert filters.delayed(ring, 40, 7.25, 0) == pytest.approx(32.75)
+    assert filters.delayed(ring, 2, 3.0, 0) == 63.0
 
 
 def test_sensor_latency_moves_the_command_behind_the_gyro(vehicle, hover):
@@ -185,9 +185,8 @@ def commanded(vehicle, gains, *, attitude=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0
     if tilted:
         setpoint["mode"][:2] = 0
     setpoint["attitude"], setpoint["velocity"], setpoint["position"] = attitude, velocity, position
-    zero = np.zeros(3)
     state["mode"] = setpoint["mode"]
-    controller.run(plant[0]["firmware"], plant[0], state, setpoint, 0, zero, zero, zero, zero)
+    controller.run(plant[0], state, setpoint, np.zeros(1, controller.ESTIMATE)[0], 0)
     return state
 
 

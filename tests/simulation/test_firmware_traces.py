@@ -32,10 +32,9 @@ def trace(name):
 @pytest.mark.parametrize("name", ["step", "cruise", "turning"])
 def test_estimator(name):
     t = trace(f"estimator_{name}")
-    firmware = settings.load("2026.08")[0]
-    memory = np.zeros(1, kalman.STATE)
-    est = memory[0]
-    kalman.begin(firmware, est, 0.0, 0.0, 0.0, np.array([1.0, 0.0, 0.0, 0.0]))
+    plant, est = from_vehicle(vehicles.load("crazyflie-2.1"))[0], np.zeros(1, kalman.STATE)[0]
+    plant["firmware"], plant["gravity"] = settings.load("2026.08")[0], G
+    kalman.begin(plant["firmware"], est, 0.0, 0.0, 0.0, np.array([1.0, 0.0, 0.0, 0.0]))
     rows = {int(tick): i for i, tick in enumerate(t["tick_ms"])}
     assert len(rows) == len(t["tick_ms"])
     # one IMU sample holds for ten ticks: a P row has that of the ten before, an F row that of the running ones
@@ -57,8 +56,8 @@ def test_estimator(name):
         if event == "F":
             reading["forward"], reading["left"], reading["dt"], reading["std"] = (
                 t["flow_dx"][i], t["flow_dy"][i], t["flow_dt_s"][i], t["flow_std"][i])
-        block = blocks[tick // 10]
-        estimator.tick(firmware, est, tick, flying, G, acc[block], gyro[block], reading)
+        reading["acc"], reading["gyro"] = acc[blocks[tick // 10]], gyro[blocks[tick // 10]]
+        estimator.tick(plant, est, tick, flying, reading)
         if i is not None:
             got[i] = [*est["x"], *est["v"], *est["q"], *np.diag(est["p"])]
     names = ["x_m", "y_m", "z_m", *(f"v{a}_body_mps" for a in "xyz"), *(f"q{a}" for a in "wxyz")]
@@ -78,7 +77,8 @@ def test_controller_and_mixer(name, firmware):
     for name in ("thrust_base", "thrust_min", "thrust_scale"):  # the firmware's own, not scaled to a vehicle
         plant[name] = release["controller"][name]
     plant["rate_scale"] = 1.0
-    s = setpoints[0]
+    plant["firmware"] = release
+    s, estimate = setpoints[0], np.zeros(1, controller.ESTIMATE)[0]
 
     def columns(*names):
         return np.stack([t[n] for n in names], axis=1)
@@ -95,7 +95,9 @@ def test_controller_and_mixer(name, firmware):
         s["mode"], s["velocity_body"], s["thrust"] = modes[i], t["velocity_body"][i], t["sp_thrust"][i]
         s["position"], s["velocity"], s["attitude"], s["rate"] = (
             sp_position[i], sp_velocity[i], sp_attitude[i], sp_rate[i])
-        controller.run(release, plant, state, s, tick, position[i], velocity[i], attitude[i], gyro[i])
+        estimate["position"], estimate["velocity"] = position[i], velocity[i]
+        estimate["attitude"], estimate["rate"] = attitude[i], gyro[i]
+        controller.run(plant, state, s, estimate, tick)
         desired[i] = [*state["attitude"], *state["rate"]]
         commands[i] = [state["thrust"], *state["command"]]
         mixed = np.zeros(4)

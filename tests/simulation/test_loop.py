@@ -8,8 +8,8 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import true_edges
-from airtouch.simulation import effects, flight, kept, ranging, scenario, setpoint
-from airtouch.simulation.firmware import battery_compensation, settings
+from airtouch.simulation import effects, flight, ranging, scenario, setpoint
+from airtouch.simulation.firmware import battery_compensation, controller, settings
 from airtouch.simulation.stepper import Stepper
 
 PLATFORM = """
@@ -80,9 +80,9 @@ def test_the_estimate_follows_the_truth(vehicle, firmware):
     table, errors = np.zeros((1, 33)), []
     for row in plan.setpoints[:1300]:
         assert stepper.fly(row[None], table)[0] == 0
-        m = stepper.memory[0]
-        errors.append([m["est"]["x"][2] - table[0, 19], *(m["velocity"] - table[0, 20:23]),
-                       *(m["angles"][:2] - table[0, 23:25])])
+        s = stepper.state[0]["firmware"]
+        errors.append([s["kalman"]["x"][2] - table[0, 19], *(s["estimate"]["velocity"] - table[0, 20:23]),
+                       *(s["angles"][:2] - table[0, 23:25])])
     rms = np.sqrt(np.mean(np.square(errors[400:]), axis=0))
     assert rms[0] < 0.02  # m; the down range errs by 1.25 % of 0.8 m
     assert rms[1] < 0.11 and rms[2] < 0.05  # m/s: less than optical flow errs, as declared
@@ -103,7 +103,7 @@ def test_readings_come_when_the_firmware_reads_them(quiet):
         assert stepper.fly(plan.setpoints[:800], table)[0] == 0
         climb = table[180:260]
         age = ((climb[:, 19] - climb[:, 11]) / climb[:, 22]).mean()  # of the logged reading, s
-        return stepper.memory[0]["looks"], age
+        return stepper.state[0]["ranging"]["count"], age
     count, age = looks()
     assert count == (7990 - ranging.RANGE_MS) // 25 + 1
     assert age == pytest.approx(0.0125, abs=0.006)
@@ -144,22 +144,22 @@ def test_late_flow_makes_the_velocity_loop_ring(quiet):
 
 
 def test_set_points_reach_the_firmware_in_its_modes():
-    memory, row = kept.memory()[0]["setpoint"], np.zeros(setpoint.SETPOINT_SIZE)
+    out, row = np.zeros(1, controller.SETPOINT)[0], np.zeros(setpoint.SETPOINT_SIZE)
     row[:] = setpoint.FLY, 1.0, 2.0, 0.7, 0.3, -0.1, np.pi / 2, 1.0
-    setpoint.to_firmware(row, memory)
-    assert memory["mode"].tolist() == [2, 2, 1, 0, 0, 1] and memory["attitude"][2] == pytest.approx(90.0)
-    np.testing.assert_allclose(memory["velocity"], [0.3, -0.1, 0.0])
+    setpoint.to_firmware(row, out)
+    assert out["mode"].tolist() == [2, 2, 1, 0, 0, 1] and out["attitude"][2] == pytest.approx(90.0)
+    np.testing.assert_allclose(out["velocity"], [0.3, -0.1, 0.0])
     row[setpoint.MODE] = setpoint.HOLD
-    setpoint.to_firmware(row, memory)
-    assert memory["mode"].tolist() == [1, 1, 1, 0, 0, 1]
+    setpoint.to_firmware(row, out)
+    assert out["mode"].tolist() == [1, 1, 1, 0, 0, 1]
     row[setpoint.MODE], row[setpoint.VX], row[setpoint.VY] = setpoint.TILT_THRUST, 4.0, 5.0
-    setpoint.to_firmware(row, memory)
-    assert memory["mode"].tolist() == [0, 0, 0, 1, 1, 1] and memory["thrust"] == 0.7
-    np.testing.assert_allclose(memory["attitude"][:2], [4.0, -5.0])  # its pitch is nose up
-    np.testing.assert_allclose(memory["velocity"], 0.0)
+    setpoint.to_firmware(row, out)
+    assert out["mode"].tolist() == [0, 0, 0, 1, 1, 1] and out["thrust"] == 0.7
+    np.testing.assert_allclose(out["attitude"][:2], [4.0, -5.0])  # its pitch is nose up
+    np.testing.assert_allclose(out["velocity"], 0.0)
     row[setpoint.MOTORS] = 0.0
-    setpoint.to_firmware(row, memory)
-    assert memory["mode"].tolist() == [0] * 6 and memory["thrust"] == 0.0
+    setpoint.to_firmware(row, out)
+    assert out["mode"].tolist() == [0] * 6 and out["thrust"] == 0.0
 
 
 @pytest.mark.parametrize(("line", "said"), [

@@ -13,12 +13,19 @@ def plant(vehicle):
     return from_vehicle(vehicle)
 
 
-def run(plant, state, speed, target, h, steps, force=None):
-    state, speed, slope = state.copy(), speed.copy(), np.zeros(13)
-    force = np.zeros(6) if force is None else force
+def body_of(plant, state, speed, target):
+    """A BODY (1,) of the plant's nominal rotors, without effects."""
+    body = np.zeros(1, rigid_body.BODY)
+    body["state"], body["rotor_speed"], body["target_speed"], body["gain"] = state, speed, target, plant["gain"]
+    return body
+
+
+def run(plant, state, speed, target, h, steps):
+    plant, body = plant.copy(), body_of(plant, state, speed, target)
+    plant["step"] = h
     for _ in range(steps):
-        rigid_body.step(plant[0], state, speed, target, h, force, slope)
-    return state, speed
+        rigid_body.step(plant[0], body[0])
+    return body["state"][0], body["rotor_speed"][0]
 
 
 def at_rest():
@@ -60,15 +67,16 @@ def test_symmetric_top_precesses_at_its_closed_form(plant):
 
 
 def test_spinning_rotors_add_their_gyroscopic_torque(plant):
-    """Four rotors that all carry momentum h about z: a roll rate makes the nose go J wy' = wx h."""
-    plant["rotor_inertia"], plant["gravity"] = 2e-8, 0.0
-    state, out, spin = at_rest(), np.zeros(13), 1e-4
-    state[10] = 2.0
-    rigid_body.derivative(plant[0], state, np.zeros(4), spin, 0.0, np.zeros(6), out)
-    assert out[11] == pytest.approx(2.0 * spin / plant[0]["inertia"][1])
-    state[10:] = (0.0, 2.0, 0.0)
-    rigid_body.derivative(plant[0], state, np.zeros(4), spin, 0.0, np.zeros(6), out)
-    assert out[10] == pytest.approx(-2.0 * spin / plant[0]["inertia"][0])
+    """Two rotors that both carry momentum about z, h in all: a roll rate makes the nose go J wy' = wx h."""
+    plant["rotor_inertia"], plant["thrust_per_speed2"], plant["gravity"] = 2e-8, 1e-30, 0.0
+    speed, spin = np.array([2500.0, 0.0, 2500.0, 0.0]), 1e-4
+    body = body_of(plant, at_rest(), speed, speed)
+    body["state"][0, 10:] = (2.0, 0.0, 0.0)
+    rigid_body.derivative(plant[0], body[0])
+    assert body["slope"][0, 11] == pytest.approx(2.0 * spin / plant[0]["inertia"][1])
+    body["state"][0, 10:] = (0.0, 2.0, 0.0)
+    rigid_body.derivative(plant[0], body[0])
+    assert body["slope"][0, 10] == pytest.approx(-2.0 * spin / plant[0]["inertia"][0])
 
 
 def test_angular_momentum_of_body_and_rotors_is_kept_while_rotors_spin_up(plant):
@@ -88,10 +96,9 @@ def test_hover_speed_holds_height(plant):
 @pytest.mark.parametrize(("rotor", "roll", "pitch", "yaw"), [(0, -1, -1, -1), (1, -1, 1, 1), (2, 1, 1, -1),
                                                              (3, 1, -1, 1)])
 def test_each_rotor_turns_the_body_the_documented_way(plant, rotor, roll, pitch, yaw):
-    out, speed = np.zeros(4), np.zeros(4)
+    speed = np.zeros(4)
     speed[rotor] = 2000.0
-    rigid_body.thrust_wrench(plant[0], speed, out)
-    assert tuple(np.sign(out)) == (1, roll, pitch, yaw)
+    assert tuple(np.sign(rigid_body.rotor_wrench(plant[0], speed, np.ones(4)))) == (1, roll, pitch, yaw)
 
 
 def test_fourth_order_convergence(plant):

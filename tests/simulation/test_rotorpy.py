@@ -63,18 +63,19 @@ def theirs(peer, given, aero):
 
 def ours(vehicle, given, drag=None):
     """The same from our rigid body; drag: the effect that is on, or none."""
-    plant = from_vehicle(vehicle)
-    state, speed, slope = np.zeros(13), np.full(4, given[0].mean()), np.zeros(13)
-    state[6] = 1.0
+    plant, body = from_vehicle(vehicle), np.zeros(1, rigid_body.BODY)
+    plant["step"] = STEP_S
+    state, speed = body["state"][0], body["rotor_speed"][0]
+    state[6], speed[:], body["gain"] = 1.0, given[0].mean(), plant["gain"]
     s, rows = np.zeros((1, at.COUNT)), []
     s[:, at.HOVER_SPEED] = hover_speed(plant)
     for command in given:
-        force = np.zeros(6)
+        body["target_speed"] = command
         if drag is not None:
             s[0, at.ROTOR_SPEED:at.ROTOR_SPEED + 4] = speed
             s[0, at.VELOCITY:at.VELOCITY + 3] = rotate_back(state[6:10], *state[3:6])
-            force = replay.wrench_of(drag, s)[0]
-        rigid_body.step(plant[0], state, speed, command, STEP_S, force, slope)
+            body["wrench"] = replay.wrench_of(drag, s)[0]
+        rigid_body.step(plant[0], body[0])
         rows.append(state[:10].copy())
     return np.array(rows)
 

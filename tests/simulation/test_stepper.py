@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
-from airtouch.simulation import loop, scenario
+from airtouch.simulation import log_row, loop, scenario
 from airtouch.simulation.flight import choose
 from airtouch.simulation.stepper import Stepper
 
@@ -16,7 +16,7 @@ def test_pieces_equal_the_whole(name):
 
     def flown(sizes):
         stepper = Stepper(plan, vehicle.load(), 5, 2, choose(plan))
-        table, done = np.full((rows, loop.COLUMNS), np.nan), 0
+        table, done = np.full((rows, log_row.COLUMNS), np.nan), 0
         stepper.begin(plan.setpoints[0])
         while done < rows:
             size = min(next(sizes), rows - done)
@@ -26,7 +26,7 @@ def test_pieces_equal_the_whole(name):
         return table
 
     whole = flown(iter([rows]))
-    assert np.ptp(whole[:, loop.PLACE + 2]) > 0.3  # it does fly
+    assert np.ptp(whole[:, log_row.POSITION + 2]) > 0.3  # it does fly
     rng = np.random.default_rng(1)
     for sizes in (iter(lambda: 1, 0), iter(lambda: int(rng.integers(1, 40)), 0)):
         np.testing.assert_array_equal(flown(sizes), whole)
@@ -36,8 +36,11 @@ def test_a_second_flight_begins_with_the_rotors_of_the_first():
     """Motor noise is drawn around the thrust of the vehicle, not around that of the last flight's last step."""
     plan = scenario.draw_flight(scenario.load("paper-9cm"), 5, 2)
     stepper = Stepper(plan, vehicle.load(), 5, 2, choose(plan, {"motor_noise": {"rms": 0.05}}))
+    nominal = stepper.plant[0]["gain"].copy()
     for _ in range(3):
         stepper.begin(plan.setpoints[0])
-        np.testing.assert_array_equal(stepper.memory[0]["gain"],
-                                      Stepper(plan, vehicle.load(), 5, 2, choose(plan)).plant[0]["gain"])
-        stepper.fly(plan.setpoints[:300], np.empty((300, loop.COLUMNS)))
+        gain = stepper.state[0]["body"]["gain"]
+        np.testing.assert_array_equal(gain, nominal)
+        stepper.fly(plan.setpoints[:300], np.empty((300, log_row.COLUMNS)))
+        assert np.ptp(gain / nominal) > 0.001  # noise of the last step
+        np.testing.assert_array_equal(stepper.plant[0]["gain"], nominal)  # which leaves the plant as it is

@@ -26,8 +26,8 @@ def vehicle() -> Vehicle:
 
 def crossings(flown: Scenario, seed: int, flight: int, table: np.ndarray) -> list[tuple[float, str]]:
     """(s, kind) at which the drone crossed the platform's edges in truth."""
-    w = draw_flight(flown, seed, flight).world
-    over = np.array([top_at(w.corners, w.first, w.surface, w.box, x, y) > 0.01 for x, y in table[:, 1:3]])
+    ground = draw_flight(flown, seed, flight).world
+    over = np.array([top_at(ground, x, y) > 0.01 for x, y in table[:, 1:3]])
     at = np.flatnonzero(np.diff(over.astype(int)))
     return [(float(table[i + 1, 0]), "entry" if over[i + 1] else "exit") for i in at]
 

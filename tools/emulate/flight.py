@@ -97,8 +97,8 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
     plan = draw_flight(scenario, seed, flight)
     plant = Plant(plan, vehicle, seed, flight, choose(plan))
     found, rows, pwm, latencies = Flown(), [], [], []
-    plant.memory["gyro_rms"] *= REST
-    plant.memory["acc_rms"] *= REST
+    plant.state["imu"]["gyro_rms"] *= REST
+    plant.state["imu"]["acc_rms"] *= REST
     rest, wait = np.zeros(2), int(BOOT_S / at.STEP_S)
     app_rows: list[dict[str, float]] = []
     with Board(elf, FLY, WATCHED, app=app, whole_milliseconds=whole_milliseconds) as board:
@@ -112,8 +112,8 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
             if step > wait:
                 latencies.append(values["latency_us"])
             if step == wait:
-                plant.memory["gyro_rms"] /= REST
-                plant.memory["acc_rms"] /= REST
+                plant.state["imu"]["gyro_rms"] /= REST
+                plant.state["imu"]["acc_rms"] /= REST
             ending = plant.step(motors)
             if ending != loop.OK:
                 found.ending = f"{loop.ENDINGS[ending]} after {(step - wait) * at.STEP_S:.2f} s"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from airtouch.simulation import battery, imu, loop, ranging, rigid_body
+from airtouch.simulation import battery, imu, loop, ranging
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.simulation.stepper import Stepper
 from airtouch.vehicle import Vehicle
@@ -19,7 +19,7 @@ ACC, GYRO, RANGE, FLOW, VOLTS, READINGS = 0, 6, 12, 13, 15, 16
 class Plant:
     """A drawn flight's vehicle, world and effects, flown from outside: `step` takes PWM and gives readings.
 
-    memory["state"] is the truth: position, velocity, attitude (w first), rates.
+    state["body"]["state"] is the truth: position, velocity, attitude (w first), rates.
     """
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: list) -> None:
@@ -30,50 +30,47 @@ class Plant:
         # the height over the floor. The sensor itself sees the distance to what is below.
         s.plant["flow_share"] = 1.0
         s.begin(plan.setpoints[0])
-        self.memory = s.memory[0]
+        self.state = s.state[0]
         self.readings = np.zeros(READINGS)
 
     def step(self, pwm: np.ndarray) -> int:
         """Two milliseconds under this PWM (4,): loop.OK or how it ended; `readings` as of their beginning."""
-        s, w = self._stepper, self._stepper.world
-        self.memory["pwm"] = pwm
-        return _step(s.plant, w.corners, w.first, w.surface, w.box, s.functions, s.used, s.parameters, s.effect_streams,
-                     s.streams, s.memory, self.readings)
+        self.state["motors"]["pwm"] = pwm
+        return _step(self._stepper.flight, self.readings)
 
     @property
     def place(self) -> np.ndarray:
         """Position (3,) of the down range sensor over the floor, m."""
-        return self.memory["state"][:3] - [0.0, 0.0, float(self._stepper.plant[0]["range_below_rotors"])]
+        return self.state["body"]["state"][:3] - [0.0, 0.0, float(self._stepper.plant[0]["range_below_rotors"])]
 
     @property
     def top(self) -> float:
         """Height of the surface that the down range saw last, m."""
-        return float(self.memory["top"])
+        return float(self.state["ranging"]["seen_top"])
 
 
 @njit(nogil=True)
-def _step(plant_array, corners, first, surface, box, effects, used, parameters, effect_streams, streams, memory_array,
-          out):
-    plant, memory = plant_array[0], memory_array[0]
-    ground = (corners, first, surface, box)
-    h, k = plant.step, memory.step
-    hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
-    imu.sense(plant, memory, streams[1], hover, k)
-    volts = battery.supply(plant, memory.volts)
+def _step(flight, out):
+    """One physics step of a loop.Flight; readings (READINGS,) of its beginning into out. How it stands."""
+    plant, state, streams = flight.plant[0], flight.state[0], flight.streams[0]
+    fixed, reading = loop.constants(plant), state.firmware.reading
+    imu.sense(plant, state, fixed.hover_speed, streams.imu[:])
+    volts = battery.supply(plant, state.battery.volts)
     out[FLOW], out[FLOW + 1] = 0.0, 0.0
     for half in range(2):
-        tick = 2 * k - 1 + half
-        row = tick & (imu.RING - 1)
+        tick = 2 * state.step - 1 + half
+        row = tick & (imu.DELAY_ROWS - 1)
         for i in range(3):
-            out[ACC + 3 * half + i] = memory.imu[row, i]
-            out[GYRO + 3 * half + i] = memory.imu[row, 3 + i]
+            out[ACC + 3 * half + i] = state.imu.delay_line[row, i]
+            out[GYRO + 3 * half + i] = state.imu.delay_line[row, 3 + i]
         if tick >= 0:
-            ranging.range_reading(plant, memory, ground, tick, memory.state[:], k * h, streams[2], memory.reading)
-            ranging.flow_reading(plant, memory, tick, memory.state[:], k * h, streams[2], memory.reading)
-            if not math.isnan(memory.reading.forward):
-                out[FLOW] += memory.reading.forward
-                out[FLOW + 1] += memory.reading.left
-    out[RANGE], out[VOLTS] = memory.down, volts
-    memory.step = k + 1
-    return loop.move(plant, memory, ground, effects, used, parameters, effect_streams, rigid_body.constants(plant, h),
-                     loop._noise(plant, h), k, hover, volts, streams[0])
+            ranging.range_reading(plant, state, flight.world, tick, streams.ranging[:])
+            ranging.flow_reading(plant, state, tick, streams.ranging[:])
+            if not math.isnan(reading.forward):
+                out[FLOW] += reading.forward
+                out[FLOW + 1] += reading.left
+    out[RANGE], out[VOLTS] = state.ranging.down, volts
+    ending = loop.move(flight, fixed, volts)
+    state.step += 1
+    state.time_s = state.step * plant.step
+    return ending

@@ -16,7 +16,7 @@ from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop_model import AXES, spectra
 from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies
 from airtouch.gap.vibration_lines import lines
-from airtouch.simulation import rigid_body, sensors
+from airtouch.simulation import filters, rigid_body
 from airtouch.simulation.flight import prepare
 
 SEEDS = 4
@@ -92,10 +92,10 @@ def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
     """PSD (bins,), 1/Hz, of the accelerometer's noise of rms 1 as logged: white, through its low-pass, folded."""
     whole = np.concatenate([f, 1.0 / PERIOD_S - f, 1.0 / PERIOD_S + f, 2.0 / PERIOD_S - f, 2.0 / PERIOD_S + f])
     b = np.zeros(5)
-    sensors.lowpass_coefficients(float(row["acc_lowpass"]), float(row["step"]), b)
+    filters.lowpass_coefficients(float(row["acc_lowpass"]), float(row["step"]), b)
     _, passed = freqz(b[:3], [1.0, b[3], b[4]], worN=whole, fs=1.0 / float(row["step"]))
     total = (np.abs(passed) ** 2).reshape(5, -1).mean(axis=0)
-    return 2.0 * PERIOD_S * total / sensors.noise_gain(b) ** 2
+    return 2.0 * PERIOD_S * total / filters.noise_gain(b) ** 2
 
 
 def _gyro_share(study: Any) -> np.ndarray:

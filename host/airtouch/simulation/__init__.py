@@ -1,7 +1,8 @@
 """A Crazyflie simulator whose every effect can be switched on, off and up.
 
 `batch.simulate` flies many flights of a scenario, `flight.fly` one; `effects` is the
-registry. What the equations are is in host/docs/simulate.md.
+registry; `loop` is one flight as stages over the record of `state`. What the equations are is in
+host/docs/simulate.md.
 """
 
 import contextlib
@@ -18,16 +19,16 @@ def _drop_stale_machine_code() -> None:
     folder = Path(__file__).parent
     sources = sorted(folder.rglob("*.py"))
     stamp = "\n".join(f"{p.relative_to(folder)} {s.st_mtime_ns} {s.st_size}" for p in sources for s in [p.stat()])
-    kept = folder / "__pycache__" / "sources.stamp"
+    stamp_file = folder / "__pycache__" / "sources.stamp"
     with contextlib.suppress(OSError):
-        if kept.is_file() and kept.read_text() == stamp:
+        if stamp_file.is_file() and stamp_file.read_text() == stamp:
             return
         for index in folder.rglob("__pycache__/*.nbi"):
             index.unlink(missing_ok=True)
-        kept.parent.mkdir(exist_ok=True)
-        temporary = kept.with_suffix(f".{os.getpid()}")
+        stamp_file.parent.mkdir(exist_ok=True)
+        temporary = stamp_file.with_suffix(f".{os.getpid()}")
         temporary.write_text(stamp)
-        temporary.replace(kept)
+        temporary.replace(stamp_file)
 
 
 _drop_stale_machine_code()

@@ -4,6 +4,8 @@ import numpy as np
 
 from airtouch.simulation.compiled import jit
 
+#: charge: share of the capacity that is left; volts: at the terminals
+STATE = np.dtype([("charge", np.float64), ("volts", np.float64)])
 #: Charge left and open-circuit voltage of one cell: typical LiPo discharge curve.
 CHARGE = np.array([0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0])
 OPEN_CIRCUIT_V = np.array([3.20, 3.45, 3.58, 3.68, 3.77, 3.87, 4.00, 4.08, 4.18])

@@ -10,3 +10,5 @@ from functools import partial
 from numba import njit
 
 jit = partial(njit, cache=True, error_model="numpy", _nrt=False)
+#: for parts of a stage that are called in one place and take records of many arrays, which a call would copy
+inlined = partial(njit, error_model="numpy", _nrt=False, inline="always")

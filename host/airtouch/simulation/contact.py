@@ -12,8 +12,12 @@ FRICTION_S = 0.02  #: sliding dies out with this time constant, under full weigh
 
 
 @jit
-def legs(plant, state, s, leg, force):
-    """Add force and torque (6,) of legs of length `leg` m; returns how deep the deepest stands, m."""
+def legs(plant, pose, s, force):
+    """Add force and torque of the legs to force (6,), N and N m; returns how deep the deepest stands in a surface, m.
+
+    pose (13,): state of the body; s (COUNT,): its signals.
+    """
+    leg = plant.range_below_rotors + plant.leg_below_range
     if s[at.HEIGHT] >= leg:
         return 0.0
     deepest = 0.0
@@ -30,15 +34,15 @@ def legs(plant, state, s, leg, force):
         deepest = max(deepest, depth)
         x, y = s[at.ROTOR_X + i], s[at.ROTOR_Y + i]
         # velocity of the leg over ground, in body axes then in world axes
-        bx = s[at.VELOCITY] - state[12] * y
-        by = s[at.VELOCITY + 1] + state[12] * x
-        bz = s[at.VELOCITY + 2] + state[10] * y - state[11] * x
+        bx = s[at.VELOCITY] - pose[12] * y
+        by = s[at.VELOCITY + 1] + pose[12] * x
+        bz = s[at.VELOCITY + 2] + pose[10] * y - pose[11] * x
         vx = s[r] * bx + s[r + 1] * by + s[r + 2] * bz
         vy = s[r + 3] * bx + s[r + 4] * by + s[r + 5] * bz
         vz = s[r + 6] * bx + s[r + 7] * by + s[r + 8] * bz
         push = max(stiffness * depth - damping * vz, 0.0)
         grip = -push / (plant.gravity * FRICTION_S)
-        fx, fy, fz = rotate_back(state[6:10], grip * vx, grip * vy, push)
+        fx, fy, fz = rotate_back(pose[6:10], grip * vx, grip * vy, push)
         force[0] += fx
         force[1] += fy
         force[2] += fz

@@ -9,7 +9,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.simulation import effects as registry
-from airtouch.simulation import loop, setpoint
+from airtouch.simulation import log_row, loop, setpoint
 from airtouch.simulation.effects import Active
 from airtouch.simulation.radio import received, rounded
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
@@ -73,14 +73,14 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     vehicle = plan.flown_by(vehicle)
     stepper = Stepper(plan, vehicle, seed, flight, active)
     plant = stepper.plant
-    table = np.empty((len(plan.setpoints), loop.COLUMNS))
+    table = np.empty((len(plan.setpoints), log_row.COLUMNS))
     radio = (float(plant[0]["time_jitter"]), float(plant[0]["packet_loss"]), float(plant[0]["loss_burst"]))
     stepper.begin(plan.setpoints[0])
     ending, rows = stepper.fly(plan.setpoints, table)
     if ending != loop.OK:
         return Diverged(name, seed, flight, loop.ENDINGS[ending], rows / 100.0)
     climb = plan.setpoints[:, setpoint.Z].max() - plan.setpoints[0, setpoint.Z]
-    if np.ptp(table[:, loop.PLACE + 2]) < 0.5 * climb:
+    if np.ptp(table[:, log_row.POSITION + 2]) < 0.5 * climb:
         return Diverged(name, seed, flight, "it did not take off", len(table) / 100.0)
     rng = np.random.default_rng([seed, flight, 7])
     table = received(table, *radio, rng)

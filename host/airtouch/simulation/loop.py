@@ -1,4 +1,4 @@
-"""One flight as one compiled loop of stages over one memory record.
+"""One flight as one compiled loop of stages over one record of named state.
 
 Order within a step of 2 ms: the IMU gives two samples, down range and flow measure when they are due, the firmware's
 estimator runs a tick for each millisecond and its controllers one, the log takes its row (100 Hz), the delayed
@@ -6,185 +6,140 @@ command reaches the motors, every effect adds its force and torque at the middle
 """
 
 import math
+from typing import Any, NamedTuple
 
-from numba import float64, from_dtype, int64, types, uint64
+import numpy as np
+from numba import float64, from_dtype, int64, types
+from numba.core.typing.typeof import typeof_impl
 
-from airtouch.simulation import (
-    autopilot,
-    battery,
-    contact,
-    imu,
-    kept,
-    motors,
-    ranging,
-    rigid_body,
-    sensors,
-    surroundings,
-)
+from airtouch.simulation import autopilot, battery, forces, imu, log_row, motors, multi_ranger, ranging, rigid_body
 from airtouch.simulation import signals as at
-from airtouch.simulation.compiled import jit
-from airtouch.simulation.effects.effect import WrenchFunction
-from airtouch.simulation.kept import SLOTS
-from airtouch.simulation.plant import DTYPE
-from airtouch.simulation.random_stream import normals
-from airtouch.simulation.rotation import euler
-from airtouch.simulation.sensors import RING
+from airtouch.simulation.compiled import inlined, jit
+from airtouch.simulation.effects.slots import EFFECT_SLOTS, EffectSlots
+from airtouch.simulation.plant import PLANT
+from airtouch.simulation.state import STATE
+from airtouch.simulation.world import WORLD, World
 
 LOG_STEPS = 5  #: physics steps a logged row
 OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended
 ENDINGS = ("ok", "a value is not finite", "it turned over", "it struck a surface", "it flew away")
-TURN = 2.0 * math.pi
+LEAST_UPRIGHT = 0.2  #: cosine of the tilt below which it has turned over
 FLOOR_DEPTH_M = 0.015  #: legs this far inside a surface: it struck it
-WALLS_STEPS = 50  #: physics steps a reading of the Multi-ranger
-(T, ACC, GYRO, PWM, DOWN, RANGES, VBAT, PLACE, SPEED, ANGLES, RPM, ACC_WORLD, COLUMNS) = (
-    0, 1, 4, 7, 11, 12, 16, 17, 20, 23, 26, 30, 33)
-
-@jit
-def _noise(plant, h):
-    """Of the motors' slow and fast noise: what is left of it a step later, and what is drawn anew."""
-    slow, fast = math.exp(-h / plant.motor_noise_time), math.exp(-h / plant.motor_hiss_time)
-    return slow, math.sqrt(1.0 - slow * slow), fast, math.sqrt(1.0 - fast * fast)
+FAR_M, HIGH_M = 1000.0, 100.0  #: beyond them it flew away
+#: random numbers of the motors, the IMU, the other sensors and of the start
+STREAMS = np.dtype([(name, np.uint64, (1,)) for name in ("motors", "imu", "ranging", "start")])
 
 
-@jit
-def _log(plant, memory, t, volts, out):
-    """A row (33,) of the log."""
-    out[T] = t
-    out[ANGLES], out[ANGLES + 1], out[ANGLES + 2] = euler(memory.state[6:10])
-    r = memory.est.r
-    for i in range(3):
-        out[ACC + i], out[GYRO + i] = memory.acc[i], memory.gyro[i]
-        out[PLACE + i], out[SPEED + i] = memory.state[i], memory.state[3 + i]
-        out[ACC_WORLD + i] = r[i, 0] * memory.acc[0] + r[i, 1] * memory.acc[1] + r[i, 2] * memory.acc[2]
-    out[PLACE + 2] -= plant.range_below_rotors
-    for i in range(4):
-        out[PWM + i], out[RANGES + i] = memory.pwm[i], memory.ranges[i]
-        out[RPM + i] = memory.speed[i] * 9.549296585513721
-    out[DOWN], out[VBAT] = memory.down, volts
+class Flight(NamedTuple):
+    """All that one flight needs: what stays as it is, its random numbers, and its state.
 
-
-@jit
-def _motors(plant, memory, noise, k, h, volts, stream):
-    """Delayed command, target speeds, noise of the thrust, phases and battery of physics step k."""
-    flicker, speed, phase, normal = memory.flicker, memory.speed, memory.phase, memory.motor_normals[:]
-    factor = motors.voltage_factor(plant, volts)
-    for i in range(4):
-        memory.commands[k & (RING - 1), i] = memory.pwm[i]
-        if k == 0:
-            for j in range(RING):
-                memory.commands[j, i] = memory.pwm[i]
-    if plant.motor_hiss > 0.0:
-        normals(stream, normal)
-        for i in range(4):
-            flicker[4 + i] = noise[2] * flicker[4 + i] + noise[3] * normal[i]
-    normals(stream, normal)
-    power = 0.0
-    power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
-    for i in range(4):
-        command = sensors.delayed(memory.commands, k, plant.actuator_delay / h, i)
-        if plant.motor_slowness[i] > 0.0:
-            memory.slowed[i] += (command - memory.slowed[i]) * (1.0 - math.exp(-h / plant.motor_slowness[i]))
-            command = memory.slowed[i]
-        if plant.motor_dead_zone[i] > 0.0:
-            if abs(command - memory.held[i]) > plant.motor_dead_zone[i]:
-                memory.held[i] = command
-            command = memory.held[i]
-        memory.target[i] = motors.target_speed(plant, command, factor)
-        flicker[i] = noise[0] * flicker[i] + noise[1] * normal[i]
-        random = plant.motor_noise * flicker[i] + plant.motor_hiss * flicker[4 + i]
-        plant.gain[i] = memory.gain[i] * (1.0 + random)
-        power += power_per_speed3 * speed[i] * speed[i] * speed[i]
-        if plant.vibration > 0.0:
-            turns = (phase[i] + h * speed[i]) / TURN
-            phase[i] = TURN * (turns - math.floor(turns))
-    memory.charge, memory.volts = battery.drain(plant, memory.charge, power, h)
-
-
-@jit
-def move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover, volts, stream):
-    """The vehicle over physics step k under memory.pwm (4,): motors, effects, body.
-
-    How the flight stands (OK or a reason).
+    plant (1,): plant.DTYPE; world: World; room (4,): walls for the Multi-ranger; effects: EffectSlots;
+    streams (1,): STREAMS; state (1,): state.DTYPE, as `state.begin` leaves it.
     """
-    corners, first, surface, box = ground
-    h, leg = plant.step, plant.range_below_rotors + plant.leg_below_range
-    state, s, force, effect_memory = memory.state[:], memory.signals[:], memory.force[:], memory.effects
-    _motors(plant, memory, noise, k, h, volts, stream)
 
-    # effects, at the middle of the step
-    for i in range(13):
-        memory.middle[i] = state[i] + 0.5 * h * memory.slope[i]
-    for i in range(4):
-        tau = plant.motor_rise if memory.target[i] > memory.speed[i] else plant.motor_fall
-        memory.middle_speed[i] = memory.speed[i] + 0.5 * h / tau * (memory.target[i] - memory.speed[i])
-    surroundings.fill(plant, memory.middle, memory.slope, memory.middle_speed, corners, first, surface, box, h,
-                      k * h + 0.5 * h, hover, s, memory.patch)
-    for i in range(6):
-        force[i] = 0.0
-    for i in range(used):
-        effects[i](parameters[i], s, effect_memory[i], effect_streams[i], force)
-    deepest = contact.legs(plant, memory.middle, s, leg, force)
+    plant: np.ndarray
+    world: World
+    room: np.ndarray
+    effects: EffectSlots
+    streams: np.ndarray
+    state: np.ndarray
 
-    rigid_body.advance(plant, constant, state, memory.speed, memory.target, h, force, memory.slope)
-    total = 0.0
-    for i in range(13):
-        total += state[i]
+
+FLIGHT = types.NamedTuple(
+    (PLANT, WORLD, float64[::1], EFFECT_SLOTS, from_dtype(STREAMS)[::1], STATE), Flight)  #: in compiled code
+
+
+@typeof_impl.register(Flight)
+def _type_of_flight(value: Flight, _context: Any) -> types.NamedTuple:
+    """Known beforehand, so that numba need not work it out at each call."""
+    return FLIGHT
+
+
+class Constants(NamedTuple):
+    """What follows from the plant alone."""
+
+    hover_speed: float  #: rad/s of a rotor
+    ahead: int  #: physics steps from the position controller's run to the log's row
+    body: rigid_body.Constants
+    noise: motors.Noise
+
+
+@jit
+def constants(plant):
+    """The Constants of a plant."""
+    hover_speed = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
+    ahead = int(plant.controller_ahead / plant.step + 1e-6) % LOG_STEPS
+    return Constants(hover_speed, ahead, rigid_body.constants(plant), motors.noise(plant))
+
+
+@inlined
+def control(flight, fixed, row, volts):
+    """Sensors and firmware over the two milliseconds that end with this step, for a set-point row (8,).
+
+    The command is in state.motors.pwm; fixed: Constants; volts: what the motors see.
+    """
+    plant, state, stream = flight.plant[0], flight.state[0], flight.streams[0].ranging[:]
+    k = state.step
+    for tick in range(max(2 * k - 1, 0), 2 * k + 1):
+        imu.reading(plant, state, tick)
+        ranging.range_reading(plant, state, flight.world, tick, stream)
+        ranging.flow_reading(plant, state, tick, stream)
+        autopilot.estimate(plant, state, tick, volts)
+    autopilot.steer(plant, state, row, 2 * (k + fixed.ahead))
+
+
+@inlined
+def move(flight, fixed, volts):
+    """The vehicle over one physics step under state.motors.pwm: motors, effects, body. How it stands: OK or a reason.
+
+    fixed: Constants; volts: what the motors see.
+    """
+    plant, state = flight.plant[0], flight.state[0]
+    motors.drive(plant, state, fixed.noise, volts, flight.streams[0].motors[:])
+    forces.act(plant, state, flight.world, flight.effects, fixed.hover_speed)
+    rigid_body.advance(plant, fixed.body, state.body)
+    return _ending(state)
+
+
+@jit
+def _ending(state):
+    """OK, or the reason why the flight ends here."""
+    pose, total = state.body.state, 0.0
+    for i in range(rigid_body.STATE_SIZE):
+        total += pose[i]
     if not math.isfinite(total):
         return NOT_FINITE
-    if s[at.ROTATION + 8] < 0.2:
+    if state.forces.signals[at.ROTATION + 8] < LEAST_UPRIGHT:
         return UPSET
-    if deepest > FLOOR_DEPTH_M:
+    if state.forces.deepest > FLOOR_DEPTH_M:
         return STRUCK
-    if abs(state[0]) > 1000.0 or abs(state[1]) > 1000.0 or abs(state[2]) > 100.0:
+    if abs(pose[0]) > FAR_M or abs(pose[1]) > FAR_M or abs(pose[2]) > HIGH_M:
         return LOST
     return OK
 
 
-_LOOP = types.Tuple((int64, int64))(
-    from_dtype(DTYPE)[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[::1],
-    float64[:, ::1], types.UniTuple(WrenchFunction, SLOTS), int64, float64[:, ::1],
-    uint64[:, ::1], uint64[:, ::1], from_dtype(kept.MEMORY_DTYPE)[::1], float64[:, ::1])
-
-
-@jit(_LOOP, nogil=True)
-def fly(plant_array, corners, first, surface, box, room, setpoints, effects, used, parameters,
-        effect_streams, streams, memory_array, table):
+@jit(types.Tuple((int64, int64))(FLIGHT, float64[:, ::1], float64[:, ::1]), nogil=True)
+def fly(flight, setpoints, table):
     """Fly as many rows as `table` (rows, 33) has, the columns of the flight log.
 
-    plant_array (1,); corners, first, surface, box: a World; room (4,): walls for the
-    Multi-ranger; setpoints (rows, 8): one a logged row; effects: SLOTS wrenches, `used` of
-    them on, with parameters (SLOTS, 8) and streams (SLOTS, 1). memory_array (1,): as
-    `kept.begin` leaves it; the next call with it (and the same plant and streams) continues,
-    and many short calls give the same numbers as one long one. Returns how it ended (OK or a
-    reason) and the number of rows of this call that are filled.
+    setpoints (rows, 8): one a logged row. The next call with the same Flight continues, and many short calls give
+    the same numbers as one long one. Returns how it ended (OK or a reason) and the number of rows of this call that
+    are filled.
     """
-    plant, memory = plant_array[0], memory_array[0]
-    ground = (corners, first, surface, box)
-    h = plant.step
-    hover = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
-    constant = rigid_body.constants(plant, h)
-    noise, ahead = _noise(plant, h), int(plant.controller_ahead / h + 1e-6) % LOG_STEPS
-    state = memory.state[:]
-    rows = table.shape[0]
-    begun = memory.step
-    for n in range(rows * LOG_STEPS):
-        k = begun + n
+    plant, state, streams = flight.plant[0], flight.state[0], flight.streams[0]
+    fixed, begun = constants(plant), state.step
+    for n in range(table.shape[0] * LOG_STEPS):
         row = n // LOG_STEPS
-        imu.sense(plant, memory, streams[1], hover, k)
-        if k % WALLS_STEPS == 0:
-            ranging.walls(memory, room, state)
-        volts = battery.supply(plant, memory.volts)
-        for tick in range(max(2 * k - 1, 0), 2 * k + 1):
-            imu.sample(plant, memory, tick)
-            ranging.range_reading(plant, memory, ground, tick, state, k * h, streams[2], memory.reading)
-            ranging.flow_reading(plant, memory, tick, state, k * h, streams[2], memory.reading)
-            autopilot.estimate(plant, memory, tick, volts)
-        autopilot.steer(plant, memory, setpoints[row], 2 * (k + ahead))
+        state.step = begun + n
+        state.time_s = state.step * plant.step
+        imu.sense(plant, state, fixed.hover_speed, streams.imu[:])
+        multi_ranger.read(state, flight.room)
+        volts = battery.supply(plant, state.battery.volts)
+        control(flight, fixed, setpoints[row], volts)
         if n % LOG_STEPS == 0:
-            _log(plant, memory, k * h, volts, table[row])
-        ending = move(plant, memory, ground, effects, used, parameters, effect_streams, constant, noise, k, hover,
-                      volts, streams[0])
+            log_row.write(plant, state, volts, table[row])
+        ending = move(flight, fixed, volts)
         if ending != OK:
             return ending, row + (ending != NOT_FINITE)
-    memory.step = begun + rows * LOG_STEPS
-    return OK, rows
+    state.step = begun + table.shape[0] * LOG_STEPS
+    return OK, table.shape[0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import setpoint as c
-from airtouch.simulation.world import World, first_below, top_at
+from airtouch.simulation.world import NONE, World, first_below, top_at
 
 RATE_HZ = 100
 MAX_SPEED_MPS = 1.0  #: the firmware's own limit (PID_POS_VEL_X_MAX)
@@ -35,8 +35,7 @@ class _Pen:
 
     def top(self, place: Sequence[float]) -> float:
         """Height of the surface at (x, y), m."""
-        w = self.world
-        return top_at(w.corners, w.first, w.surface, w.box, place[0], place[1])
+        return top_at(self.world, place[0], place[1])
 
     def move(self, to: np.ndarray, seconds: float) -> None:
         n = max(int(round(seconds * RATE_HZ)), 1)
@@ -137,9 +136,8 @@ def _check_path(pen: _Pen, first: int, place: str) -> None:
     rows = np.concatenate(pen.rows)[first::5]
     if rows[0, c.MOTORS] == 0.0:
         raise AirTouchError(f"{place}: it has not taken off")
-    w = pen.world
-    struck = first_below(w.corners, w.first, w.surface, w.box, rows[:, c.X:c.Z + 1])
-    if struck >= 0:
+    struck = first_below(pen.world, rows[:, c.X:c.Z + 1])
+    if struck != NONE:
         x, y, z = rows[struck, c.X:c.Z + 1]
         raise AirTouchError(f"{place}: at ({x:.2f}, {y:.2f}) m it would fly "
                             f"{z:.2f} m high through a surface {pen.top((x, y)):.2f} m high")

@@ -7,6 +7,7 @@ A vehicle gives the nominal values, effects change them. `firmware` holds the se
 import functools
 
 import numpy as np
+from numba import from_dtype
 
 from airtouch.simulation.firmware import settings
 from airtouch.vehicle import Vehicle
@@ -98,6 +99,7 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
 )
 DTYPE = np.dtype([*((name, _F) if n == 1 else (name, _F, (n,)) for name, n, _, _ in FIELDS),
                   ("firmware", settings.DTYPE)])
+PLANT = from_dtype(DTYPE)[::1]  #: an array (1,) of it, in compiled code
 ROTOR_SIGN_X = np.array([1.0, -1.0, -1.0, 1.0])
 ROTOR_SIGN_Y = np.array([-1.0, -1.0, 1.0, 1.0])
 OWN_PLATFORM = "cf2"  #: whose gains and battery compensation stand in the firmwares' files

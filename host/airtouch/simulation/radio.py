@@ -20,17 +20,18 @@ def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
     if loss <= 0.0:
         return table
     recover = 1.0 / burst
-    kept = np.ones(n, dtype=bool)
-    _lose(draws, recover, min(recover * loss / (1.0 - loss), 1.0), kept)
-    return table[kept]
+    arrived = np.ones(n, dtype=bool)
+    _lose(draws, recover, min(recover * loss / (1.0 - loss), 1.0), arrived)
+    return table[arrived]
 
 
 @jit
-def _lose(draws, recover, fail, kept):
+def _lose(draws, recover, fail, arrived):
+    """Mark lost rows in arrived (n,), by draws (n,) in 0..1 and the chances to recover and to fail at each row."""
     lost = False
     for i in range(1, len(draws)):
         lost = draws[i] >= recover if lost else draws[i] < fail
-        kept[i] = not lost
+        arrived[i] = not lost
 
 
 @jit

@@ -1,20 +1,49 @@
-"""Down range, optical flow and Multi-ranger: readings that the firmware and the log get."""
+"""Down range and optical flow: readings that the firmware and the log get."""
 
 import math
 
 import numpy as np
 
-from airtouch.simulation import sensors, world
+from airtouch.simulation import filters, world
 from airtouch.simulation.compiled import jit
-from airtouch.simulation.firmware import kalman, range_module
+from airtouch.simulation.firmware import measurement, range_module
 from airtouch.simulation.random_stream import normals
-from airtouch.simulation.rotation import euler, rotate_back
+from airtouch.simulation.rotation import rotate_back
 
+_F = np.float64
 RANGE_MS, FLOW_MS = 7, 3  #: ticks of the first down range reading and of the first flow reading
 RANGES, FLOWS = 16, 64  #: readings that the delay lines hold
+MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
+CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
+CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
+LEAST_SPOT_M = 0.002
 #: share of the new surface in a reading that saw two: where it is more than this, a reading beyond an edge overshoots
 OVERSHOOT_SHARE = 0.5
-LAST = 1000.0  #: s; where nothing has changed below for so long
+LONG_AGO_S = 1000.0  #: since the last change below, at the start of a flight
+STATE = np.dtype([
+    ("count", np.int64),  # down range measurements so far
+    ("distance", _F, (RANGES,)),  # delay line of them, m along the beam
+    ("top", _F, (RANGES,)),  # m, height of the surface that each saw
+    ("kick", _F, (RANGES,)),  # m, error of each that the estimator alone gets
+    ("flow", _F, (FLOWS, 2)),  # delay line of flow counts, forward and left
+    ("seen_top", _F),  # m, height of the surface that the down range saw last
+    ("below_top", _F),  # m, of the surface below
+    ("start_top", _F),  # m, of the surface that it started from
+    ("changed_s", _F),  # when seen_top changed last
+    ("rise", _F),  # 1 where seen_top rose then, 0 where it fell
+    ("down", _F),  # m, down range as logged
+    ("offset", _F),  # m, what the range module added to its last reading
+    ("range_drift", _F),  # error over distance
+    ("flow_drift", _F, (2,)),  # 1/s, error of velocity over distance, forward and left
+    ("normals", _F, (4,)),  # working space
+])
+
+
+@jit
+def begin(s, top):
+    """Stand on a surface of that height, m."""
+    s.start_top = s.seen_top = s.below_top = top
+    s.down, s.changed_s = 0.01, -LONG_AGO_S
 
 
 @jit
@@ -35,122 +64,133 @@ def mixed_share(drawn, leaving):
 
 
 @jit
-def look(plant, memory, ground, state, now, stream):
-    """One measurement of the down range at time now (s): distance along the beam into the delay line.
-
-    ground: corners, first, surface, box of a World. memory.top is the height of the surface it saw.
-    """
-    corners, first, surface, box = ground
-    normals(stream, memory.other_normals[:])
-    eye, patch = state[2] - plant.range_below_rotors, memory.patch[:]
-    spot = max(sensors.CONE_TANGENT * (eye - memory.ground), 0.002)
-    world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
-    near = patch[world.UPPER_TOP] if patch[world.COVER] > 0.0 else patch[world.LOWER_TOP]
-    spot = max(sensors.CONE_TANGENT * (eye - near), 0.002)
-    world.below(corners, first, surface, box, state[0], state[1], eye, spot, patch)
-    top = patch[world.UPPER_TOP] if patch[world.COVER] >= sensors.CONE_COVER else patch[world.LOWER_TOP]
-    memory.beneath = top
-    if plant.range_reach > 0.0:
-        world.below(corners, first, surface, box, state[0], state[1], eye, plant.range_reach, patch)
-        top = patch[world.UPPER_TOP] if patch[world.COVER] > 0.0 else patch[world.LOWER_TOP]
-    tilt = max(1.0 - 2.0 * (state[7] * state[7] + state[8] * state[8]), 0.3)  # cosine between beam and plumb
-    true = (eye - top) / tilt
-    if top != memory.top:
-        memory.changed, memory.rose = now, 1.0 if top > memory.top else 0.0
-        memory.offset += top - memory.top  # optical flow sees it at once, however late the reading is
-    decay = math.exp(-0.001 * plant.firmware.periods.range_ms / plant.range_drift_time)
-    fresh = math.sqrt(1.0 - decay * decay) * plant.range_drift
-    memory.drift[2] = decay * memory.drift[2] + fresh * memory.other_normals[1]
-    error = memory.drift[2] * true + plant.range_bias * math.exp(-true / plant.range_bias_fade)
-    dip = plant.range_dip * memory.rose * math.exp((memory.changed - now) / plant.range_dip_time)
-    error += dip * math.exp(-true / plant.range_dip_fade) if plant.range_dip_fade > 0.0 else dip
-    if top != memory.top and uniform_of(memory.other_normals[3]) < plant.range_mixed:
-        error += (mixed_share(uniform_of(memory.other_normals[2]), top < memory.top) - 1.0) * (memory.top - top) / tilt
-    row = memory.looks & (RANGES - 1)
-    down = max(true + error + plant.range_noise * memory.other_normals[0], 0.0)
-    memory.distances[row] = down if down <= sensors.MAX_RANGE_M else np.nan
-    memory.tops[row] = top
-    memory.kicks[row] = 0.0
-    if top != memory.top:
-        memory.kicks[row] = plant.range_kick if top < memory.top else -plant.range_kick
-    memory.top = top
-    memory.looks += 1
+def _surface(ground, x, y, z, radius, least_cover):
+    """Height (m) of the surface that a spot of `radius` sees: the higher one where it covers more than least_cover."""
+    lower, upper, cover = world.below(ground, x, y, z, radius)
+    return ground.surface[upper if cover > least_cover else lower, world.TOP]
 
 
 @jit
-def range_reading(plant, memory, ground, tick, state, now, stream, reading):
-    """The down range at a tick (ms): measures when due and fills distance and distance_std of the reading (NaN: none).
+def _below(s, ground, x, y, eye):
+    """Height (m) of the surface that fills most of the beam's spot, from a sensor `eye` m high."""
+    spot = max(CONE_TANGENT * (eye - s.start_top), LEAST_SPOT_M)
+    near = _surface(ground, x, y, eye, spot, 0.0)
+    spot = max(CONE_TANGENT * (eye - near), LEAST_SPOT_M)
+    lower, upper, cover = world.below(ground, x, y, eye, spot)
+    return ground.surface[upper if cover >= CONE_COVER else lower, world.TOP]
 
-    A reading reaches log and estimator plant.range_delay after it was measured, by way of the firmware's
+
+@jit
+def _error(plant, s, now, true):
+    """Error (m) of a measurement of the distance `true` (m) at time now (s): drift, bias near a surface, dip."""
+    decay = math.exp(-0.001 * plant.firmware.periods.range_ms / plant.range_drift_time)
+    fresh = math.sqrt(1.0 - decay * decay) * plant.range_drift
+    s.range_drift = decay * s.range_drift + fresh * s.normals[1]
+    error = s.range_drift * true + plant.range_bias * math.exp(-true / plant.range_bias_fade)
+    dip = plant.range_dip * s.rise * math.exp((s.changed_s - now) / plant.range_dip_time)
+    error += dip * math.exp(-true / plant.range_dip_fade) if plant.range_dip_fade > 0.0 else dip
+    return error
+
+
+@jit
+def measure(plant, state, ground, stream):
+    """One measurement of the down range: distance along the beam, its surface and its kick into the delay lines.
+
+    ground: a World. The surface that it saw stays in state.ranging.seen_top.
+    """
+    s, pose, now = state.ranging, state.body.state, state.time_s
+    normals(stream, s.normals[:])
+    eye = pose[2] - plant.range_below_rotors
+    top = s.below_top = _below(s, ground, pose[0], pose[1], eye)
+    if plant.range_reach > 0.0:
+        top = _surface(ground, pose[0], pose[1], eye, plant.range_reach, 0.0)
+    tilt = max(1.0 - 2.0 * (pose[7] * pose[7] + pose[8] * pose[8]), 0.3)  # cosine between beam and plumb
+    true = (eye - top) / tilt
+    changed = top != s.seen_top
+    if changed:
+        s.changed_s, s.rise = now, 1.0 if top > s.seen_top else 0.0
+        s.offset += top - s.seen_top  # optical flow sees it at once, however late the reading is
+    error = _error(plant, s, now, true)
+    if changed and uniform_of(s.normals[3]) < plant.range_mixed:
+        error += (mixed_share(uniform_of(s.normals[2]), top < s.seen_top) - 1.0) * (s.seen_top - top) / tilt
+    row = s.count & (RANGES - 1)
+    down = max(true + error + plant.range_noise * s.normals[0], 0.0)
+    s.distance[row] = down if down <= MAX_RANGE_M else np.nan
+    s.top[row] = top
+    s.kick[row] = 0.0
+    if changed:
+        s.kick[row] = plant.range_kick if top < s.seen_top else -plant.range_kick
+    s.seen_top = top
+    s.count += 1
+
+
+@jit
+def range_reading(plant, state, ground, tick, stream):
+    """The down range at a tick (ms): measures when due and fills distance and distance_std of the firmware's reading.
+
+    A reading (NaN: none) reaches log and estimator plant.range_delay after it was measured, by way of the firmware's
     range module.
     """
-    firmware = plant.firmware
-    period, late = firmware.periods.range_ms, int(1000.0 * plant.range_delay + 0.5)
+    s, release, reading = state.ranging, plant.firmware, state.firmware.reading
+    period, late = release.periods.range_ms, int(1000.0 * plant.range_delay + 0.5)
     reading.distance = np.nan
     if tick >= RANGE_MS and (tick - RANGE_MS) % period == 0:
-        look(plant, memory, ground, state, now, stream)
+        measure(plant, state, ground, stream)
     since = tick - RANGE_MS - late
     if since < 0 or since % period != 0:
         return
     row = (since // period) & (RANGES - 1)
-    memory.down = memory.distances[row]
-    if math.isnan(memory.down) or memory.down >= firmware.range.most_m:
+    s.down = s.distance[row]
+    if math.isnan(s.down) or s.down >= release.range.most_m:
         return
-    passed = range_module.compensated(firmware, memory.module, memory.down, memory.tops[row])
-    memory.offset = passed - memory.down + memory.top - memory.tops[row]
-    if memory.tops[row] > memory.ground:
+    passed = range_module.compensated(release, state.firmware.range_module, s.down, s.top[row])
+    s.offset = passed - s.down + s.seen_top - s.top[row]
+    if s.top[row] > s.start_top:
         passed -= plant.range_residual
-    reading.distance = passed + memory.kicks[row]
-    reading.distance_std = kalman.range_std(firmware, reading.distance)
+    reading.distance = passed + s.kick[row]
+    reading.distance_std = measurement.range_std(release, reading.distance)
 
 
 @jit
-def flow_reading(plant, memory, tick, state, now, stream, reading):
-    """Optical flow at a tick (ms): counts forward and left of the reading (NaN: none).
-
-    Counts follow from the velocity over ground, the body's rates and the distance to what is below, scaled to the
-    height that the firmware divides by (plant.flow_share: how far they are not).
-    """
-    s = plant.firmware.flow
+def flow_reading(plant, state, tick, stream):
+    """Optical flow at a tick (ms): counts forward and left of the firmware's reading (NaN: none)."""
+    s, model, reading = state.ranging, plant.firmware.flow, state.firmware.reading
     period = plant.firmware.periods.flow_ms
     reading.forward = np.nan
     if tick < FLOW_MS or (tick - FLOW_MS) % period != 0:
         return
-    dt = 0.001 * period
-    normals(stream, memory.other_normals[:])
+    dt, number = 0.001 * period, (tick - FLOW_MS) // period
+    normals(stream, s.normals[:])
     decay = math.exp(-dt / plant.flow_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
     for i in range(2):
-        memory.drift[i] = decay * memory.drift[i] + fresh * plant.flow_noise[i] * memory.other_normals[i]
-    distance = state[2] - plant.range_below_rotors - memory.beneath
-    near = max(distance, plant.flow_focus)
-    far = max(near + (memory.beneath - memory.top) + memory.offset, near)
-    share, since = plant.flow_share, now - memory.changed - plant.flow_transient_wait
-    if since >= 0.0 and distance >= plant.flow_transient_above:
-        share += plant.flow_transient * math.exp(-since / plant.flow_transient_time)
-    per_metre = (1.0 - share) / far + share / near
-    ahead, left, _ = rotate_back(state[6:10], state[3], state[4], state[5])
-    upright = 1.0 - 2.0 * (state[7] * state[7] + state[8] * state[8])
-    pixels = dt * s.pixels / s.aperture_rad
-    number = (tick - FLOW_MS) // period
-    row = number & (FLOWS - 1)
-    memory.flows[row, 0] = s.counts_per_pixel * pixels * (
-        upright * ahead * per_metre + memory.drift[0] - state[11])
-    memory.flows[row, 1] = s.counts_per_pixel * pixels * (
-        upright * left * per_metre + memory.drift[1] + state[10])
+        s.flow_drift[i] = decay * s.flow_drift[i] + fresh * plant.flow_noise[i] * s.normals[i]
+    _count(plant, state, dt, number & (FLOWS - 1))
     late = plant.flow_delay / dt
     if number < late:
         return
-    forward, left = sensors.delayed(memory.flows, number, late, 0), sensors.delayed(memory.flows, number, late, 1)
-    if max(abs(forward), abs(left)) < s.most_counts:
-        reading.forward, reading.left, reading.dt, reading.std = forward, left, dt, s.std_counts
+    forward, left = filters.delayed(s.flow, number, late, 0), filters.delayed(s.flow, number, late, 1)
+    if max(abs(forward), abs(left)) < model.most_counts:
+        reading.forward, reading.left, reading.dt, reading.std = forward, left, dt, model.std_counts
 
 
 @jit
-def walls(memory, room, state):
-    """The Multi-ranger: distances to the walls of room (4,), front, back, left, right."""
-    _, _, yaw = euler(state[6:10])
-    for i in range(4):
-        turn = (0.0, math.pi, 0.5 * math.pi, -0.5 * math.pi)[i]
-        far = sensors.wall_distance(state[0], state[1], yaw + turn, room)
-        memory.ranges[i] = far if far <= sensors.MAX_RANGE_M else np.nan
+def _count(plant, state, dt, row):
+    """Counts of optical flow over dt seconds, forward and left, into a row of the delay line.
+
+    They follow from the velocity over ground, the body's rates and the distance to what is below, scaled to the
+    height that the firmware divides by (plant.flow_share: how far they are not).
+    """
+    s, pose, model = state.ranging, state.body.state, plant.firmware.flow
+    distance = pose[2] - plant.range_below_rotors - s.below_top
+    near = max(distance, plant.flow_focus)
+    far = max(near + (s.below_top - s.seen_top) + s.offset, near)
+    share, since = plant.flow_share, state.time_s - s.changed_s - plant.flow_transient_wait
+    if since >= 0.0 and distance >= plant.flow_transient_above:
+        share += plant.flow_transient * math.exp(-since / plant.flow_transient_time)
+    per_metre = (1.0 - share) / far + share / near
+    ahead, left, _ = rotate_back(pose[6:10], pose[3], pose[4], pose[5])
+    upright = 1.0 - 2.0 * (pose[7] * pose[7] + pose[8] * pose[8])
+    pixels = dt * model.pixels / model.aperture_rad
+    s.flow[row, 0] = model.counts_per_pixel * pixels * (upright * ahead * per_metre + s.flow_drift[0] - pose[11])
+    s.flow[row, 1] = model.counts_per_pixel * pixels * (upright * left * per_metre + s.flow_drift[1] + pose[10])

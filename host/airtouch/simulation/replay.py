@@ -7,17 +7,19 @@ what the IMU measured.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import float64, from_dtype, int64, njit, types, uint64
+from numba import float64, njit, types
 
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
-from airtouch.simulation import battery, loop, motors, rigid_body, sensors
+from airtouch.simulation import battery, filters, motors, rigid_body
 from airtouch.simulation import signals as at
-from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import MEMORY, PARAMETERS, Wrenches, WrenchFunction
+from airtouch.simulation.effects import Active, slots
+from airtouch.simulation.effects.effect import MEMORY
+from airtouch.simulation.effects.slots import EFFECT_SLOTS, SLOTS
 from airtouch.simulation.flight import prepare
-from airtouch.simulation.plant import DTYPE, hover_speed
+from airtouch.simulation.plant import PLANT, hover_speed
 from airtouch.simulation.random_stream import stream
 from airtouch.simulation.rotation import as_matrix
 from airtouch.vehicle import Vehicle
@@ -27,9 +29,10 @@ FAR_M = 10.0  #: height where none is known: out of ground effect
 
 @dataclass(frozen=True)
 class Replay:
-    """What the model says of each sample: specific_force (n, 3) m/s^2 and torque (n, 3) N m, body axes,
+    """What the model says of each of n samples.
 
-    angular_acceleration (n, 3) rad/s^2, rotor_speed (n, 4) rad/s, volts (n,).
+    specific_force (n, 3) m/s^2, torque (n, 3) N m and angular_acceleration (n, 3) rad/s^2: body axes;
+    rotor_speed (n, 4) rad/s; volts (n,).
     """
 
     specific_force: np.ndarray
@@ -39,51 +42,76 @@ class Replay:
     volts: np.ndarray
 
 
-@njit(types.void(from_dtype(DTYPE)[::1], float64[:, ::1], float64[:, ::1], float64[::1],
-                 types.UniTuple(WrenchFunction, loop.SLOTS), int64, float64[:, ::1], uint64[:, ::1],
-                 float64[:, ::1], float64[:, ::1], float64[::1]), cache=True, nogil=True)
-def _run(plant_array, signals, pwm, measured_volts, effects, used, parameters, streams, out, speeds,
-         volts_out):
-    plant = plant_array[0]
-    speed, target, wrench_now = np.zeros(4), np.zeros(4), np.zeros(4)
-    command, memory, force = np.zeros((loop.RING, 4)), np.zeros((loop.SLOTS, MEMORY)), np.zeros(6)
-    charge, battery_volts = plant.battery_charge, plant.nominal_voltage
-    command[:] = pwm[0]
+class _Log(NamedTuple):
+    """What the replay reads of n samples: signals (n, COUNT), pwm (n, 4), measured volts (n,; NaN: none)."""
+
+    signals: np.ndarray
+    pwm: np.ndarray
+    volts: np.ndarray
+
+
+class _Model(NamedTuple):
+    """What it fills: force over mass and torque (n, 6), rotor speeds (n, 4) rad/s, supply volts (n,)."""
+
+    motion: np.ndarray
+    speeds: np.ndarray
+    volts: np.ndarray
+
+
+@njit
+def _motion(plant, speed, force, out):
+    """Specific force and torque (6,) of rotors and effects, without the rotors' momentum."""
+    lift, roll, pitch, yaw = rigid_body.rotor_wrench(plant, speed, plant.gain)
+    out[0], out[1], out[2] = force[0] / plant.mass, force[1] / plant.mass, (force[2] + lift) / plant.mass
+    out[3], out[4], out[5] = force[3] + roll, force[4] + pitch, force[5] + yaw
+
+
+@njit
+def _rotors(plant, s, speed, target, out):
+    """Rotor speeds one sample on, and the torque of their momentum and its change, added to out (6,)."""
+    h, spin, spin_rate = s[at.STEP], 0.0, 0.0
     for i in range(4):
-        speed[i] = motors.target_speed(plant, pwm[0, i], 1.0)
-    for k in range(len(signals)):
-        s = signals[k]
+        tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
+        spin += rigid_body.SPIN[i] * plant.rotor_inertia * speed[i]
+        spin_rate += rigid_body.SPIN[i] * plant.rotor_inertia * (target[i] - speed[i]) / tau
+        speed[i] = target[i] + (speed[i] - target[i]) * np.exp(-h / tau)
+    out[3] -= s[at.RATES + 1] * spin
+    out[4] += s[at.RATES] * spin
+    out[5] -= spin_rate
+
+
+_ROWS, _COLUMN = float64[:, ::1], float64[::1]
+
+
+@njit(types.void(PLANT, types.NamedTuple((_ROWS, _ROWS, _COLUMN), _Log), EFFECT_SLOTS,
+                 types.NamedTuple((_ROWS, _ROWS, _COLUMN), _Model)), cache=True, nogil=True)
+def _run(plants, log, effects, model):
+    """Fill the model, sample by sample, and rotor speeds and thrusts of the signals."""
+    plant = plants[0]
+    speed, target = np.zeros(4), np.zeros(4)
+    commands, memory, force = np.zeros((motors.DELAY_ROWS, 4)), np.zeros((SLOTS, MEMORY)), np.zeros(6)
+    charge, battery_volts = plant.battery_charge, plant.nominal_voltage
+    commands[:] = log.pwm[0]
+    for i in range(4):
+        speed[i] = motors.target_speed(plant, log.pwm[0, i], 1.0)
+    for k in range(len(log.signals)):
+        s = log.signals[k]
         h = s[at.STEP]
         volts = battery.supply(plant, battery_volts)
-        if np.isfinite(measured_volts[k]):
-            volts = measured_volts[k]
-        volts_out[k] = volts
-        factor = motors.voltage_factor(plant, volts)
-        power = 0.0
+        if np.isfinite(log.volts[k]):
+            volts = log.volts[k]
+        model.volts[k], model.speeds[k] = volts, speed
+        factor, power = motors.voltage_factor(plant, volts), 0.0
         for i in range(4):
             thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
             power += plant.power_per_thrust15 * thrust * np.sqrt(thrust)
-            s[at.ROTOR_SPEED + i], speeds[k, i] = speed[i], speed[i]
-            s[at.THRUST + i] = thrust * plant.gain[i]
-            command[k % loop.RING, i] = pwm[k, i]
-            given = sensors.delayed(command, k, plant.actuator_delay / h, i)
-            target[i] = motors.target_speed(plant, given, factor)
-        for i in range(6):
-            force[i] = 0.0
-        for i in range(used):
-            effects[i](parameters[i], s, memory[i], streams[i], force)
-        rigid_body.thrust_wrench(plant, speed, wrench_now)
-        out[k, 0], out[k, 1] = force[0] / plant.mass, force[1] / plant.mass
-        out[k, 2] = (force[2] + wrench_now[0]) / plant.mass
-        spin, spin_rate = 0.0, 0.0
-        for i in range(4):
-            tau = plant.motor_rise if target[i] > speed[i] else plant.motor_fall
-            spin += rigid_body.SPIN[i] * plant.rotor_inertia * speed[i]
-            spin_rate += rigid_body.SPIN[i] * plant.rotor_inertia * (target[i] - speed[i]) / tau
-            speed[i] = target[i] + (speed[i] - target[i]) * np.exp(-h / tau)
-        out[k, 3] = force[3] + wrench_now[1] - s[at.RATES + 1] * spin
-        out[k, 4] = force[4] + wrench_now[2] + s[at.RATES] * spin
-        out[k, 5] = force[5] + wrench_now[3] - spin_rate
+            s[at.ROTOR_SPEED + i], s[at.THRUST + i] = speed[i], thrust * plant.gain[i]
+            commands[k % motors.DELAY_ROWS, i] = log.pwm[k, i]
+            target[i] = motors.target_speed(plant, filters.delayed(commands, k, plant.actuator_delay / h, i), factor)
+        force[:] = 0.0
+        slots.add(effects, s, memory, force)
+        _motion(plant, speed, force, model.motion[k])
+        _rotors(plant, s, speed, target, model.motion[k])
         charge, battery_volts = battery.drain(plant, charge, power, h)
 
 
@@ -141,18 +169,15 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     volts = np.full(n, np.nan)
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
         volts = log["vbat_V"].copy()
-    functions = Wrenches([a.effect.wrench for a in acting], loop.SLOTS)
-    parameters, streams = np.zeros((loop.SLOTS, PARAMETERS)), np.zeros((loop.SLOTS, 1), np.uint64)
-    for i, a in enumerate(acting):
-        parameters[i], streams[i] = a.effect.vector(a.values), stream(seed, 0, a.effect.name)
-    out, speeds, volts_out = np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n)
-    pwm = np.ascontiguousarray(np.nan_to_num(log.stack(PWM) if pwm is None else pwm))
-    _run(plant, s, pwm, volts, functions, len(acting), parameters, streams, out, speeds, volts_out)
+    effects = slots.slots(acting, [stream(seed, 0, a.effect.name) for a in acting])
+    model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
+    _run(plant, _Log(s, np.ascontiguousarray(np.nan_to_num(log.stack(PWM) if pwm is None else pwm)), volts), effects,
+         model)
     row = plant[0]
     rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
-    turning = (out[:, 3:] - np.cross(rates, inertia * rates)) / inertia
-    force = out[:, :3] + row["acc_bias"]
-    return Replay(force, out[:, 3:], turning, speeds, volts_out)
+    force, torque = model.motion[:, :3] + row["acc_bias"], model.motion[:, 3:]
+    turning = (torque - np.cross(rates, inertia * rates)) / inertia
+    return Replay(force, torque, turning, model.speeds, model.volts)
 
 
 def wrench_of(active: Active, signals: np.ndarray, seed: int = 0) -> np.ndarray:

@@ -2,10 +2,13 @@
 
 import math
 
+from numba import float64
+
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.firmware import controller
 
 MODE, X, Y, Z, VX, VY, YAW, MOTORS, SETPOINT_SIZE = range(9)  #: places in a row
+ROW = float64[::1]  #: a row (8,) in compiled code
 FLY, HOLD, TILT, TILT_THRUST = 0.0, 1.0, 2.0, 3.0  #: values of MODE, see to_firmware
 
 

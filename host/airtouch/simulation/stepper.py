@@ -6,9 +6,10 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import effects as registry
-from airtouch.simulation import kept, loop
+from airtouch.simulation import loop
+from airtouch.simulation import state as states
 from airtouch.simulation.effects import Active
-from airtouch.simulation.effects.effect import PARAMETERS, Wrenches
+from airtouch.simulation.effects.slots import slots
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
 from airtouch.simulation.random_stream import stream
 from airtouch.simulation.scenario import FlightPlan
@@ -30,15 +31,13 @@ def prepare(vehicle: Vehicle, active: Sequence[Active]) -> tuple[np.ndarray, lis
     for a in active:
         if a.effect.settings is not None:
             a.effect.settings(plant[0], a.values)
-    if len(acting) > loop.SLOTS:
-        raise AirTouchError(f"{len(acting)} effects with a force at once; at most {loop.SLOTS}")
     return plant, acting
 
 
 class Stepper:
-    """One flight's plant, world, effects and random numbers, and what it keeps between rows.
+    """One flight's plant, world, effects, random numbers and state, flown on by `fly`.
 
-    `plant` (1,) and `memory` (1,) of kept.MEMORY_DTYPE may be looked at and changed between calls.
+    `plant` (1,) of plant.DTYPE and `state` (1,) of state.DTYPE may be looked at and changed between calls.
     """
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int,
@@ -49,30 +48,24 @@ class Stepper:
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
                                 f"{hover_pwm(vehicle):.0f}")
         self.plant, acting = prepare(vehicle, active)
-        self._gain = self.plant[0]["gain"].copy()  # the loop writes gain times noise into the plant
-        self.world, self.room = plan.world, plan.room
-        self.used = len(acting)
-        self.functions = Wrenches([a.effect.wrench for a in acting], loop.SLOTS)
-        self.parameters = np.zeros((loop.SLOTS, PARAMETERS))
-        self.effect_streams = np.zeros((loop.SLOTS, 1), np.uint64)
-        seen: dict[str, int] = {}
-        for i, a in enumerate(acting):
-            self.parameters[i] = a.effect.vector(a.values)
-            seen[a.effect.name] = seen.get(a.effect.name, 0) + 1
-            self.effect_streams[i] = stream(seed, flight, f"{a.effect.name}/{seen[a.effect.name]}")
-        self.streams = np.array([stream(seed, flight, n) for n in ("motors", "imu", "ranging", "start")])
-        self.memory = kept.memory()
+        self.state = states.empty()
+        streams = np.zeros(1, loop.STREAMS)
+        for name in loop.STREAMS.names:
+            streams[0][name] = stream(seed, flight, name)
+        effects = slots(acting, [stream(seed, flight, key) for key in _keys(acting)])
+        self.flight = loop.Flight(self.plant, plan.world, plan.room, effects, streams, self.state)
 
     def begin(self, setpoint: np.ndarray) -> None:
         """Stand on what is below the set-point (8,), motors off."""
-        w = self.world
-        self.memory[:] = 0
-        self.plant[0]["gain"] = self._gain
-        kept.begin(self.plant, w.corners, w.first, w.surface, w.box, setpoint, self.streams[3], self.memory)
+        self.state[:] = 0
+        states.begin(self.plant, self.flight.world, setpoint, self.flight.streams[0]["start"], self.state)
 
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:
         """Fly on by len(table) rows into table (rows, 33): how it ended, rows filled. setpoints (rows, 8)."""
-        w = self.world
-        return loop.fly(self.plant, w.corners, w.first, w.surface, w.box, self.room, setpoints,
-                        self.functions, self.used, self.parameters, self.effect_streams, self.streams,
-                        self.memory, table)
+        return loop.fly(self.flight, setpoints, table)
+
+
+def _keys(acting: Sequence[Active]) -> list[str]:
+    """Names of the effects' random streams: an effect that comes twice draws other numbers the second time."""
+    names = [a.effect.name for a in acting]
+    return [f"{name}/{names[:i].count(name) + 1}" for i, name in enumerate(names)]

@@ -3,8 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import float64, int64, types
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.compiled import jit
@@ -16,7 +18,8 @@ MATERIALS = {
     "cement": (1.00, 1.0), "acrylic": (1.00, 0.9), "mat": (0.85, 1.3),
     "grass": (0.70, 1.8), "water": (0.90, 2.2),
 }
-LOWER_TOP, LOWER_FACTOR, LOWER_ROUGHNESS, UPPER_TOP, UPPER_FACTOR, UPPER_ROUGHNESS, COVER = range(7)
+TOP, FACTOR, ROUGHNESS = range(3)  #: columns of World.surface: height in m, ground-effect factor, roughness
+NONE = -1  #: no row of World.surface, no place
 ABOVE_M = 0.005  #: a surface this far above a rotor is beside it, not below
 
 
@@ -29,12 +32,11 @@ class Platform:
     material: str = "acrylic"
 
 
-@dataclass(frozen=True)
-class World:
+class World(NamedTuple):
     """Platforms as flat arrays, lowest first; the floor is at height 0.
 
     corners (total, 2), first (n + 1): corners of platform k are first[k]:first[k + 1];
-    surface (n + 1, 3): top, factor, roughness, the floor in the last row; box (n, 4):
+    surface (n + 1, 3): TOP, FACTOR, ROUGHNESS, the floor in the last row; box (n, 4):
     least x, least y, greatest x, greatest y.
     """
 
@@ -42,6 +44,9 @@ class World:
     first: np.ndarray
     surface: np.ndarray
     box: np.ndarray
+
+
+WORLD = types.NamedTuple((float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1]), World)  #: in compiled code
 
 
 def build(platforms: Sequence[Platform], floor: str = "cement") -> World:
@@ -82,78 +87,74 @@ def inside_by(corners, start, stop, x, y):
 
 
 @jit
-def below(corners, first, surface, box, x, y, z, radius, out):
-    """What lies under a disc of `radius` at (x, y, z): two surfaces and a share, into out (7,).
+def _beyond(world, k, x, y, distance):
+    """Whether (x, y) is further than `distance` m outside the box around platform k."""
+    box = world.box
+    return (x < box[k, 0] - distance or x > box[k, 2] + distance
+            or y < box[k, 1] - distance or y > box[k, 3] + distance)
 
-    Places LOWER_TOP .. COVER: the surface under the whole disc, the higher one under part
-    of it, and how much of the disc is over that one (0..1, across a straight edge).
+
+@jit
+def below(world, x, y, z, radius):
+    """What lies under a disc of `radius` m at (x, y, z): lower, upper, cover.
+
+    lower: row of World.surface that lies under the whole disc; upper: row of the higher one under part of it;
+    cover: share of the disc over that one, 0..1, as across a straight edge. With a cover of 0 upper means nothing.
     """
-    n = len(first) - 1
-    out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = surface[n, 0], surface[n, 1], surface[n, 2]
-    out[UPPER_TOP], out[UPPER_FACTOR], out[UPPER_ROUGHNESS] = surface[n, 0], surface[n, 1], surface[n, 2]
-    out[COVER] = 0.0
+    n = len(world.first) - 1
+    lower, upper, cover = n, n, 0.0
     for k in range(n):
-        if surface[k, 0] > z + ABOVE_M:
+        if world.surface[k, TOP] > z + ABOVE_M:
             break
-        if (x < box[k, 0] - radius or x > box[k, 2] + radius
-                or y < box[k, 1] - radius or y > box[k, 3] + radius):
+        if _beyond(world, k, x, y, radius):
             continue
-        depth = inside_by(corners, first[k], first[k + 1], x, y)
+        depth = inside_by(world.corners, world.first[k], world.first[k + 1], x, y)
         if depth <= -radius:
             continue
-        if depth >= radius or out[COVER] > 0.0:
-            # all of the disc is over it, or it stands beside a lower one that already counts
-            if depth >= radius:
-                out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = surface[k, 0], surface[k,
-                        1], surface[k, 2]
-                out[COVER] = 0.0
-                continue
-            out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = out[UPPER_TOP], out[UPPER_FACTOR], out[
-                UPPER_ROUGHNESS]
-        out[UPPER_TOP], out[UPPER_FACTOR], out[UPPER_ROUGHNESS] = surface[k, 0], surface[k, 1], surface[k, 2]
-        share = depth / radius
-        out[COVER] = 0.5 + (math.asin(share) + share * math.sqrt(1.0 - share * share)) / math.pi
-
-
-@jit
-def alike(corners, first, surface, box, x, y, low, high, reach, out):
-    """Whether all discs within `reach` of (x, y), between heights low and high, have one whole surface below.
-
-    If so, what `below` gives for each of them is in out (7,).
-    """
-    n = len(first) - 1
-    top = n
-    for k in range(n):
-        if surface[k, 0] > high + ABOVE_M:
-            break
-        if (x < box[k, 0] - reach or x > box[k, 2] + reach
-                or y < box[k, 1] - reach or y > box[k, 3] + reach):
+        if depth >= radius:
+            lower, cover = k, 0.0
             continue
-        depth = inside_by(corners, first[k], first[k + 1], x, y)
+        if cover > 0.0:  # it stands beside a lower one that already covers a part
+            lower = upper
+        share = depth / radius
+        upper, cover = k, 0.5 + (math.asin(share) + share * math.sqrt(1.0 - share * share)) / math.pi
+    return lower, upper, cover
+
+
+@jit
+def common(world, x, y, low, high, reach):
+    """The row of World.surface below every disc within `reach` m of (x, y), between heights low and high (m).
+
+    NONE where an edge, or a platform between the two heights, sets discs apart.
+    """
+    found = len(world.first) - 1
+    for k in range(len(world.first) - 1):
+        if world.surface[k, TOP] > high + ABOVE_M:
+            break
+        if _beyond(world, k, x, y, reach):
+            continue
+        depth = inside_by(world.corners, world.first[k], world.first[k + 1], x, y)
         if depth > -reach:
-            if depth < reach or surface[k, 0] > low + ABOVE_M:
-                return False
-            top = k
-    out[LOWER_TOP], out[LOWER_FACTOR], out[LOWER_ROUGHNESS] = surface[top, 0], surface[top, 1], surface[top, 2]
-    out[UPPER_TOP], out[UPPER_FACTOR], out[UPPER_ROUGHNESS] = surface[top, 0], surface[top, 1], surface[top, 2]
-    out[COVER] = 0.0
-    return True
+            if depth < reach or world.surface[k, TOP] > low + ABOVE_M:
+                return NONE
+            found = k
+    return found
 
 
 @jit
-def top_at(corners, first, surface, box, x, y):
+def top_at(world, x, y):
     """Height of the highest surface at the point (x, y), m."""
-    for k in range(len(first) - 2, -1, -1):
-        if box[k, 0] <= x <= box[k, 2] and box[k, 1] <= y <= box[k, 3]:
-            if inside_by(corners, first[k], first[k + 1], x, y) >= 0.0:
-                return surface[k, 0]
-    return surface[len(first) - 1, 0]
+    for k in range(len(world.first) - 2, -1, -1):
+        if not _beyond(world, k, x, y, 0.0):
+            if inside_by(world.corners, world.first[k], world.first[k + 1], x, y) >= 0.0:
+                return world.surface[k, TOP]
+    return world.surface[len(world.first) - 1, TOP]
 
 
 @jit
-def first_below(corners, first, surface, box, places):
-    """The first of places (n, 3) that is below the surface at its x and y; -1 where none is."""
+def first_below(world, places):
+    """The first of places (n, 3) that is below the surface at its x and y; NONE where none is."""
     for i in range(len(places)):
-        if places[i, 2] < top_at(corners, first, surface, box, places[i, 0], places[i, 1]):
+        if places[i, 2] < top_at(world, places[i, 0], places[i, 1]):
             return i
-    return -1
+    return NONE

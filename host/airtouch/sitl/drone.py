@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.simulation import loop, setpoint
+from airtouch.simulation import log_row, loop, setpoint
 from airtouch.simulation.effects import Active
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.simulation.stepper import Stepper
@@ -33,7 +33,7 @@ class Drone:
         self._stepper = Stepper(plan, vehicle, seed, flight, active)
         self._start = plan.setpoints[0].copy()
         self._start[setpoint.MOTORS] = 0.0
-        self._table = np.zeros((1, loop.COLUMNS))
+        self._table = np.zeros((1, log_row.COLUMNS))
         self._setpoint = np.zeros((1, setpoint.SETPOINT_SIZE))
         self.commander, self.app = Commander(), App(ai_deck, vehicle)
         self.ticks = 0
@@ -59,8 +59,8 @@ class Drone:
     @property
     def estimate(self) -> np.ndarray:
         """roll, pitch, yaw (rad), velocity (m/s), position (m over the floor)."""
-        memory = self._stepper.memory[0]
-        return np.concatenate([memory["angles"], memory["velocity"], memory["est"]["x"]])
+        firmware = self._stepper.state[0]["firmware"]
+        return np.concatenate([firmware["angles"], firmware["estimate"]["velocity"], firmware["kalman"]["x"]])
 
     @property
     def is_flying(self) -> bool:
@@ -75,7 +75,7 @@ class Drone:
     @property
     def height_over_floor(self) -> float:
         """True height of the down range sensor, m."""
-        return float(self.row[loop.PLACE + 2])
+        return float(self.row[log_row.POSITION + 2])
 
     @property
     def low_battery(self) -> bool:
@@ -127,8 +127,8 @@ class Drone:
         """From now on the battery is nearly empty."""
         self._drained = True
         self._stepper.plant[0]["battery_strength"] = 1.0
-        memory = self._stepper.memory[0]
-        memory["charge"] = min(NEARLY_EMPTY, memory["charge"])
+        battery = self._stepper.state[0]["battery"]
+        battery["charge"] = min(NEARLY_EMPTY, battery["charge"])
 
     def step(self) -> str:
         """Fly 10 ms. Returns the kind of the edge that the app reports, "none" mostly."""
@@ -142,33 +142,33 @@ class Drone:
         ending, _ = self._stepper.fly(self._setpoint, self._table)
         if ending != loop.OK:
             self._end(ending)
-        self.row[loop.T] = self.now_s
+        self.row[log_row.T] = self.now_s
         self.ticks += 1
         if self.motors_on:
             self._thrust_s = self.now_s
             if self.took_off_s is None:
                 self.took_off_s = self.now_s
-        self._low_s = self._low_s + PERIOD_S if self.row[loop.VBAT] < LOW_V else 0.0
-        row = self.row
-        edge = self.app.step(self.now_s, row[loop.ACC_WORLD:loop.ACC_WORLD + 3], row[loop.GYRO:loop.GYRO + 3],
-                             row[loop.PWM:loop.PWM + 4], float(row[loop.VBAT]), self.quaternion())
+        self._low_s = self._low_s + PERIOD_S if self.row[log_row.VBAT] < LOW_V else 0.0
+        acc, gyro = (self.row[first:first + 3] for first in (log_row.ACC_WORLD, log_row.GYRO))
+        pwm = self.row[log_row.PWM:log_row.PWM + 4]
+        edge = self.app.step(self.now_s, acc, gyro, pwm, float(self.row[log_row.VBAT]), self.quaternion())
         if edge != "none":
             self.messages.append(f"AIRTOUCH: Edge {int(self.app.read('edge'))}")
         return edge
 
     def _begin(self, row: np.ndarray) -> None:
-        memory, fresh = self._stepper.memory[0], self.ticks == 0
-        charge = memory["charge"].item()
+        battery = self._stepper.state[0]["battery"]
+        charge = battery["charge"].item()
         self._stepper.begin(row)
-        if not fresh:
-            memory["charge"] = charge
+        if self.ticks > 0:
+            battery["charge"] = charge
 
     def _end(self, ending: int) -> None:
         """What the simulator cannot fly on: the drone lies where it came down."""
         place = self._start.copy()
         if ending in (loop.STRUCK, loop.UPSET) and np.isfinite(self.row).all():
-            place[setpoint.X], place[setpoint.Y] = self.row[loop.PLACE:loop.PLACE + 2]
-            place[setpoint.YAW] = self.row[loop.ANGLES + 2]
+            place[setpoint.X], place[setpoint.Y] = self.row[log_row.POSITION:log_row.POSITION + 2]
+            place[setpoint.YAW] = self.row[log_row.ANGLES + 2]
         if ending != loop.STRUCK or self.motors_on:
             self.state = CRASHED
             self.messages.append("SUP: Crashed, recovery required")

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from airtouch.simulation import loop, setpoint
+from airtouch.simulation import log_row, setpoint
 from airtouch.simulation.battery import CHARGE, OPEN_CIRCUIT_V
 from airtouch.sitl import app
 from airtouch.sitl.drone import BATTERY, LOW_POWER, Drone
@@ -43,37 +43,37 @@ def log_variables(drone: Drone) -> Variables:
         for i, name in enumerate(names.split()):
             table[f"{group}.{name}"] = (kind, lambda d, i=i: read(d, i))
 
-    add("acc", "x y z", "float", lambda d, i: d.row[loop.ACC + i] / G)
-    add("gyro", "x y z", "float", lambda d, i: math.degrees(d.row[loop.GYRO + i]))
+    add("acc", "x y z", "float", lambda d, i: d.row[log_row.ACC + i] / G)
+    add("gyro", "x y z", "float", lambda d, i: math.degrees(d.row[log_row.GYRO + i]))
     add("gyro", "xRaw yRaw zRaw", "int16_t",
-        lambda d, i: round(math.degrees(d.row[loop.GYRO + i]) / GYRO_LSB_DEG))
+        lambda d, i: round(math.degrees(d.row[log_row.GYRO + i]) / GYRO_LSB_DEG))
     add("stateEstimate", "x y z", "float", lambda d, i: d.estimate[6 + i])
     add("stateEstimate", "vx vy vz", "float", lambda d, i: d.estimate[3 + i])
-    add("stateEstimate", "ax ay az", "float", lambda d, i: d.row[loop.ACC_WORLD + i] / G - (i == 2))
+    add("stateEstimate", "ax ay az", "float", lambda d, i: d.row[log_row.ACC_WORLD + i] / G - (i == 2))
     add("stateEstimate", "roll pitch yaw", "float", lambda d, i: math.degrees((1, -1, 1)[i] * d.estimate[i]))
     add("stateEstimate", "qx qy qz qw", "float", lambda d, i: d.quaternion()[i])
     add("stateEstimateZ", "x y z", "int16_t", lambda d, i: 1000.0 * d.estimate[6 + i])
     add("stateEstimateZ", "vx vy vz", "int16_t", lambda d, i: 1000.0 * d.estimate[3 + i])
-    add("stateEstimateZ", "ax ay az", "int16_t", lambda d, i: 1000.0 * d.row[loop.ACC_WORLD + i])
+    add("stateEstimateZ", "ax ay az", "int16_t", lambda d, i: 1000.0 * d.row[log_row.ACC_WORLD + i])
     add("stateEstimateZ", "quat", "uint32_t", lambda d, i: compress(d.quaternion()))
     add("stateEstimateZ", "rateRoll ratePitch rateYaw", "int16_t",
-        lambda d, i: 1000.0 * (1, -1, 1)[i] * d.row[loop.GYRO + i])
+        lambda d, i: 1000.0 * (1, -1, 1)[i] * d.row[log_row.GYRO + i])
     add("stabilizer", "roll pitch yaw", "float", lambda d, i: math.degrees((1, -1, 1)[i] * d.estimate[i]))
-    add("stabilizer", "thrust", "float", lambda d, i: float(np.mean(d.row[loop.PWM:loop.PWM + 4])))
+    add("stabilizer", "thrust", "float", lambda d, i: float(np.mean(d.row[log_row.PWM:log_row.PWM + 4])))
     add("ctrltarget", "x y z", "float", lambda d, i: d.setpoint[setpoint.X + i])
     add("ctrltarget", "vx vy", "float", lambda d, i: d.setpoint[setpoint.VX + i])
     add("kalman", "stateX stateY stateZ", "float", lambda d, i: d.estimate[6 + i])
     add("kalman", "varX varY varZ", "float", lambda d, i: 1e-4)
     add("kalman", "varPX varPY varPZ", "float", lambda d, i: 1e-3)
-    add("motor", "m1 m2 m3 m4", "uint16_t", lambda d, i: d.row[loop.PWM + i])
-    add("motor", "m1req m2req m3req m4req", "int32_t", lambda d, i: d.row[loop.PWM + i])
-    add("range", "front back left right", "uint16_t", lambda d, i: _millimetres(d.row[loop.RANGES + i]))
+    add("motor", "m1 m2 m3 m4", "uint16_t", lambda d, i: d.row[log_row.PWM + i])
+    add("motor", "m1req m2req m3req m4req", "int32_t", lambda d, i: d.row[log_row.PWM + i])
+    add("range", "front back left right", "uint16_t", lambda d, i: _millimetres(d.row[log_row.WALLS + i]))
     add("range", "up", "uint16_t", lambda d, i: INVALID_RANGE_MM)
-    add("range", "zrange", "uint16_t", lambda d, i: _millimetres(d.row[loop.DOWN]))
-    add("pm", "vbat", "float", lambda d, i: d.row[loop.VBAT])
-    add("pm", "vbatMV", "uint16_t", lambda d, i: 1000.0 * d.row[loop.VBAT])
+    add("range", "zrange", "uint16_t", lambda d, i: _millimetres(d.row[log_row.DOWN]))
+    add("pm", "vbat", "float", lambda d, i: d.row[log_row.VBAT])
+    add("pm", "vbatMV", "uint16_t", lambda d, i: 1000.0 * d.row[log_row.VBAT])
     add("pm", "state", "int8_t", lambda d, i: LOW_POWER if d.low_battery else BATTERY)
-    add("pm", "batteryLevel", "uint8_t", lambda d, i: _level(d.row[loop.VBAT]))
+    add("pm", "batteryLevel", "uint8_t", lambda d, i: _level(d.row[log_row.VBAT]))
     add("supervisor", "info", "uint16_t", lambda d, i: d.info())
     add("sys", "canfly isFlying isTumbled", "uint8_t", lambda d, i: d.info() >> (3 + i) & 1)
     add("radio", "rssi", "uint8_t", lambda d, i: 40)

@@ -1,16 +1,13 @@
 """What an effect is: parameters with units and bounds, and how it enters the equations."""
 
-import functools
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numba
 import numpy as np
 from numba import float64, types, uint64
-from numba.core.typing.typeof import typeof_impl
-from numba.experimental.function_type import _get_wrapper_address
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.compiled import jit
@@ -36,50 +33,6 @@ def wrench(function: Callable) -> Any:
     return numba.njit([SIGNATURE])(function)  # may make arrays
 
 
-class _Address:
-    """A compiled function by its address: numba else looks each one up by name at every call."""
-
-    _numba_type_ = WrenchFunction
-
-    def __init__(self, function: Any) -> None:
-        self.function = function  # whose machine code must stay
-        self.address = _get_wrapper_address(function, SIGNATURE)
-
-    def __wrapper_address__(self) -> int:
-        return self.address
-
-
-@functools.cache
-def _handle(function: Any) -> _Address:
-    return _Address(function)
-
-
-@wrench
-def _nothing(p, s, memory, stream, out):
-    pass
-
-
-class Wrenches(tuple):
-    """`wrench` functions as compiled code takes them: always `count`, the places left over filled with one that does
-    nothing.
-
-    A type of its own, so that numba need not work it out at each call.
-    """
-
-    def __new__(cls, functions: Sequence[Any], count: int) -> "Wrenches":
-        return super().__new__(cls, [_handle(f) for f in (*functions, *[_nothing] * (count - len(functions)))])
-
-
-@functools.cache
-def _slots(count: int) -> types.UniTuple:
-    return types.UniTuple(WrenchFunction, count)
-
-
-@typeof_impl.register(Wrenches)
-def _typeof_wrenches(value: Wrenches, _context: Any) -> types.UniTuple:
-    return _slots(len(value))
-
-
 @dataclass(frozen=True)
 class Parameter:
     """A number that an effect takes. neutral: the value at which it changes nothing.
@@ -101,10 +54,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One unmodelled effect. It has `settings`, which change the plant before the flight,
+    """One unmodelled effect: it has `settings`, which change the plant before the flight, a `wrench`, or both.
 
-    or a `wrench`, which adds a force and a torque in flight, or both.
-    settings(plant row, {parameter: value}) changes fields of `simulation.plant.FIELDS`.
+    A wrench adds a force and a torque in flight (see `wrench`). settings(plant row, {parameter: value}) changes
+    fields of `simulation.plant.FIELDS`.
     """
 
     name: str

@@ -5,29 +5,32 @@ import math
 import numpy as np
 
 from airtouch.simulation.compiled import jit
-from airtouch.simulation.firmware import kalman
+from airtouch.simulation.firmware import kalman, measurement
 
 _F = np.float64
-#: what a tick's sensors hand over: distance m and its standard deviation; counts forward and left over dt seconds
-#: and theirs. NaN in distance or forward: no such reading
-READING = np.dtype([("distance", _F), ("distance_std", _F), ("forward", _F), ("left", _F), ("dt", _F), ("std", _F)])
+#: what a tick's sensors hand over: the IMU's sample, acc m/s^2 and gyro rad/s; down range, distance m and its standard
+#: deviation; optical flow, counts forward and left over dt seconds and their standard deviation. NaN in distance or
+#: forward: no such reading
+READING = np.dtype([("acc", _F, (3,)), ("gyro", _F, (3,)), ("distance", _F), ("distance_std", _F), ("forward", _F),
+                    ("left", _F), ("dt", _F), ("std", _F)])
 
 
 @jit
-def tick(settings, est, now, flying, gravity, acc, gyro, reading):
-    """Tick `now` (ms, from 0) of the estimator est (kalman.STATE).
+def tick(plant, est, now, flying, reading):
+    """Tick `now` (ms, from 0) of the estimator est (kalman.STATE) with its READING.
 
-    flying: as the supervisor says. acc (3,) m/s^2 and gyro (3,) rad/s: the IMU's sample; reading: READING.
+    plant: its firmware and gravity count. flying: as the supervisor says.
     """
+    settings = plant.firmware
     if now > 0:
         if now % settings.periods.prediction_ms == 0:
-            kalman.predict(settings, est, 0.001 * settings.periods.prediction_ms, flying, gravity)
+            kalman.predict(settings, est, 0.001 * settings.periods.prediction_ms, flying, plant.gravity)
         kalman.process_noise(settings, est, 0.001)
-    kalman.take_imu(est, acc, gyro)
+    kalman.take_imu(est, reading.acc, reading.gyro)
     if not math.isnan(reading.distance):
-        kalman.correct_range(settings, est, reading.distance, reading.distance_std)
+        measurement.correct_range(settings, est, reading)
     if not math.isnan(reading.forward):
-        kalman.correct_flow(settings, est, reading.forward, reading.left, reading.dt, reading.std, 0.0)
+        measurement.correct_flow(settings, est, reading)
     kalman.finalize(est)
     if kalman.lost(settings, est):
         kalman.begin(settings, est, 0.0, 0.0, 0.0, est.home)

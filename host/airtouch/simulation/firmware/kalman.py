@@ -1,7 +1,7 @@
 """The extended Kalman filter: position, velocity in body axes, attitude error; attitude as a quaternion.
 
-Order of calls at a millisecond's tick: `predict` when due, `process_noise`, `take_imu`, `correct_range` or
-`correct_flow` when there is a reading, `finalize`. Units SI; the accelerometer reads +g at rest.
+Order of calls at a millisecond's tick: `predict` when due, `process_noise`, `take_imu`, the corrections of
+`measurement` when there is a reading, `finalize`. Units SI; the accelerometer reads +g at rest.
 Source: Mueller, Hehn, D'Andrea, Covariance Correction Step for Kalman Filtering with an Attitude, 2017;
 Mueller, Hamer, D'Andrea, Fusing ultra-wideband range measurements with accelerometers and rate gyroscopes, 2015.
 """
@@ -13,13 +13,25 @@ import numpy as np
 from airtouch.simulation.compiled import jit
 
 _F = np.float64
-#: position (world), velocity (body), attitude error; attitude; rotation body to world; covariance
 STATE = np.dtype([
-    ("x", _F, (3,)), ("v", _F, (3,)), ("d", _F, (3,)), ("q", _F, (4,)), ("home", _F, (4,)), ("r", _F, (3, 3)),
-    ("p", _F, (9, 9)), ("acc_sum", _F, (3,)), ("gyro_sum", _F, (3,)), ("samples", np.int64),
-    ("acc", _F, (3,)), ("gyro", _F, (3,)), ("updated", np.int64), ("f", _F, (9, 6)), ("t", _F, (9, 9)),
-    ("column", _F, (9,))])
-Z, VX, VY = 2, 3, 4  #: rows of the covariance
+    ("x", _F, (3,)),  # m, position, world
+    ("v", _F, (3,)),  # m/s, velocity, body
+    ("d", _F, (3,)),  # rad, attitude error, not yet in q
+    ("q", _F, (4,)),  # attitude
+    ("home", _F, (4,)),  # attitude at the start
+    ("r", _F, (3, 3)),  # rotation body to world, of q
+    ("p", _F, (9, 9)),  # covariance of x, v, d
+    ("acc_sum", _F, (3,)),  # of the IMU's samples since the last prediction
+    ("gyro_sum", _F, (3,)),
+    ("samples", np.int64),  # their number
+    ("acc", _F, (3,)),  # m/s^2, the last sample
+    ("gyro", _F, (3,)),  # rad/s
+    ("updated", np.int64),  # 1 where d or q changed since `finalize`
+    ("f", _F, (9, 6)),  # columns 3 to 8 of the transition matrix
+    ("t", _F, (9, 9)),  # working space
+    ("column", _F, (9,)),  # working space
+])
+Z = 2  #: row of the covariance
 MOST_VARIANCE, LEAST_VARIANCE = 100.0, 1e-6
 MOVED_RAD = 1e-4  #: attitude errors from here on go into the quaternion
 MOST_ERROR_RAD = 10.0
@@ -156,60 +168,6 @@ def _grow(p, i, std):
 
 
 @jit
-def correct_range(settings, est, distance, std):
-    """A down range reading: z over the cosine of the tilt beyond the cone's half angle."""
-    up = est.r[2, 2]
-    if up <= 0.1:
-        return
-    stretch = 1.0 / math.cos(max(math.acos(min(up, 1.0)) - math.radians(settings.range.cone_deg), 0.0))
-    _update(est, Z, stretch, Z, 0.0, distance - est.x[2] * stretch, std)
-
-
-@jit
-def range_std(settings, distance):
-    """Standard deviation that the firmware gives a reading, m."""
-    s = settings.range
-    return s.std_m * (1.0 + math.exp(s.std_growth_1pm * (distance - s.std_far_m)))
-
-
-@jit
-def correct_flow(settings, est, forward, left, dt, std, surface):
-    """Optical flow over dt seconds, counts along body x and y: two updates with the latest gyro sample.
-
-    surface: height of what is below as far as it is known, 0 for a firmware that knows of none.
-    """
-    s = settings.flow
-    k = dt * s.pixels / s.aperture_rad
-    height = max(est.x[2] - surface, s.least_height_m)  # of both updates: taken before the first
-    seen = k * est.r[2, 2] / height
-    ahead, aside, noise = est.v[0], est.v[1], std / s.counts_per_pixel
-    turn_x, turn_y = k * est.gyro[0], k * est.gyro[1]
-    _update(est, Z, -seen * ahead / height, VX, seen, forward / s.counts_per_pixel - seen * ahead + turn_y, noise)
-    _update(est, Z, -seen * aside / height, VY, seen, left / s.counts_per_pixel - seen * aside - turn_x, noise)
-
-
-@jit
-def _update(est, i, hi, j, hj, error, std):
-    """A scalar measurement whose row of the measurement matrix has hi in column i and hj in column j."""
-    p, c = est.p, est.column
-    for n in range(9):
-        c[n] = hi * p[n, i] + hj * p[n, j]
-    inverse = 1.0 / (hi * c[i] + hj * c[j] + std * std)
-    gain = error * inverse
-    for n in range(3):
-        est.x[n] += c[n] * gain
-        est.v[n] += c[3 + n] * gain
-        est.d[n] += c[6 + n] * gain
-    for a in range(9):
-        scaled = c[a] * inverse
-        for b in range(a, 9):
-            value = min(p[a, b] - scaled * c[b], MOST_VARIANCE)
-            p[a, b], p[b, a] = value, value
-        p[a, a] = max(p[a, a], LEAST_VARIANCE)
-    est.updated = 1
-
-
-@jit
 def finalize(est):
     """Move the attitude error into the quaternion, and the rotation matrix with it."""
     if not est.updated:
@@ -282,9 +240,3 @@ def world_velocity(est, out):
     for i in range(3):
         out[i] = est.r[i, 0] * est.v[0] + est.r[i, 1] * est.v[1] + est.r[i, 2] * est.v[2]
 
-
-@jit
-def world_force(est, out):
-    """Latest specific force in world axes into out (3,): +g upwards at rest."""
-    for i in range(3):
-        out[i] = est.r[i, 0] * est.acc[0] + est.r[i, 1] * est.acc[1] + est.r[i, 2] * est.acc[2]

@@ -1,10 +1,21 @@
 """One PID loop as the firmware runs it: integral with a limit, derivative of measurement or error, output limit."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from airtouch.simulation.compiled import jit
 
 STATE = np.dtype([("integral", np.float64), ("previous", np.float64)])
+
+
+class How(NamedTuple):
+    """How a loop is run."""
+
+    dt: float  #: s since its last run
+    scale: float  #: all its gains are multiplied by it
+    on_error: bool  #: the derivative is that of the error, else of the measurement
+    turns: bool  #: desired and measured are angles in degrees that wrap
 
 
 @jit
@@ -31,27 +42,26 @@ def reset(state, measured):
 
 
 @jit
-def run(gains, state, scale, desired, measured, dt, on_error, turns):
-    """The loop's output, dt seconds after its last run.
+def run(gains, state, how, desired, measured):
+    """The loop's output.
 
-    gains: settings.GAINS; all are multiplied by scale. on_error: the derivative is the
-    error's, else that of the measurement. turns: desired and measured are angles in degrees that wrap.
+    gains: settings.GAINS; state: STATE; how: How; desired and measured: in the loop's own unit.
     """
     error = desired - measured
-    if turns:
+    if how.turns:
         error = wrapped(error)
-    if on_error:
+    if how.on_error:
         change = error - state.previous
         state.previous = error
     else:
         change = state.previous - measured
-        if turns:
+        if how.turns:
             change = wrapped(change)
         state.previous = measured
-    state.integral += error * dt
+    state.integral += error * how.dt
     if gains.integral_limit > 0.0:
         state.integral = limit(state.integral, gains.integral_limit)
-    out = scale * (gains.p * error + gains.d * (change / dt) + gains.i * state.integral)
+    out = how.scale * (gains.p * error + gains.d * (change / how.dt) + gains.i * state.integral)
     if gains.output_limit > 0.0:
         out = limit(out, gains.output_limit)
     return out

@@ -1,18 +1,13 @@
-"""Sensors as the controller and the log get them: IMU, down range, flow, Multi-ranger."""
+"""Second-order low-pass filters and delay lines."""
 
 import math
 
 from airtouch.simulation.compiled import jit
 
-MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
-CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
-RING = 64  #: rows of the commands' delay line, a power of two: delays of up to 63 steps
-CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
-
 
 @jit
 def lowpass_coefficients(cutoff, h, out):
-    """Second-order Butterworth (b0, b1, b2, a1, a2) into out (5,); a cutoff of 0 passes all."""
+    """Second-order Butterworth (b0, b1, b2, a1, a2) for samples of h s into out (5,); a cutoff (Hz) of 0 passes all."""
     if cutoff <= 0.0 or cutoff >= 0.49 / h:
         out[0], out[1], out[2], out[3], out[4] = 1.0, 0.0, 0.0, 0.0, 0.0
         return
@@ -27,7 +22,7 @@ def lowpass_coefficients(cutoff, h, out):
 
 @jit
 def lowpass(b, memory, x):
-    """One sample through the filter; memory (2,)."""
+    """One sample through the filter with coefficients b (5,); memory (2,) is the filter's own."""
     d = x - memory[0] * b[3] - memory[1] * b[4]
     y = d * b[0] + memory[0] * b[1] + memory[1] * b[2]
     memory[1] = memory[0]
@@ -57,8 +52,10 @@ def noise_gain(b):
 
 @jit
 def delayed(ring, at, steps, column):
-    """Value of `column` `steps` (any real number >= 0) rows before row `at` of a delay line (a power of two,
-    columns)."""
+    """Value of `column`, `steps` (any real number >= 0) rows before row `at`.
+
+    ring (rows, columns): the delay line, whose number of rows is a power of two; row k is kept at k modulo rows.
+    """
     whole = int(steps)
     part = steps - whole
     mask = ring.shape[0] - 1
@@ -66,19 +63,3 @@ def delayed(ring, at, steps, column):
     if part == 0.0:
         return now
     return now + part * (ring[(at - whole - 1) & mask, column] - now)
-
-
-@jit
-def wall_distance(x, y, direction, room):
-    """Distance in m from (x, y) along `direction` (rad) to the wall of room (x0, x1, y0, y1)."""
-    c, s = math.cos(direction), math.sin(direction)
-    far = 1e9
-    if c > 1e-9:
-        far = min(far, (room[1] - x) / c)
-    elif c < -1e-9:
-        far = min(far, (room[0] - x) / c)
-    if s > 1e-9:
-        far = min(far, (room[3] - y) / s)
-    elif s < -1e-9:
-        far = min(far, (room[2] - y) / s)
-    return far

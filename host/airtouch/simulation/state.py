@@ -1,0 +1,60 @@
+"""Everything that changes in flight, as one record of named parts that compiled code reads and writes.
+
+Each stage owns its part and says in its own module what the fields are. With the record a flight can be flown a few
+rows at a time (`loop.fly` continues where it stopped), with the same numbers as in one call.
+"""
+
+import math
+
+import numpy as np
+from numba import from_dtype, types
+
+from airtouch.simulation import autopilot, battery, contact, forces, imu, motors, ranging, rigid_body, setpoint, world
+from airtouch.simulation.compiled import jit
+from airtouch.simulation.plant import PLANT
+from airtouch.simulation.random_stream import STREAM, normal
+from airtouch.simulation.setpoint import ROW
+from airtouch.simulation.world import WORLD
+
+_F = np.float64
+DTYPE = np.dtype([
+    ("step", np.int64),  # physics steps flown
+    ("time_s", _F),  # of this step
+    ("body", rigid_body.BODY),
+    ("motors", motors.STATE),
+    ("battery", battery.STATE),
+    ("imu", imu.STATE),
+    ("ranging", ranging.STATE),
+    ("walls", _F, (4,)),  # m, the Multi-ranger: front, back, left, right; NaN: none
+    ("firmware", autopilot.STATE),
+    ("forces", forces.STATE),
+])
+STATE = from_dtype(DTYPE)[::1]  #: in compiled code
+
+
+def empty() -> np.ndarray:
+    """A record (1,) of DTYPE, all zero as `begin` expects it."""
+    return np.zeros(1, DTYPE)
+
+
+@jit(types.void(PLANT, WORLD, ROW, STREAM, STATE))
+def begin(plants, ground, row, stream, states):
+    """Stand the vehicle on what is below the first set-point row (8,): fills a record (1,) that is all zero."""
+    plant, state = plants[0], states[0]
+    body, pose = state.body, state.body.state
+    pose[0], pose[1] = row[setpoint.X], row[setpoint.Y]
+    ranging.begin(state.ranging, world.top_at(ground, pose[0], pose[1]))
+    leg = plant.range_below_rotors + plant.leg_below_range
+    pose[2] = state.ranging.start_top + leg - contact.SINK_M
+    yaw = row[setpoint.YAW]
+    pose[6], pose[9] = math.cos(yaw / 2), math.sin(yaw / 2)
+    for i in range(4):
+        state.motors.phase[i] = 6.283185307179586 * i * 0.381966 + normal(stream)
+        body.gain[i] = plant.gain[i]
+        state.walls[i] = np.nan
+    body.wrench[2] = plant.mass * plant.gravity
+    state.battery.charge, state.battery.volts = plant.battery_charge, plant.nominal_voltage
+    roll, pitch = 0.005 * normal(stream), 0.005 * normal(stream)
+    imu.begin(plant, state)
+    autopilot.begin(plant, state, roll, pitch, yaw)
+    rigid_body.derivative(plant, body)
