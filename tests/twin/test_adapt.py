@@ -94,6 +94,7 @@ def test_flights_without_acceleration_train_a_detector_without(made, quick, tmp_
     said = CliRunner().invoke(airtouch, ["adapt", str(folder), "--out", str(out), "--no-hold-out"])
     assert said.exit_code == 0, said.output + str(said.exception)
     assert "no twin: it needs 4 flights" in said.output and "here are 0" in said.output
+    assert "nothing was held out, as asked" in said.output
     model = best.load(out)
     assert set(sensors.CHANNELS_OF["acceleration"]) <= set(model.recipe.muted)
     assert best.run(bare[0].log, model).probability.shape == (len(bare[0].log),)

@@ -118,7 +118,10 @@ def _say(found: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) ->
     if any(s.in_training for s in found.twin_only):
         click.echo("the weights it started from have seen some of these flights: these figures are too good; "
                    "--from scratch measures without them")
-    if not hold_out or not found.held_out:
+    if not hold_out:
+        click.echo("nothing was held out, as asked: what to expect of new flights is not known")
+        return
+    if not found.held_out:
         click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.FEWEST} are needed to say "
                    "what to expect")
         return
