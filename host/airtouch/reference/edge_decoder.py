@@ -1,10 +1,11 @@
-"""From the streaming network's three logits to edges, causal."""
+"""From the logits of `best` to edges, causal."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-LOGITS = ("over", "entry", "exit")  #: columns of the logits
+#: Columns of the logits. The decoder reads the first three; kernel_types.h has their number for C.
+LOGITS = ("over", "entry", "exit")
 LOGIT_LIMIT = 8.0  #: logits are clamped to this magnitude
 SLOW_AT_START = -3.0  #: the smoothed over logit before anything is known: off a platform
 LONG_AGO = 0x3FFFFFFF  #: steps since an edge that never was

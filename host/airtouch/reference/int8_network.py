@@ -88,7 +88,7 @@ def multiplications(network: Int8Network) -> int:
 
 
 def rolling_multiplications(network: Int8Network, stride: int) -> float:
-    """Multiplications a sample where the network rolls over a stream, mean over `stride` samples.
+    """Multiplications a sample where the network rolls over samples, mean over `stride` samples.
 
     A layer's row is computed on each sample, or on as few as the pools before it and the stride let it.
     """

@@ -1,4 +1,4 @@
-"""Training batches of the streaming network: crops of flights, augmented."""
+"""Training batches of `best`: crops of flights, augmented."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The streaming network as C sources for `gap8/kernels/stream_int8.h` and `firmware/kernels/stream_detector.h`."""
+"""A model of `best` as C sources for `gap8/kernels/stream_int8.h` and `firmware/kernels/stream_detector.h`."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 """The outputs of the network: what each says, what it is trained to say, and how much its error counts.
 
-The decoder reads them (`reference.edge_decoder.LOGITS`, `firmware/kernels/edge_decoder.h`). Another output is another
-entry here, and whatever the decoder makes of it there.
+The decoder reads them, in this order: `reference.edge_decoder.LOGITS` and `firmware/kernels/edge_decoder.h`.
+host/docs/change-the-network.md says how to add one.
 """
 
 from collections.abc import Callable, Sequence

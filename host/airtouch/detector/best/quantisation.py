@@ -1,4 +1,4 @@
-"""Float weights of the streaming network to int8, with scales as TensorFlow Lite chooses them."""
+"""Float weights of `best` to int8, with scales as TensorFlow Lite chooses them."""
 
 from collections.abc import Sequence
 

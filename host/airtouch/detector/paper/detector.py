@@ -51,7 +51,7 @@ def probability_of(model: Model, fused: np.ndarray) -> np.ndarray:
 
 
 def stride(model: Model) -> int:
-    """Samples to one answer where the model runs as a stream."""
+    """Samples to one answer where the model rolls over samples."""
     value = model.metadata.get("stride", 1)
     if not isinstance(value, int) or isinstance(value, bool) or value < 1:
         raise AirTouchError(f"the model's stride must be a whole number from 1, not {value!r}; train it again")

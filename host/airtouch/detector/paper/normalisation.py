@@ -18,7 +18,7 @@ class FixedScale:
     """x = clip((log2(feature) - mean) / deviation, -LIMIT, LIMIT), column by column.
 
     mean, deviation: float32 (columns,), of the training flights in the air. A sample's input does
-    not depend on other samples, so a network over it can run as a stream. Band powers span
+    not depend on other samples, so a network over it can roll from sample to sample. Band powers span
     decades: their logarithm, not they, fits in eight bits.
     """
 

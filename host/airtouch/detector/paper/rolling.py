@@ -1,4 +1,6 @@
-"""The paper's network as a stream: inputs on a fixed scale, pruned harder, a row of each layer a step.
+"""The `paper-stream` detector: the paper's network rolling over samples, on a fixed scale of inputs, pruned harder.
+
+A step computes one row of each layer (`gap8/kernels/rolling_int8.h`).
 
 The paper z-scores each window by itself, so that every sample computes all of it anew. On a fixed scale of
 the features' logarithm a window's answer follows from what was computed before, and nine in ten
@@ -52,7 +54,7 @@ def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = T
 
 
 def load(path: Path | None) -> Model:
-    """A model from its file, the shipped one for None; AirTouchError for one that cannot run as a stream."""
+    """A model from its file, the shipped one for None; AirTouchError for one that cannot roll over samples."""
     if path is None:
         with resources.as_file(resources.files("airtouch") / "models" / "paper_stream.npz") as shipped:
             return load(shipped)
@@ -69,7 +71,7 @@ def lag_s(model: Model | None) -> float:
 
 
 def parameters(model: Model | None) -> dict[str, Any]:
-    """As `paper.parameters`, with what the stream costs."""
+    """As `paper.parameters`, with the cost of a sample instead of a window's."""
     model = model or load(None)
     stride = paper.stride(model)
     return {**paper.parameters(model), "stride": stride, "conv_sparsity": model.metadata.get("conv_sparsity"),

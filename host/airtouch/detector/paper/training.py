@@ -71,7 +71,7 @@ def train_paper(
     flights: with down range, for the true edges. sparsity: share of zeros in the first dense
     layer, in blocks of `block` inputs (4, or 1 for single weights); conv_sparsity: in the second
     convolution. df_lambda: weight of the disturbance-force loss. fixed_scale: inputs on a fixed scale
-    instead of z-scored windows, so that the network can run as a stream. Training stops early on
+    instead of z-scored windows, so that the network can roll over samples. Training stops early on
     flights held out by seed.
     Raises AirTouchError without TensorFlow, without a usable window and for settings out of range.
     """

@@ -1,4 +1,4 @@
-"""Which sensors a log has, and what the streaming detector gets where one is missing."""
+"""Which sensors a log has, and what `best` gets where one is missing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
