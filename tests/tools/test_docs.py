@@ -71,7 +71,7 @@ def test_tables_and_lists_stand_apart_for_the_site(page):
 
 
 #: pages that tell a newcomer which files to open
-MAPS = ("architecture", "add-an-effect", "unknown", "port")
+MAPS = ("architecture", "add-an-effect", "change-the-network", "unknown", "port")
 
 
 @pytest.mark.parametrize("name", MAPS)

@@ -8,6 +8,9 @@
 #include "app_paper.h"
 #include "stream_window.h"
 
+_Static_assert(EDGE_DECODER_LOGITS <= EDGE_LINK_OUTPUTS && (int)MOTION_CHANNELS <= EDGE_LINK_SAMPLE_BYTES,
+               "the packets have room for channels and logits");
+
 enum { EDGE_UNKNOWN = 3 };
 
 static uint8_t detectorInForce(const appCore_t *core) {

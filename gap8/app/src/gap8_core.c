@@ -8,6 +8,8 @@
 
 _Static_assert(AIRTOUCH_MODEL_COLUMNS * sizeof(float) == EDGE_LINK_SAMPLE_BYTES, "a sample is a row of features");
 _Static_assert(AIRTOUCH_ROLLING_COLUMNS * sizeof(float) == EDGE_LINK_SAMPLE_BYTES, "a sample is a row of features");
+_Static_assert(EDGE_DECODER_LOGITS <= EDGE_LINK_OUTPUTS && (int)MOTION_CHANNELS <= EDGE_LINK_SAMPLE_BYTES,
+               "the packets have room for channels and logits");
 _Static_assert(AIRTOUCH_MODEL_OUTPUTS <= EDGE_LINK_OUTPUTS && AIRTOUCH_ROLLING_OUTPUTS <= EDGE_LINK_OUTPUTS,
                "an answer has room for the outputs");
 
@@ -22,7 +24,7 @@ static bool stepBest(void *context, const uint8_t sample[EDGE_LINK_SAMPLE_BYTES]
   if (logits == NULL) {
     return false;
   }
-  memcpy(output, logits, EDGE_LINK_OUTPUTS);
+  memcpy(output, logits, EDGE_DECODER_LOGITS);
   return true;
 }
 
