@@ -13,7 +13,7 @@ from airtouch.reference.cross_spectrum import cascaded_cross_spectrum
 from airtouch.reference.edge_pipeline import NONE, EdgePipelineConfig, cfar_input, edge_pipeline
 from airtouch.reference.feature_window import deviation_from_mean
 from airtouch.reference.finite import ACC_LIMIT, RATE_LIMIT
-from airtouch.reference.fr_cfar import fr_cfar, hold_power
+from airtouch.reference.fr_cfar import POWER_LIMIT, fr_cfar, hold_power
 from airtouch.reference.motion_channels import MotionConfig, motion_channels
 from airtouch.vehicle import load
 
@@ -130,3 +130,19 @@ def test_a_steady_value_has_no_power_in_any_channel():
 def test_gaps_before_the_first_cell_are_nothing():
     np.testing.assert_array_equal(hold_power([np.nan, 3.0, np.inf, -2.0, np.nan]), [0.0, 3.0, 3.0, 0.0, 0.0])
     np.testing.assert_array_equal(hold_power([5.0, np.nan, 2.0]), [5.0, 5.0, 2.0])
+
+
+def test_replaced_samples_are_counted_as_they_come(signals):
+    acc, gyro, pwm = (s[:200].copy() for s in signals)
+    acc[20, 0], gyro[30, 1], pwm[30, 2] = np.nan, np.inf, np.nan
+    events = edge_pipeline(acc, gyro, pwm, VEHICLE)
+    assert [events.non_finite[i] for i in (0, 19, 20, 29, 30, 199)] == [0, 0, 1, 1, 3, 3]
+    assert events.ready.dtype == bool
+
+
+def test_limits_and_slow_clocks():
+    assert hold_power([1e35, 1.0]).tolist() == [POWER_LIMIT, 1.0] == hold_power([1e35, 1.0, np.nan])[:2].tolist()
+    assert band_bins(0.5, 10, (0.1, 0.2)) == (2, 4), "a sample every two seconds is a clock as well"
+    single = [np.float32(x) for x in (np.full((50, 3), 0.1), np.full((50, 3), 0.1), np.full((50, 4), 40000.3))]
+    for one, other in zip(motion_channels(*single), motion_channels(*map(np.float64, single)), strict=True):
+        np.testing.assert_array_equal(one, other)
