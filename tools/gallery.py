@@ -24,6 +24,7 @@ from airtouch.detector import baseline, best, paper
 from airtouch.detector.evaluation import edge_map
 from airtouch.detector.evaluation.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.evaluate import evaluate_flight
+from airtouch.detector.evaluation.score_report import found_within
 from airtouch.logs.files import write_bytes
 from airtouch.report.figures import error_distribution, flight
 from airtouch.report.map_figure import edge_map as draw_map
@@ -71,11 +72,9 @@ def zig_zag_map() -> bytes:
     (log,) = at.simulate(mission.scene_of("zig-zag"), seed=1)
     model = best.load(None)
     found = best.run(log, model).edges
-    xy, _ = edge_map.track(log, None)
-    points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found],
-                                  sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S),
-                                  lag_s=best.lag_s(model))
-    return draw_map(xy, points, edge_map.platforms(points), f"zig-zag: {len(points)} edges felt")
+    made = edge_map.edge_map(log, found, lag_s=best.lag_s(model),
+                             sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
+    return draw_map(made, f"zig-zag: {len(made.points)} edges felt")
 
 
 def virtual_errors(count: int = 20) -> bytes:
@@ -87,7 +86,7 @@ def virtual_errors(count: int = 20) -> bytes:
         scores[name] = [evaluate_flight(FlightFile(Path(log.source),
                                                    Condition(speed_mps=log.meta["condition"]["speed"])),
                                         log, module, model).score for log in flights]
-    return error_distribution(scores)
+    return error_distribution({name: found_within(some) for name, some in scores.items()})
 
 
 def photograph(browser: str, page: Path, width: int, height: int) -> bytes:

@@ -17,6 +17,7 @@ from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.evaluation import dataset
 from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.score_report import reliability_of
 from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
@@ -37,7 +38,7 @@ def main() -> None:
     path = next(iter(sorted(options.models.glob(f"best_fold{file.condition.fold}_*.npz"))))
     write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out / "flight.png", force=True)
     scores = [FlightScore.from_dict(s) for s in json.loads(options.json.read_text())["per_flight"]]
-    write_bytes(reliability({"best": scores}), options.out / "reliability.png", force=True)
+    write_bytes(reliability({"best": reliability_of(scores)}), options.out / "reliability.png", force=True)
 
 
 def draw(log, model, name: str) -> bytes:

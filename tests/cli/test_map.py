@@ -60,13 +60,13 @@ def test_without_position_the_edges_lie_along_the_track(tmp_path):
 def test_the_picture_is_a_map_platform_scale_start_and_end():
     from shapely.geometry import Point
 
-    from airtouch.detector.evaluation.edge_map import EdgePoint, Platform
+    from airtouch.detector.evaluation.edge_map import EdgeMap, EdgePoint, Platform
     from airtouch.report import map_figure
 
     xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.zeros(500)])
     points = [EdgePoint(200, "entry", 0.0, 0.0, 0.02), EdgePoint(300, "exit", 1.0, 0.0, 0.02)]
     one_pass = Platform(Point(0.0, 0.0), Point(1.0, 0.0), None, None, 0.02)
-    figure = map_figure.drawn(xy, points, [one_pass], "a flight")
+    figure = map_figure.drawn(EdgeMap(xy, points, [one_pass], "logged", 0.0, 0.1), "a flight")
     (ax,) = figure.axes
     labels = {text.get_text() for text in figure.legends[0].get_texts()}
     assert {"start", "end", "track", "platform (its width is not known)", "entry (1)", "exit (1)"} <= labels

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.evaluate import Result
 from airtouch.detector.evaluation.score import score_flight
+from airtouch.detector.evaluation.score_report import (
+    ShownFlight,
+    found_within,
+    reliability_of,
+    score_report,
+    shown_flights,
+)
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
@@ -15,7 +23,7 @@ from airtouch.logs import Edge
 from airtouch.logs.flight_log import FlightLog
 from airtouch.report import figures
 from airtouch.report.columns import COLUMNS, cell
-from airtouch.report.write import ShownFlight, answer, in_words, write_report
+from airtouch.report.write import answer, in_words, write_report
 
 N = 600
 EDGES = [Edge(200, "entry", 0.8, 0.05), Edge(400, "exit", 0.05, 0.8)]
@@ -57,7 +65,7 @@ def test_report_is_one_file_with_the_figures(tmp_path):
     flight = shown()
     path = tmp_path / "report.html"
     scores = {"paper": [flight.score, flight.score], "baseline": []}
-    write_report(path, "A & B", scores, [flight], parameters={"p_fa": 1e-6}, command="airtouch demo",
+    write_report(path, "A & B", score_report(scores, [flight]), parameters={"p_fa": 1e-6}, command="airtouch demo",
                  left_out=[("x.csv", "x.csv: the file is empty")])
     text = path.read_text()
     checker = Checker()
@@ -70,7 +78,7 @@ def test_report_is_one_file_with_the_figures(tmp_path):
         assert cell(table, key, form).split("\n")[0] in text
     assert "x.csv: the file is empty" in text and "viewport" in text
     with pytest.raises(AirTouchError, match="--force"):
-        write_report(path, "again", scores, [flight], parameters={}, command="x")
+        write_report(path, "again", score_report(scores), parameters={}, command="x")
 
 
 def test_words_say_misses_and_false_edges():
@@ -84,7 +92,33 @@ def test_words_say_misses_and_false_edges():
 def test_plots_are_made_of_whatever_is_there():
     flight = shown()
     bare = Trace(np.full(N, np.nan), [])
-    for image in (figures.flight(flight.log, bare, None, {}), figures.reliability({"none": []}),
-                  figures.reliability({"paper": [flight.score]}),
-                  figures.error_distribution({"paper": [flight.score]})):
+    for image in (figures.flight(flight.log, bare, None, {}), figures.reliability({"none": reliability_of([])}),
+                  figures.reliability({"paper": reliability_of([flight.score])}),
+                  figures.error_distribution({"paper": found_within([flight.score])})):
         assert image.startswith(b"\x89PNG") and len(image) > 5000
+
+
+def test_curves_are_those_of_the_edges_and_samples():
+    one, other = shown().score, shown(detections=()).score
+    found = found_within([one, other])
+    np.testing.assert_allclose(found.distance_m, [0.02])  # 0.1 s at 0.2 m/s
+    assert found.edges == 4 and found.share.tolist() == [0.25]  # one of four
+    curve = reliability_of([one])
+    assert curve.samples.sum() == pytest.approx(1.0)
+    assert np.sum(curve.samples * np.abs(curve.stated - curve.truly)) == pytest.approx(curve.ece)
+
+
+def test_flights_are_shown_from_the_best_found_to_the_worst():
+    results = {"best": [result(f"{n}.csv", detections) for n, detections in
+                        (("false", DETECTIONS), ("good", (Detection(210, "entry"), Detection(400, "exit"))),
+                         ("blind", ()))],
+               "paper": [result("good.csv", ())]}
+    chosen = shown_flights(results, 3)
+    assert [f.score.file for f in chosen] == ["good.csv", "false.csv", "blind.csv"]
+    assert [set(f.others) for f in chosen] == [{"paper"}, set(), set()]
+    assert [f.score.file for f in shown_flights(results, 2)] == ["good.csv", "blind.csv"]
+
+
+def result(name, detections):
+    flight = shown(name, detections)
+    return Result(flight.log, flight.trace, flight.score)

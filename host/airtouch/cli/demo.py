@@ -13,7 +13,7 @@ from airtouch.cli.flights import find_flights
 from airtouch.detector import registry
 from airtouch.detector.evaluation import dataset, evaluate
 from airtouch.detector.evaluation.dataset import FlightFile
-from airtouch.detector.evaluation.summary import summarise
+from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 
@@ -39,6 +39,8 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     beside its baseline on flights that neither has seen, and get an HTML report with plots.
     """
     need("train", "the demo trains a detector (airtouch gap demo needs nothing more), which")
+    from airtouch.report.write import write_report
+
     started = time.monotonic()
     report = out / "report.html"
     if report.exists() and not force:
@@ -69,13 +71,17 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
         left_out += [f for f in failures if f not in left_out]
     if not results[names[0]]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
-    scores = {name: [r.score for r in some] for name, some in results.items()}
-    show.console().print(show.table({n: summarise(s) for n, s in scores.items()}, where))
+    made = score_report({name: [r.score for r in some] for name, some in results.items()},
+                        shown_flights(results, SHOWN))
+    show.console().print(show.table(made.summaries, where))
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
 
     steps.say("Report")
-    write(report, where, results, models, left_out, epochs)
+    write_report(report, f"AirTouch demo: {where}", made,
+                 parameters={f"{n}: {key}": value for n, model in models.items()
+                             for key, value in registry.get(n).parameters(model).items()},
+                 command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)
     click.echo(f"  written: {report} (open it in a browser), {out / 'model'}")
     click.echo(f"\ndone in {time.monotonic() - started:.0f} s")
 
@@ -169,30 +175,3 @@ def export(name: str, model: Any, out: Path) -> None:
     model.save(folder / f"{name}.npz", force=True)
     written = gap8.export(model, folder, f"{name}.npz", force=True)
     click.echo(f"  {folder}: {name}.npz, {', '.join(path.name for path in written)}")
-
-
-def write(path: Path, where: str, results: dict[str, list[evaluate.Result]], models: dict[str, Any],
-          left_out: list[tuple[str, str]], epochs: int) -> None:
-    """The HTML report: the flights shown are spread from the best found to the worst."""
-    from airtouch.report.write import ShownFlight, write_report
-
-    shown_first, *_ = results
-    first = sorted(results[shown_first], key=badness)
-    chosen = [first[i * (len(first) - 1) // max(SHOWN - 1, 1)] for i in range(min(SHOWN, len(first)))]
-    others = {name: {r.score.file: r.trace for r in some} for name, some in results.items()
-              if name != shown_first}
-    shown = [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
-                         {name: found[r.score.file] for name, found in others.items()
-                          if r.score.file in found})
-             for r in chosen]
-    scores = {name: [r.score for r in some] for name, some in results.items()}
-    write_report(path, f"AirTouch demo: {where}", scores, shown,
-                 parameters={f"{n}: {key}": value for n, model in models.items()
-                             for key, value in registry.get(n).parameters(model).items()},
-                 command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)
-
-
-def badness(result: evaluate.Result) -> float:
-    """Misses and false edges of a flight, then its errors in seconds."""
-    errors = [abs(e.error_s) if e.error_s is not None else 3.0 for e in result.score.edges]
-    return sum(errors) + len(result.score.false or ())

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from airtouch.gap import words
+from airtouch.gap import summary, words
 from airtouch.gap.gap_map import CHANNEL_WORDS, ratio, short
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
@@ -99,9 +99,7 @@ def measurement(screen: Console, found: Measurement) -> None:
         screen.print(cells(found.where, "Largest cells of the gap"))
     else:
         screen.print("No cell of the gap stands out of its floor.")
-    screen.print(f"overall: {found.gap['before']:.2g} times the floor"
-                 + (f"; with the vehicle calibrated on the baseline {found.gap['calibrated']:.2g} times"
-                    if "calibrated" in found.gap else ""))
+    screen.print(words.overall(found.gap))
     remarks(screen, "Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors])
     remarks(screen, "What these logs cannot say", found.cannot)
     remarks(screen, "Notes", found.notes)
@@ -118,7 +116,7 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
-    for r in [r for i, r in enumerate(found.ranking) if i < 8 or r.name in ("none", "unknown")]:
+    for r in summary.leading(found.ranking):
         table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}"), r.why)
     screen.print(table)
     for group in found.indistinguishable:

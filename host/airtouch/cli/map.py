@@ -44,7 +44,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
         check_free(path, force)
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
-    xy, measured = edge_map.track(log, speed or file.condition.speed_mps, heading)
+    edge_map.track(log, speed or file.condition.speed_mps)  # which may be missing, told before the detector runs
     if truth:
         found, lag, model_sigma = logs.true_edges(log), 0.0, 0.01
     else:
@@ -54,23 +54,19 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
         trained = module.model_for(trained, log) if hasattr(module, "model_for") else trained
         found, lag = module.run(log, trained).edges, module.lag_s(trained)
         model_sigma = getattr(trained, "metadata", {}).get("sigma_s", edge_map.ASSUMED_SIGMA_S)
-    sigma_s = sigma or model_sigma
-    if not measured and found:  # only distances from the first edge mean something
-        xy = xy - xy[max(round(found[0].sample - lag / edge_map.PERIOD_S), 0)]
-    points = edge_map.edge_points(xy, [e.sample for e in found], [e.kind for e in found], sigma_s=sigma_s, lag_s=lag)
-    platforms = edge_map.platforms(points)
-    position = "logged" if measured else "dead reckoning, from the first edge"
-    content = edge_map.geojson(points, platforms, {
-        "flight": flight.name, "detector": "truth" if truth else detector, "position": position,
-        "lag_s": lag, "sigma_s": sigma_s})
+    made = edge_map.edge_map(log, found, lag_s=lag, sigma_s=sigma or model_sigma,
+                             speed_mps=speed or file.condition.speed_mps, heading_deg=heading)
+    content = edge_map.geojson(made.points, made.platforms, {
+        "flight": flight.name, "detector": "truth" if truth else detector, "position": made.position,
+        "lag_s": made.lag_s, "sigma_s": made.sigma_s})
     from airtouch.report.map_figure import edge_map as draw
 
     write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)
-    write_bytes(draw(xy, points, platforms, f"{flight.name}: {len(points)} edges ({position})"), picture, force)
-    for point in points:
+    write_bytes(draw(made, f"{flight.name}: {len(made.points)} edges ({made.position})"), picture, force)
+    for point in made.points:
         click.echo(f"{point.kind:5} at {point.sample * 0.01:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
                    f"1-sigma {point.sigma_m:.3f} m")
-    for number, platform in enumerate(platforms):
+    for number, platform in enumerate(made.platforms):
         if platform.outline is not None:
             click.echo(f"platform {number}: {platform.outline.area:.3f} m^2, outline 1-sigma {platform.sigma_m:.3f} m")
     click.echo(f"written: {out}, {picture}")

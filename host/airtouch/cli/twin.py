@@ -56,8 +56,9 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     need("train", "comparing the twin with the drone")
     from airtouch import vehicle as vehicles
     from airtouch.report import twin_report
-    from airtouch.twin import calibrate, compare, files, levers
+    from airtouch.twin import calibrate, compare, files, levers, words
     from airtouch.twin import flights as recordings
+    from airtouch.twin.curves import curves
 
     _check_free(out / calibrate.FIT, resume, force)
     craft = vehicles.load(vehicle)
@@ -78,8 +79,8 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
     summary = _summary(comparison, by_name, fitted.history, recorded, typed)
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
-    twin_report.write_report(out / REPORT, recorded, comparison, fitted.levers, fitted.values,
-                             fitted.history[0]["misfit"], command=typed, force=True)
+    twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flown), fitted.levers,
+                             fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
     click.echo(f"{len(recorded.courses)} flights; misfit in scatters: "
                f"{calibrate.in_words(fitted.history[0]['misfit'])} -> {calibrate.in_words(comparison.misfit)}")
     for a in comparison.auroc:
@@ -87,7 +88,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
                    f"{a.windows} windows; tells: {a.telling[0]}")
     click.echo("largest differences:")
     for gap in comparison.gaps[:5]:
-        where, what, difference, scatters, n = twin_report.gap_row(gap)
+        where, what, difference, scatters, n = words.gap_row(gap)
         click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 

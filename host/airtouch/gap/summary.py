@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap.result import Cell
+from airtouch.gap.result import Cell, Ranked
 from airtouch.logs.segments import KINDS
 
 GROUND = "ground"
+MOST_RANKED = 10  #: candidates of a ranking that are shown
 WORSE = 1.1  #: times the gap before, from which a cell has become worse
 
 
@@ -126,6 +127,11 @@ def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
                           sum(stands_out(c) for c in some), sum(stays(c) for c in some),
                           sum(got_worse(c) for c in some), sum(energy(c) for c in some)))
     return tuple(sorted(made, key=lambda p: -p.energy))
+
+
+def leading(ranking: Sequence[Ranked]) -> list[Ranked]:
+    """The candidates that are shown: the first MOST_RANKED, and `none` and `unknown` wherever they are."""
+    return [r for i, r in enumerate(ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
 
 
 def rms(values: Sequence[float]) -> float:

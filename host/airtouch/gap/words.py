@@ -139,6 +139,13 @@ def measured(where: Cell | None) -> str:
     return f"Most of the gap lies {in_words(where)}." if where else "No gap stands out of the floor."
 
 
+def overall(gap: Mapping[str, float]) -> str:
+    """The gap of a measurement in a sentence."""
+    return f"Overall it is {gap['before']:.2g} times the floor" + (
+        f", {gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights."
+        if "calibrated" in gap else ".")
+
+
 def rotor_in_words(rotor: Mapping[str, float]) -> str:
     """`rotor 1: 19600 rpm logged, 0.96 of the model's (0.95 to 0.97 over 6 flights)`."""
     return (f"rotor {rotor['rotor']}: {rotor['logged']:.0f} rpm logged, {rotor['ratio']:.3f} of the model's "

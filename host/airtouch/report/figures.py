@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from airtouch.detector.evaluation.calibration import BINS, expected_calibration_error
-from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore
+from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
+from airtouch.detector.evaluation.score_report import Found, Reliability
 from airtouch.detector.shared.channels import NAMES
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
@@ -61,42 +61,33 @@ def flight(
         return png(figure)
 
 
-def reliability(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
+def reliability(curves: Mapping[str, Reliability]) -> bytes:
     """How often the drone was over a platform when the detector said so with probability p."""
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
         ax.plot([0, 1], [0, 1], color=MUTED, lw=1, ls="--", label="perfect")
-        for name, some in scores.items():
-            colour = colour_of(name)
-            table = np.sum([s.bins for s in some], axis=0) if some else np.zeros((BINS, 3))
-            filled = table[:, 0] > 0
-            if not filled.any():
-                continue
-            said, was = table[filled, 1] / table[filled, 0], table[filled, 2] / table[filled, 0]
-            ece = float(expected_calibration_error(table))
-            ax.plot(said, was, color=colour, lw=1, alpha=0.6)
-            ax.scatter(said, was, s=8 + 250 * table[filled, 0] / table[:, 0].sum(), color=colour,
-                       label=f"{name}, ECE {ece:.3f}")
+        for name, curve in curves.items():
+            if len(curve.stated):
+                ax.plot(curve.stated, curve.truly, color=colour_of(name), lw=1, alpha=0.6)
+                ax.scatter(curve.stated, curve.truly, s=8 + 250 * curve.samples, color=colour_of(name),
+                           label=f"{name}, ECE {curve.ece:.3f}")
         ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="share truly over",
                title="Reliability; a dot's area is its share of the samples")
         ax.legend(loc="upper left", frameon=False)
         return png(figure)
 
 
-def error_distribution(scores: Mapping[str, Sequence[FlightScore]]) -> bytes:
+def error_distribution(curves: Mapping[str, Found]) -> bytes:
     """Share of all true edges found within a distance; misses keep the curve below 1."""
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
-        for name, some in scores.items():
-            colour = colour_of(name)
-            edges = [e for s in some for e in s.edges]
-            errors = np.sort([abs(e.error_m) for e in edges if e.error_m is not None])
-            if edges:
-                found = np.r_[0.0, np.arange(1, len(errors) + 1), len(errors)]
-                ax.step(np.r_[0.0, errors, 1.0], found / len(edges),
-                        where="post", color=colour, label=f"{name}, {len(edges)} edges")
+        for name, curve in curves.items():
+            if curve.edges:
+                share = np.r_[0.0, curve.share]
+                ax.step(np.r_[0.0, curve.distance_m, 1.0], np.r_[share, share[-1]],
+                        where="post", color=colour_of(name), label=f"{name}, {curve.edges} edges")
         ax.set(xlim=(0, 0.5), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges",
                title="Edges found within a distance")
         ax.grid(alpha=0.25)

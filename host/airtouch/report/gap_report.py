@@ -29,11 +29,8 @@ def write_measurement(path: Path, found: Measurement, pictures: Pictures | None 
     Raises AirTouchError when the file exists, without `force`.
     """
     headline = found.where[0] if found.where else None
-    overall = f"Overall it is {found.gap['before']:.2g} times the floor" + (
-        f", {found.gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights."
-        if "calibrated" in found.gap else ".")
     page = _page(
-        title="Gap between flights and simulator", answers=(words.measured(headline), overall), headline=headline,
+        title="Gap between flights and simulator", answers=(words.measured(headline), words.overall(found.gap)), headline=headline,
         cells=found.map.cells, floor_from=found.map.floor_from, where=found.where, pictures=pictures,
         calibration=gap_tables.named(found.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),
@@ -59,7 +56,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
                            for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None,
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
-        remaining=words.remaining_in_words(left[:gap_tables.MOST_RANKED]), remaining_count=len(left),
+        remaining=words.remaining_in_words(left[:gap_tables.MOST_LEFT]), remaining_count=len(left),
         unexplained=[words.open_in_words(u) for u in diagnosis.unexplained],
         nearest=words.nearest_in_words(diagnosis.unexplained[0]) if diagnosis.unexplained else [],
         calibration=gap_tables.named(diagnosis.calibration),

@@ -15,7 +15,7 @@ SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd
 QUIET = ("#f3f4f6", "#8a8f98")
 LEGEND = [(*QUIET, "floor"), *((colour, ink, f"> {least:g}×" if least else "< 1.5×")
                                for least, colour, ink in reversed(SHADES))]
-MOST_RANKED = 10
+MOST_LEFT = 10  #: cells that still stand out, in words
 
 
 def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
@@ -92,11 +92,10 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The best candidates, and `none` and `unknown` wherever they are."""
-    shown = [r for i, r in enumerate(diagnosis.ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
     return [{"name": r.name, "probability": f"{r.probability:.1%}", "width": round(100 * r.probability),
              "shrink": f"{r.shrink.value:.2f}", "why": r.why,
              "interval": "" if r.shrink.low is None or r.shrink.high is None
-             else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in shown]
+             else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in summary.leading(diagnosis.ranking)]
 
 
 def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:

@@ -1,7 +1,5 @@
 """The edge map as a picture."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,28 +7,29 @@ from matplotlib.patches import Polygon as PolygonPatch
 from shapely.geometry import LineString, Point
 from shapely.plotting import patch_from_polygon
 
-from airtouch.detector.evaluation.edge_map import EdgePoint, Platform
+from airtouch.detector.evaluation.edge_map import EdgeMap
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
 
 STRIP_M = 0.3  #: drawn width of a platform that a single pass crossed
 COLOURS = {"entry": FOUND, "exit": OTHER, "edge": TRUE}
 
 
-def edge_map(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Platform], title: str) -> bytes:
-    """PNG of the track (n, 2), the edges felt with 2-sigma bars along the track, platforms and a scale bar."""
+def edge_map(made: EdgeMap, title: str) -> bytes:
+    """PNG of the track, the edges felt with 2-sigma bars along the track, platforms and a scale bar."""
     with style():
-        return png(drawn(xy, points, platforms, title))
+        return png(drawn(made, title))
 
 
-def drawn(xy: np.ndarray, points: Sequence[EdgePoint], platforms: Sequence[Platform], title: str) -> Figure:
+def drawn(made: EdgeMap, title: str) -> Figure:
     """The map as a figure."""
+    xy, points = made.xy, made.points
     with style():
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
         ax.grid(color="#e5e7eb", lw=0.6, zorder=0)
         ax.plot(*xy.T, color=MUTED, lw=0.9, label="track")
         _ends(ax, xy)
-        for platform in platforms:
+        for platform in made.platforms:
             ends = (platform.near, platform.far)
             if platform.outline is None and all(isinstance(end, Point) for end in ends):
                 strip = _strip(*(np.array(end.coords[0]) for end in ends))

@@ -2,7 +2,6 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -10,31 +9,16 @@ from typing import Any
 import jinja2
 
 from airtouch import __version__
-from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
-from airtouch.detector.trace import Trace
-from airtouch.logs import Edge
+from airtouch.detector.evaluation.score_report import ScoreReport
 from airtouch.logs.files import write_bytes
-from airtouch.logs.flight_log import FlightLog
 from airtouch.report.columns import COLUMNS, cell
-
-
-@dataclass(frozen=True)
-class ShownFlight:
-    """One flight to plot: its log, what the first detector said, and the others' edges."""
-
-    log: FlightLog
-    trace: Trace
-    edges: Sequence[Edge] | None
-    score: FlightScore
-    others: Mapping[str, Trace] = field(default_factory=dict)
 
 
 def write_report(
     path: Path,
     title: str,
-    scores: Mapping[str, Sequence[FlightScore]],
-    flights: Sequence[ShownFlight],
+    made: ScoreReport,
     *,
     parameters: Mapping[str, Any],
     command: str,
@@ -43,25 +27,21 @@ def write_report(
 ) -> None:
     """Score table of the detectors side by side, plots, and a few flights, as one HTML file.
 
-    scores: detector -> its flights; the first detector is the one that is reported on.
     Raises AirTouchError when the file exists, without `force`.
     """
     from airtouch.report import figures
 
-    first = next(iter(scores))
-    summaries = {name: summary.summarise(some) for name, some in scores.items()}
+    first = next(iter(made.summaries))
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
     template = environment.from_string(source)
-    answers = [answer(*row) for row in sorted(summaries.items(), key=_missed)]
+    answers = [answer(*row) for row in sorted(made.summaries.items(), key=_missed)]
     page = template.render(
-        title=title, answers=answers, summaries=summaries, columns=COLUMNS, cell=cell,
-        breakdowns={f"{first} by height": summary.by_height(scores[first]),
-                    f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
-                    f"{first} by wind": summary.by_wind(scores[first])},
-        errors=embed(figures.error_distribution(scores)), reliability=embed(figures.reliability(scores)),
+        title=title, answers=answers, summaries=made.summaries, columns=COLUMNS, cell=cell,
+        breakdowns=made.breakdowns,
+        errors=embed(figures.error_distribution(made.found)), reliability=embed(figures.reliability(made.reliability)),
         flights=[{"name": f.score.file, "text": in_words(f.score),
-                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in flights],
+                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in made.flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)
 

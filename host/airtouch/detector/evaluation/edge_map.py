@@ -5,6 +5,7 @@ ends of successive passes that lie beside each other belong to one platform; joi
 its outline. Everything is in metres, in the frame of the positions given.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,7 +13,9 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, mapping
 
+from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
+from airtouch.logs import Edge
 from airtouch.logs.flight_log import FlightLog
 
 ASSUMED_SIGMA_S = 0.1  #: timing error of a detection where the model does not state one
@@ -43,6 +46,33 @@ class Platform:
     outline: Polygon | None
     rectangle: Polygon | None
     sigma_m: float
+
+
+@dataclass(frozen=True)
+class EdgeMap:
+    """The edges of one flight in the plane, m: track (n, 2), edges along it, platforms; where positions come from."""
+
+    xy: np.ndarray
+    points: list[EdgePoint]
+    platforms: list[Platform]
+    position: str
+    lag_s: float
+    sigma_s: float
+
+
+def edge_map(log: FlightLog, found: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,
+             speed_mps: float | None = None, heading_deg: float = 0.0) -> EdgeMap:
+    """The map of the edges that were found in a flight, by a detector with a lag or in the down range.
+
+    sigma_s: timing error of an edge, s. speed_mps, heading_deg: for dead reckoning, where the log has no position; only
+    distances from the first edge mean something then, and that is the origin. Raises as `track` does.
+    """
+    xy, measured = track(log, speed_mps, heading_deg)
+    if not measured and found:
+        xy = xy - xy[max(round(found[0].sample - lag_s / PERIOD_S), 0)]
+    points = edge_points(xy, [e.sample for e in found], [e.kind for e in found], sigma_s=sigma_s, lag_s=lag_s)
+    return EdgeMap(xy, points, platforms(points), "logged" if measured else "dead reckoning, from the first edge", lag_s,
+                   sigma_s)
 
 
 def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0.0) -> tuple[np.ndarray, bool]:

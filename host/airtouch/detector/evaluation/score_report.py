@@ -1,0 +1,104 @@
+"""What a report on scored flights shows, built in one place: tables, curves, and the flights to plot."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from airtouch.detector.evaluation import evaluate, summary
+from airtouch.detector.evaluation.calibration import BINS, expected_calibration_error
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.trace import Trace
+from airtouch.logs import Edge
+from airtouch.logs.flight_log import FlightLog
+
+MISSED_S = 3.0  #: what a missed edge counts when flights are ranked, twice the time in which a detection may serve one
+
+
+@dataclass(frozen=True)
+class ShownFlight:
+    """One flight to plot: its log, what the first detector said, and the others' edges."""
+
+    log: FlightLog
+    trace: Trace
+    edges: Sequence[Edge] | None
+    score: FlightScore
+    others: Mapping[str, Trace] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Share (n,) of all true edges found within a distance (n,), m, ascending; edges: how many there are."""
+
+    distance_m: np.ndarray
+    share: np.ndarray
+    edges: int
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """Probability stated (k,), share truly over a platform (k,) and share of the samples (k,), of the bins in use."""
+
+    stated: np.ndarray
+    truly: np.ndarray
+    samples: np.ndarray
+    ece: float
+
+
+@dataclass(frozen=True)
+class ScoreReport:
+    """Tables and curves of every detector, the one that is reported on first, and a few flights of it.
+
+    summaries: detector -> figures (`summary.summarise`). breakdowns: title -> value -> figures.
+    """
+
+    summaries: Mapping[str, dict[str, Any]]
+    breakdowns: Mapping[str, Mapping[str, dict[str, Any]]]
+    found: Mapping[str, Found]
+    reliability: Mapping[str, Reliability]
+    flights: Sequence[ShownFlight]
+
+
+def score_report(scores: Mapping[str, Sequence[FlightScore]], flights: Sequence[ShownFlight] = ()) -> ScoreReport:
+    """Everything that a report on some detectors shows. scores: detector -> its flights, that of interest first."""
+    first = next(iter(scores))
+    return ScoreReport(
+        {name: summary.summarise(some) for name, some in scores.items()},
+        {f"{first} by height": summary.by_height(scores[first]),
+         f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
+         f"{first} by wind": summary.by_wind(scores[first])},
+        {name: found_within(some) for name, some in scores.items()},
+        {name: reliability_of(some) for name, some in scores.items()}, flights)
+
+
+def found_within(scores: Sequence[FlightScore]) -> Found:
+    """How many of all true edges are found within a distance; misses keep the share below 1."""
+    edges = [e for s in scores for e in s.edges]
+    errors = np.sort([abs(e.error_m) for e in edges if e.error_m is not None])
+    return Found(errors, np.arange(1, len(errors) + 1) / max(len(edges), 1), len(edges))
+
+
+def reliability_of(scores: Sequence[FlightScore]) -> Reliability:
+    """How often the drone was over a platform when a detector said so with some probability."""
+    table = np.sum([s.bins for s in scores], axis=0) if scores else np.zeros((BINS, 3))
+    count, stated, truly = table[table[:, 0] > 0].T
+    return Reliability(stated / count, truly / count, count / max(count.sum(), 1.0),
+                       float(expected_calibration_error(table)))
+
+
+def shown_flights(results: Mapping[str, Sequence[evaluate.Result]], most: int) -> list[ShownFlight]:
+    """At most so many flights of the first detector, from the best found to the worst, with the others' edges."""
+    first, *others = results
+    ranked = sorted(results[first], key=_badness)
+    chosen = [ranked[i * (len(ranked) - 1) // max(most - 1, 1)] for i in range(min(most, len(ranked)))]
+    traces = {name: {r.score.file: r.trace for r in results[name]} for name in others}
+    return [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
+                        {name: found[r.score.file] for name, found in traces.items() if r.score.file in found})
+            for r in chosen]
+
+
+def _badness(result: evaluate.Result) -> float:
+    """Seconds: errors of the edges, MISSED_S for each that was missed; and one for each false edge."""
+    errors = [abs(e.error_s) if e.error_s is not None else MISSED_S for e in result.score.edges]
+    return sum(errors) + len(result.score.false or ())

@@ -1,0 +1,28 @@
+"""A twin beside the recorded flights in sentences and rows, for the terminal and the report alike."""
+
+from collections.abc import Sequence
+
+from airtouch.twin.compare import Gap
+from airtouch.twin.two_sample import Auroc
+
+CLOSED = 0.6  #: an AUROC below it counts as hard to tell
+
+
+def answer(auroc: Sequence[Auroc]) -> str:
+    """The result in a sentence."""
+    if not auroc:
+        return "Too few flights of any phase for a classifier to be scored."
+    worst = max(auroc, key=lambda a: a.value)
+    best = min(auroc, key=lambda a: a.value)
+    if worst.value < CLOSED:
+        return f"A classifier hardly tells the twin from the drone: AUROC {worst.value:.2f} at most ({worst.phase})."
+    return (f"A classifier tells the twin from the drone with AUROC {best.value:.3f} ({best.phase}) to "
+            f"{worst.value:.3f} ({worst.phase}); 0.5 is closed.")
+
+
+def gap_row(gap: Gap) -> tuple[str, str, str, str, int]:
+    """(where, what, difference with unit, in scatters, flights) of one feature."""
+    digits = ".0f" if gap.feature.unit in ("PWM", "PWM/s") else ".2f"
+    unit = "" if gap.feature.unit == "1" else f" {gap.feature.unit}"
+    return (gap.feature.group, gap.feature.name, f"{gap.difference:+{digits}}{unit}", f"{gap.scatters:+.1f}",
+            gap.flights)
