@@ -30,7 +30,8 @@ def write_measurement(path: Path, found: Measurement, pictures: Pictures | None 
     """
     headline = found.where[0] if found.where else None
     page = _page(
-        title="Gap between flights and simulator", answers=(words.measured(headline), words.overall(found.gap)), headline=headline,
+        title="Gap between flights and simulator", headline=headline,
+        answers=(words.measured(headline), words.overall(found.gap)),
         cells=found.map.cells, floor_from=found.map.floor_from, where=found.where, pictures=pictures,
         calibration=gap_tables.named(found.calibration),
         lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),

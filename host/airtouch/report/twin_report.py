@@ -25,8 +25,8 @@ def write_report(path: Path, recorded: Recorded, found: Comparison, drawn: Curve
     """One self-contained HTML file. drawn: its curves. first: the misfit by group before the fit."""
     images = [("One flight and its twin", "", twin_figures.overlaid(drawn.overlaid)),
               ("Spectra in free air", "", twin_figures.spectra(drawn.spectra)),
-              *(("Around the edges, medians and quartiles", twin_figures.class_in_words(name), twin_figures.edges(kinds))
-                for name, kinds in drawn.edges.items())]
+              *(("Around the edges, medians and quartiles", twin_figures.class_in_words(name),
+                 twin_figures.edges(kinds)) for name, kinds in drawn.edges.items())]
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((resources.files("airtouch.report") / "twin.html").read_text("utf-8"))
     page = template.render(

@@ -71,8 +71,8 @@ def edge_map(log: FlightLog, found: Sequence[Edge | Detection], *, lag_s: float 
     if not measured and found:
         xy = xy - xy[max(round(found[0].sample - lag_s / PERIOD_S), 0)]
     points = edge_points(xy, [e.sample for e in found], [e.kind for e in found], sigma_s=sigma_s, lag_s=lag_s)
-    return EdgeMap(xy, points, platforms(points), "logged" if measured else "dead reckoning, from the first edge", lag_s,
-                   sigma_s)
+    position = "logged" if measured else "dead reckoning, from the first edge"
+    return EdgeMap(xy, points, platforms(points), position, lag_s, sigma_s)
 
 
 def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0.0) -> tuple[np.ndarray, bool]:
