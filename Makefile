@@ -29,8 +29,9 @@ demo: setup  ## the main job: train, prune, export, detect through the C kernels
 test: setup  ## every test, sanitizers included
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST_ARGS)
 
-lint: setup  ## ruff over Python and notebooks, clang-format over C (pyproject.toml, .clang-format); FIX=1 mends what it can
+lint: setup  ## ruff over Python and notebooks, mypy over types, clang-format over C (pyproject.toml, .clang-format); FIX=1 mends what it can
 	$(BIN)/ruff check $(if $(FIX),--fix) .
+	$(BIN)/python -m mypy
 	$(BIN)/clang-format $(if $(FIX),-i,--dry-run --Werror) $$(git ls-files '*.c' '*.h')
 
 tidy: setup  ## clang-tidy over the C that flies, by .clang-tidy; fetches clang-tidy (38 MB) the first time

@@ -6,7 +6,7 @@ imported when it is first used, so `import airtouch` itself is quick.
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from airtouch.twin.adapt import Adapted
     from airtouch.vehicle import Vehicle
 
-    Flight = str | Path | FlightLog | DataFrame
+    Flight: TypeAlias = str | Path | FlightLog | DataFrame
 
 __all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", "read", "simulate", "to_pandas",
            "write"]
@@ -127,7 +127,7 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     lost = [f for f in flown if isinstance(f, Diverged)]
     if lost:
         raise AirTouchError(f"{len(lost)} of {flights} flights diverged; the first: {lost[0]}")
-    return flown
+    return [f for f in flown if isinstance(f, FlightLog)]
 
 
 def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,

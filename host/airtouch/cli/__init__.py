@@ -1,6 +1,7 @@
 """The `airtouch` command: parse, call, print. Each sub-command loads only when it is called."""
 
 import importlib
+import io
 import sys
 
 import click
@@ -71,7 +72,8 @@ def airtouch() -> None:
 def main() -> None:
     """Entry point: one clear line and exit code 2 for bad input; names that the terminal cannot show as escapes."""
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="backslashreplace")
+        if isinstance(stream, io.TextIOWrapper):  # not where a caller has put something else in its place
+            stream.reconfigure(errors="backslashreplace")
     try:
         airtouch()
     except AirTouchError as error:

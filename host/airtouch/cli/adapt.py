@@ -148,8 +148,11 @@ def in_words(table: dict[str, Any]) -> str:
 class Stages:
     """One progress bar a stage: call it with (stage, done, total, note)."""
 
+    def __init__(self) -> None:
+        self.name = ""
+        self.bar: Bar | None = None
+
     def __enter__(self) -> "Stages":
-        self.name, self.bar = "", None
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -157,7 +160,7 @@ class Stages:
             self.bar.__exit__(*error)
 
     def __call__(self, stage: str, done: int, total: int, note: str) -> None:
-        if stage != self.name:
+        if stage != self.name or self.bar is None:
             self.__exit__(None, None, None)
             self.name, self.bar = stage, Bar(stage).__enter__()
         self.bar(done, total, note)

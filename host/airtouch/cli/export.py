@@ -11,6 +11,8 @@ from airtouch.detector.paper import rolling
 from airtouch.detector.shared import archive, export, vehicle_header
 from airtouch.kernels.network import parameter_bytes
 
+Trained = model_file.Model | best_model.BestModel
+
 
 @click.command(name="export")
 @click.argument("model", required=False, type=click.Path(path_type=Path))
@@ -37,7 +39,7 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
             click.echo(f"written: {vehicle_header.export(craft, folder, force)}")
         return
     out = out or Path("gap8/model")
-    shipped = [] if model else [model_file.load(), rolling.load(None), best_model.load()]
+    shipped: list[Trained] = [] if model else [model_file.load(), rolling.load(None), best_model.load()]
     for trained in [_load(model)] if model else shipped:
         name = model.name if model else ""
         if only_check:
@@ -52,7 +54,7 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
         export.check_nothing_else(shipped, out)
 
 
-def _load(path: Path) -> model_file.Model | best_model.BestModel:
+def _load(path: Path) -> Trained:
     """A model of either kind."""
     data = archive.read(path)
     _, metadata = archive.parse(data, str(path))

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 
 from airtouch.gap import summary, words
-from airtouch.gap.gap_map import CHANNEL_WORDS, ratio, short
+from airtouch.gap.gap_map import CHANNEL_WORDS, interval, ratio, short
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
 
@@ -84,7 +84,7 @@ def cells(some: Iterable[Cell], title: str) -> Table:
     for c in some:
         row = [c.phase, "" if c.regime == "all" else c.regime, CHANNEL_WORDS[c.channel],
                f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", f"{short(c.gap)}",
-               "" if c.low is None else f"{short(c.low)} to {short(c.high)}", c.unit, f"{short(c.floor)}",
+               interval(c), c.unit, f"{short(c.floor)}",
                short(ratio(c))]
         table.add_row(*row, *([("" if c.after is None else f"{short(c.after)}")] if after else []))
     return table

@@ -1,6 +1,7 @@
 """`airtouch map`: the edges of a flight in the plane."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -8,6 +9,7 @@ import click
 from airtouch import logs
 from airtouch.detector import registry
 from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.trace import Detection
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 
@@ -45,6 +47,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
     edge_map.track(log, speed or file.condition.speed_mps)  # which may be missing, told before the detector runs
+    found: Sequence[logs.Edge | Detection]
     if truth:
         found, lag, model_sigma = logs.true_edges(log), 0.0, 0.01
     else:

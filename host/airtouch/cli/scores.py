@@ -1,6 +1,7 @@
 """What `evaluate`, `crossval` and `demo` print and write alike."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
 
-def table(rows: dict[str, dict[str, Any]], title: str) -> Table:
+def table(rows: Mapping[str, dict[str, Any]], title: str) -> Table:
     """A table of summaries, one row each, with intervals."""
     result = Table(title=title, title_justify="left", show_lines=True, caption_justify="left",
                    caption="second line: 95 % interval, bootstrap by flight. A miss has no detection within "

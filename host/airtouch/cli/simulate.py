@@ -1,10 +1,16 @@
 """`airtouch simulate`: fly a scenario many times and write the flight logs."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from airtouch.errors import AirTouchError
+
+if TYPE_CHECKING:
+    from airtouch.logs.flight_log import FlightLog
+    from airtouch.simulation.flight import Diverged
 
 FLIGHTS_A_PROCESS = 10  #: no further process for fewer
 
@@ -84,6 +90,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     todo = store.missing(out, scene.name, seed, flights)
     if len(todo) < flights:
         click.echo(f"{flights - len(todo)} of {flights} flights are there already")
+    results: Iterator[FlightLog | Diverged] | Iterator[Diverged | None]
     if dask:
         client = cluster.connect(dask)
         results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without,

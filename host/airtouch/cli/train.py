@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from airtouch import logs
 from airtouch.cli.flights import need_flights
@@ -76,7 +76,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         raise AirTouchError("baseline has nothing to train; --detector best or paper")
     given = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
              "df_lambda": df_lambda, "most_flights": labelled}
-    options = {name: value for name, value in given.items() if value is not None}
+    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     what: dict[str, Any] | None = None
     if start:
         options["start"] = module.load(start)
@@ -87,7 +87,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         chosen, failures = _read(flights, evaluate.spare_of(module))
     with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
                   TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
-        tasks: dict[str, int] = {}
+        tasks: dict[str, TaskID] = {}
 
         def progress(stage: str, done: int, total: int, note: str) -> None:
             if stage not in tasks:
@@ -104,8 +104,9 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
     model.save(out, force)
-    if options.get("work") and options["work"].is_dir() and not any(options["work"].iterdir()):
-        options["work"].rmdir()
+    work = options.get("work")
+    if work and work.is_dir() and not any(work.iterdir()):
+        work.rmdir()
     _report(model.metadata, time.monotonic() - began)
     click.echo(f"written: {out} ({out.stat().st_size} bytes)")
     if failures:

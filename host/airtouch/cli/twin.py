@@ -4,6 +4,7 @@ import json
 import shlex
 import sys
 from dataclasses import asdict
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +73,8 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
         flown, lost = compare.flown(recorded.courses, craft, fitted.levers, fitted.values, seed, levers.FIXED,
                                     progress=bar)
     with Bar("telling apart") as bar:
-        phases: list[str] = []
-        comparison = compare.compare(recorded, fitted.aim, flown, lost, seed,
-                                     lambda name: (phases.append(name), bar(len(phases), 6, name)))
+        phase = count(1)
+        comparison = compare.compare(recorded, fitted.aim, flown, lost, seed, lambda name: bar(next(phase), 6, name))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
     summary = _summary(comparison, by_name, fitted.history, recorded, typed)

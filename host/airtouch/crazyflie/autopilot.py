@@ -136,7 +136,7 @@ class Autopilot:
         return [command]
 
     def _again(self, now_s: float, wall_s: float, silence_s: float) -> list[Command]:
-        if wall_s - self._wall_sent_s < RESEND_S:
+        if self._command is None or wall_s - self._wall_sent_s < RESEND_S:
             return []
         if self._tries >= TRIES and silence_s < RESEND_S:
             self._answered = True

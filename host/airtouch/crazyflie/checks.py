@@ -76,8 +76,7 @@ def representable(name: str, text: str, ctype: str) -> float:
                                 f"the drone keeps it as {ctype}, {low} to {high}")
         return value
     try:
-        value = float(text)
-        return struct.unpack("<f", struct.pack("<f", value))[0]
+        return struct.unpack("<f", struct.pack("<f", float(text)))[0]
     except ValueError:
         raise AirTouchError(f"{name} = {text}: the drone keeps it as {ctype}; give a number") from None
     except OverflowError:

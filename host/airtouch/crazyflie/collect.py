@@ -110,9 +110,9 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
     blocks.check(blocks.MOTION, known)
     decks = {deck: there for deck in DECKS if (there := has_deck(drone, deck)) is not None}
     without = () if decks.get("bcMultiranger") else blocks.MULTIRANGER
-    slow = blocks.available(blocks.STATE, known, without)
-    blocks.check(slow, known)
-    slow = slow if slow.variables else None
+    state = blocks.available(blocks.STATE, known, without)
+    blocks.check(state, known)
+    slow = state if state.variables else None
     for name, text in plan.settings:
         drone.set_parameter(name, text)
     start_over(drone)
@@ -160,11 +160,11 @@ def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake
 
 def firmware(drone: Drone) -> str:
     """The firmware's revision, as far as it says."""
-    parts = [drone.parameter(f"firmware.revision{i}", 2.0) for i in (0, 1)]
-    if None in parts:
+    first, second = (drone.parameter(f"firmware.revision{i}", 2.0) for i in (0, 1))
+    if first is None or second is None:
         return "unknown"
     dirty = "+" if drone.parameter("firmware.modified", 2.0) else ""
-    return f"{int(parts[0]):08x}{int(parts[1]):04x}{dirty}"
+    return f"{int(first):08x}{int(second):04x}{dirty}"
 
 
 def start_over(drone: Drone) -> None:

@@ -1,6 +1,7 @@
 """One flight: packets in, rows to the file, commands out, and what makes it land early."""
 
 import contextlib
+import queue
 import statistics
 import time
 from collections import deque
@@ -13,6 +14,7 @@ from airtouch.crazyflie.autopilot import Autopilot, Command
 from airtouch.crazyflie.checks import CONFLICTS, LOWEST_V
 from airtouch.crazyflie.drone import drain
 from airtouch.crazyflie.intake import Intake
+from airtouch.crazyflie.log_blocks import Sample
 from airtouch.crazyflie.recorder import Recorder
 from airtouch.crazyflie.ticks import Restarted
 from airtouch.errors import AirTouchError
@@ -30,9 +32,17 @@ BATTERY_SAMPLES = 100
 class Craft(Protocol):
     """What a flight needs of a drone; `drone.Drone` is one."""
 
-    samples: object
-    answers: object
-    lost: Event
+    @property
+    def samples(self) -> "queue.SimpleQueue[Sample]":
+        """Samples as they come."""
+
+    @property
+    def answers(self) -> "queue.SimpleQueue[tuple[str, int]]":
+        """Kind of command and code of what the drone answered."""
+
+    @property
+    def lost(self) -> Event:
+        """Set when the link is lost."""
 
     def send(self, commands: list[Command]) -> None:
         """Send commands."""

@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 PATIENCE_S = 60.0  #: for a drone that is out of reach or a radio that is still busy
 RESEND_S = 0.2
@@ -43,7 +44,8 @@ def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
     finally:
         if guard.landed:
             process.kill()
-        process.stdin.close()
+        if process.stdin is not None:
+            process.stdin.close()
         if guard.landed:
             process.wait()
 
@@ -72,7 +74,7 @@ def land(uri: str, height_m: float, seconds: float, patience_s: float = PATIENCE
     return False
 
 
-def _answered(link: object) -> bool:
+def _answered(link: Any) -> bool:
     until = time.monotonic() + RESEND_S
     while time.monotonic() < until:
         packet = link.receive_packet(0.05)

@@ -50,7 +50,7 @@ class Intake:
     @property
     def lost(self) -> int:
         """Samples that should have come by now and did not (those under way count as lost)."""
-        if self.first_ms is None:
+        if self.first_ms is None or self.newest_ms is None:
             return 0
         return max(round((self.newest_ms - self.first_ms) / blocks.MOTION.period_ms) + 1 - self.received, 0)
 

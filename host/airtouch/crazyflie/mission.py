@@ -127,7 +127,8 @@ def legs_of(setpoints: np.ndarray) -> list[Leg]:
 
 
 def _leg(kind: str, end: Sequence[float], seconds: float) -> Leg:
-    return Leg(kind, *(round(float(v), 6) for v in end), float(seconds))
+    x, y, z = (round(float(v), 6) for v in end)
+    return Leg(kind, x, y, z, float(seconds))
 
 
 def landing(last: Leg) -> Leg:

@@ -31,8 +31,8 @@ def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostD
     """
     known = drone.variables
     blocks.check(blocks.MOTION, known)
-    slow = blocks.available(blocks.STATE, known)
-    slow = slow if slow.variables else None
+    state = blocks.available(blocks.STATE, known)
+    slow = state if state.variables else None
     app = app_log.block(known)
     for block in filter(None, (blocks.MOTION, slow, app)):
         drone.start(block)

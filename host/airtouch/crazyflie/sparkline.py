@@ -61,7 +61,8 @@ def text_map(track: np.ndarray, edges: Sequence[tuple[float, float, str]], width
     for x, y, kind in edges:
         put(x, y, {"entry": "[", "exit": "]"}.get(kind, "|"))
     if len(known):
-        put(*known[-1], "o")
+        x, y = known[-1]
+        put(x, y, "o")
     lines = ["".join(row) for row in grid]
     scale = f"{metre_a_row * 10:.2f} m"
     room = max(width - 22 - len(scale), 0)

@@ -1,7 +1,7 @@
 """The detectors, by name."""
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -28,8 +28,9 @@ class Detector(Protocol):
     def run(self, log: FlightLog, model: Any = None) -> Trace:
         """Edges of one flight at 100 Hz; None is the shipped model. AirTouchError for what it cannot use."""
 
-    def fit(self, flights: Sequence[FlightLog], seed: int = 0, **options: Any) -> Any:
-        """A model from training flights: weights, thresholds and lag, deterministic per seed."""
+    @property
+    def fit(self) -> Callable[..., Any]:
+        """fit(flights, seed=0, **options): a model from training flights, deterministic per seed."""
 
     def load(self, path: Path | None) -> Any:
         """A model from its file, the shipped one for None; AirTouchError that names what is wrong with it."""

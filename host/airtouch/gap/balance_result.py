@@ -51,7 +51,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     effects = _found(every[best[first]], weights[best[first]]) if verdict == "effect" else ()
     cells = _cells(seen, base, vehicle, every[best[first]], weights[best[first]], len(flights))
     before, after = share[first][0]
-    alike = [tuple(sorted(twins_of(e.name)[0])) for e in effects if twins_of(e.name)]
+    alike = [tuple(sorted(twins[0])) for e in effects if (twins := twins_of(e.name))]
     others = [n for n in names if n not in (first, "unknown") and total[n] > 0.5 * family[first]]
     if others:
         alike.append(tuple(sorted({first, *others})))

@@ -8,7 +8,7 @@ effect is drawn, and `sealed.json` with the SHA-256 of the key. The key lies apa
 import hashlib
 import json
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from itertools import islice
 from pathlib import Path
@@ -119,7 +119,7 @@ def open_key(folder: Path, answers_sha256: str, key: Path | None = None) -> dict
 
 def stripped(log: FlightLog) -> FlightLog:
     """A log that says nothing of how it came about."""
-    kept = {k: log.meta[k] for k in ("sample_period_s", "acc_frame") if k in log.meta}
+    kept: dict[str, Any] = {k: log.meta[k] for k in ("sample_period_s", "acc_frame") if k in log.meta}
     return FlightLog({k: v for k, v in log.columns.items() if k not in HIDDEN}, {**kept, "vehicle": VEHICLE})
 
 
@@ -149,7 +149,7 @@ def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
     return calibrate.calibrated(vehicle, list(measure.usable(cal, vehicle, [])))[0]
 
 
-def draw(count: int, levels: dict[str, Sequence[float]], rng: np.random.Generator) -> list[list[tuple[str, int]]]:
+def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Generator) -> list[list[tuple[str, int]]]:
     """For each flight its kinds of effect with their severities, in random order."""
     singles, none = (round(count * SHARES[k]) for k in ("single", "none"))
     names = list(levels)
@@ -175,7 +175,7 @@ def alike(one: str, other: str) -> bool:
     return one == other or (group is not None and other in group[0])
 
 
-def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], levels: dict[str, Sequence[float]], seed: int,
+def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], levels: Mapping[str, Sequence[float]], seed: int,
             number: int, rng: np.random.Generator) -> tuple[FlightLog, list[dict[str, Any]]]:
     """A flight that ends well, and what acts in it: after a crash another one, a little weaker."""
     for attempt in range(TRIES):

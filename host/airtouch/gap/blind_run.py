@@ -88,7 +88,7 @@ def _answers(study: Study, logs: Iterable[Case], workers: int, spread: Mapper | 
         yield from (spread or map)(partial(_diagnosed, study), logs)
         return
     with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
-        yield from in_order(partial(pool.submit, _with_study), logs, AHEAD * workers)
+        yield from in_order(lambda case: pool.submit(_with_study, case), logs, AHEAD * workers)
 
 
 def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
@@ -106,6 +106,7 @@ def _begin(study: Study | None) -> None:
 
 
 def _with_study(case: Case) -> Answer:
+    assert _study is not None  # which `_begin` has set in this process
     return _diagnosed(_study, case)
 
 

@@ -76,13 +76,13 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
     }
 
 
-def share(values: Any) -> dict[str, float]:
+def share(values: Any) -> dict[str, float | None]:
     """Share of true values with n and Wilson's 95 % interval."""
     found = [bool(v) for v in values]
     return wilson(sum(found), len(found))
 
 
-def wilson(hits: int, n: int, z: float = 1.959964) -> dict[str, float]:
+def wilson(hits: int, n: int, z: float = 1.959964) -> dict[str, float | None]:
     """Share hits / n with Wilson's score interval; without trials anything is possible."""
     if not n:
         return {"value": None, "low": 0.0, "high": 1.0, "hits": 0, "n": 0}
@@ -175,7 +175,8 @@ def confusion(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case]) -> 
     return {k: dict(v) for k, v in sorted(out.items())}
 
 
-def reliability(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case], bins: int = 8) -> list[dict[str, float]]:
+def reliability(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case], bins: int = 8,
+                ) -> list[dict[str, float | None]]:
     """For bins of the first answer's probability: its mean, how often the answer was right, and n."""
     rows = []
     for n, e in truth.items():

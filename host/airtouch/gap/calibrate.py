@@ -33,7 +33,7 @@ from airtouch.vehicle import Vehicle
 
 #: effect, its variant, and the prior's standard deviation of each free parameter in its own unit
 PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
-    *(("weak_motor", {"rotor": i}, {"thrust_loss": 0.1}) for i in (1, 2, 3, 4)),
+    *(("weak_motor", {"rotor": float(i)}, {"thrust_loss": 0.1}) for i in (1, 2, 3, 4)),
     ("motor_lag", {}, {"factor": 0.5}),
     ("actuator_delay", {}, {"delay": 0.005}),
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),

@@ -185,10 +185,11 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
     """
     without = set(without)
-    out = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
+    out: dict[str, list[tuple[Term, ...]]] = {name: [(t,) for t in terms(name)] for name in EFFECTS
+                                              if name not in without}
     for name in UNSTEADY:
         if name in out:
-            shaking = [(*v, _unsteady(name)) for v in out[name]]
+            shaking: list[tuple[Term, ...]] = [(*v, _unsteady(name)) for v in out[name]]
             out[name] = shaking if name in SHAKES else out[name] + shaking
     for name in COMPANIONS:
         if name in out and COMPANIONS[name] not in without:
@@ -200,7 +201,8 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
 def gated(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     """Effects that may come and go, with their variants; the gate is set by who looks for it."""
     without = set(without)
-    out = {name: [(t,) for t in terms(name)] for name in GATED if name in EFFECTS and name not in without}
+    out: dict[str, list[tuple[Term, ...]]] = {name: [(t,) for t in terms(name)] for name in GATED
+                                              if name in EFFECTS and name not in without}
     return {n: [(*t, _unsteady(n)) for t in v] if n in UNSTEADY else v for n, v in out.items()}
 
 

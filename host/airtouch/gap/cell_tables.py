@@ -92,7 +92,8 @@ def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
     found: Floors = {GROUND: (least, least), AIR: (least, least)}
     air = Sums(np.where(nominal.phase == GROUND, GROUND, 1), nominal.flight, nominal.weight, nominal.power,
                nominal.mean)
-    for key, source, phase in ((AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))):
+    of: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
+    for key, source, phase in of:
         spread = _without_common(source, phase, count)
         table = table_of(spread, phase, seed=100) if spread is not None else None
         if table is None:

@@ -82,6 +82,7 @@ def _applied(data: Data, response: Response, active: Sequence[Active], replayed:
     """Spectra of the gap, torque compared with what the commands leave to expect. replayed: without COMMAND_ONLY."""
     every = _replayed(data, replayed)
     law = data.study.controller
+    assert law is not None  # a response is known of nominal flights, and so is their loop
     beside = [a for a in replayed if not law.changes_loop((a,))]
     through = [a for a in beside if a.effect.wrench is None]
     change = law.torque_change(active, frequencies(AIR))

@@ -167,14 +167,16 @@ def _verdict(selection: Selection, gap: Shrink, exact: bool) -> str:
 
 def _effects(data: Data, selection: Selection) -> list[Found]:
     """The effects chosen, fitted anew on all the data, with 90 % intervals."""
-    if selection.chosen is None:
+    judged = selection.whole
+    if selection.chosen is None or judged is None:
         return []
-    others = [t for t in selection.whole.terms if t.kind != CLOCK]
+    others = [t for t in judged.terms if t.kind != CLOCK]
     whole = whole_of(data)
-    fitted = _best_shape(data, whole, others, _middle(selection.whole)) if others else None
+    fitted = (_best_shape(data, whole, others, _middle(judged)) if others
+              else Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0))
     chosen = {t.name for t in selection.chosen.terms}
     out, place = [], 0
-    for t in fitted.terms if fitted else ():
+    for t in fitted.terms:
         part = slice(place, place + len(t.free)) if t.kind == candidates.MEAN else None
         if part is not None:
             place += len(t.free)
@@ -185,7 +187,7 @@ def _effects(data: Data, selection: Selection) -> list[Found]:
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
         known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
-        spread = _spread(data.study.controller, selection.whole, t, known)
+        spread = _spread(data.study.controller, judged, t, known)
         out.append(Found(t.name, t.quantities(x, spread), t.gate))
     for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
         x = t.scaled(t.values)
@@ -220,7 +222,7 @@ def _with_random_part(effect: Found, part: Term) -> Found:
     own, given = part.values["strength"], effect.parameters["strength"]
     limits = {p.name: p.high for p in part.effect.parameters}
     strength = max(given.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
-    raised = replace(given, value=strength, high=max(given.high, strength))
+    raised = replace(given, value=strength, high=strength if given.high is None else max(given.high, strength))
     scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
     return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
 

@@ -157,9 +157,11 @@ def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Acti
 def _place(flight: Flight) -> tuple[float, float, float, float]:
     """Height, clearance, speed and length of crossing, rounded so that flights share a simulation."""
     edges = edges_of(flight)
+    if not edges:
+        raise ValueError(f"{flight.name}: no edge in this flight")
     entry = next((e for e in edges if e.kind == "entry"), None)
     leave = next((e for e in edges if e.kind == "exit" and (entry is None or e.sample > entry.sample)), None)
-    one = entry or leave
+    one = entry or leave or edges[0]
     high, low = max(one.height_before_m, one.height_after_m), min(one.height_before_m, one.height_after_m)
     speed = 0.3
     if flight.log.has(*VELOCITY[:2]):

@@ -53,7 +53,8 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     mean = tuple(t for t in terms if t.kind == MEAN)
     random = [t for t in terms if t.kind == SPECTRUM]
     x = _start(problem, mean, start)
-    offsets, covariance, added = np.zeros(0), np.zeros((0, 0)), 0.0
+    offsets, covariance = np.zeros(0), np.zeros((0, 0))
+    added: np.ndarray | float = 0.0
     for _ in range(2 if random and mean and start is None else 1):
         if random and mean and start is not None:
             added = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
@@ -195,7 +196,7 @@ class Slopes:
         gradient, information = problem.twin.slopes(_active(self.mean, x), np.array(self.rises), wide)
         doubts = np.array(self.doubts)
         if doubts.any():
-            push, weight = problem.power_slopes(values, added)
+            push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))
             gradient = gradient + doubts @ push
             information = information + (doubts * weight) @ doubts.T
         return gradient, information

@@ -73,14 +73,15 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     floors = floors_of(join([p.before for p in nominal]), len(nominal), sensor) if nominal \
         else spreads_of(joined, sensor)
     later = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
-    alone = [join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1 else [later]
+    alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
+             else [later] if later is not None else [])
     no_gyro = not any(p.has_gyro for p in parts)
     cells = []
     for k, kind in enumerate(KINDS):
         table = table_of(joined, k, seed=k)
         if table is None:
             continue
-        then = table_of(later, k, seed=k) if later else None
+        then = table_of(later, k, seed=k) if later is not None else None
         level, top = floors.get(k) or (floors[GROUND] if k == GROUND else floors[AIR])
         best = _best([_rms(a, k) for a in alone], effects, table.rms, level) if then else None
         cells += _cells(kind, table, then, best, level, top, bool(nominal), no_gyro)
@@ -106,7 +107,7 @@ def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
         if not significant(c) or key not in whole:
             continue
         phase = whole[key]
-        if c.regime != "all" and not (c.low > (phase.high or np.inf) and sure_ratio(c) > sure_ratio(phase)):
+        if c.regime != "all" and not ((c.low or 0.0) > (phase.high or np.inf) and sure_ratio(c) > sure_ratio(phase)):
             continue
         if key not in best or sure_ratio(c) > sure_ratio(best[key]):
             best[key] = c
@@ -118,8 +119,8 @@ def where(made: GapMap, count: int = 10) -> list[Cell]:
     chosen = largest(made.cells, count)
     every = largest(made.cells, len(made.cells))
     more = [next((c for c in every if c.phase == kind), None) for kind in KINDS]
-    closed = [c for c in every if c.after is not None]
-    more += sorted(closed, key=lambda c: (c.after - c.gap) / max(c.floor_high or c.floor, 1e-12))[:3]
+    closed = [((c.after - c.gap) / max(c.floor_high or c.floor, 1e-12), c) for c in every if c.after is not None]
+    more += [c for _, c in sorted(closed, key=lambda x: x[0])[:3]]
     others = {c for c in more if c is not None and c not in chosen}
     return chosen + sorted(others, key=sure_ratio, reverse=True)
 
@@ -147,6 +148,11 @@ def in_words(cell: Cell) -> str:
     return (f"{PHASE_WORDS[cell.phase]}{regime}, {cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz, "
             f"{CHANNEL_WORDS[cell.channel]}: {short(cell.gap)} {cell.unit}, "
             f"{short(ratio(cell))} times the floor")
+
+
+def interval(cell: Cell) -> str:
+    """The interval of the cell's gap, "" where there is none."""
+    return "" if cell.low is None or cell.high is None else f"{short(cell.low)} to {short(cell.high)}"
 
 
 def short(value: float) -> str:

@@ -138,12 +138,13 @@ def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Ga
     best = level(gate)
     for step in STEPS_S:
         for i in range(len(gate)):
-            for end in (1, 2):
+            for end in (0, 1):
                 for sign in (-1.0, 1.0):
-                    moved = list(gate[i])
-                    moved[end] += sign * step
-                    tried = (*gate[:i], tuple(moved), *gate[i + 1:])
-                    if moved[1] < moved[2] and (found := level(tried)) > best:
+                    flight, *ends = gate[i]
+                    ends[end] += sign * step
+                    begin, stop = ends
+                    tried = (*gate[:i], (flight, begin, stop), *gate[i + 1:])
+                    if begin < stop and (found := level(tried)) > best:
                         best, gate = found, tried
     return gate
 

@@ -21,8 +21,8 @@ def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) 
     return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
 
 
-def _normal(columns: Sequence[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray, at: np.ndarray,
-            twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _normal(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
+            weights: np.ndarray, at: np.ndarray, twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and right-hand side of the ridge regression that lowers values + sum(step * column).
 
     twin: gradient and information of the likelihood from the commands' spectra.
@@ -34,7 +34,7 @@ def _normal(columns: Sequence[np.ndarray], prior: np.ndarray, values: np.ndarray
     return normal + twin[1], slope + twin[0]
 
 
-def bounded_step(columns: Sequence[np.ndarray], prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
+def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
                  x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
                  twin: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """A step that leaves parameters at a bound there when it would take them past it, and the covariance (n, n) of x.

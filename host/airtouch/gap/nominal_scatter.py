@@ -12,7 +12,7 @@ which class it is they tell by themselves. `tools/nominal_scatter.py` makes the 
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -82,7 +82,7 @@ class Scatter:
         if name in self.middle:  # a random effect weaker than usual is no news
             strength = np.maximum(strength - self.middle[name], 0.0)
         strength = np.maximum(np.abs(strength) - SURELY * error, 0.0)
-        far = float(np.sum((strength / rms) ** 2)) - max(np.count_nonzero(strength) - 1, 0)
+        far = float(np.sum((strength / rms) ** 2)) - max(int(np.count_nonzero(strength)) - 1, 0)
         return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
 
     def allowed(self, seconds: float, least: float) -> float:
@@ -118,7 +118,7 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     known = baseline if n > 1 else ()
     weight = np.array([_fit(c, known, wide) for c in classes.values()])
     name_of = list(classes)[int(np.argmax(weight))]
-    own = classes[name_of] if n > 1 else _widest(classes.values())
+    own = classes[name_of] if n > 1 else _widest(list(classes.values()))
     simulated = name_of == SIMULATED and n > 1  # whose flights are all drawn alike
     least = LEAST if simulated else LEAST_RECORDED
     worth = own.freedom if simulated else min(own.freedom, WORTH)
@@ -193,8 +193,10 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     classes = list(classes)
     names = {n for c in classes for n in c.rms}
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
-    def highest(rates):
+
+    def highest(rates: Iterable[tuple[float, float]]) -> tuple[float, float]:
         return max(rates, key=lambda r: r[0] + r[1])
+
     passing = {n: highest(c.passing_rates[n] for c in classes if n in c.passing_rates)
                for n in sorted({n for c in classes for n in c.passing_rates})}
     return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
@@ -222,12 +224,13 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
     for name in names:
         rows = [f for f in flights if name in f.strengths]
         size = max(len(f.strengths[name]) for f in rows)
-        columns = [tuple(_column(rows, name, part, k) for part in ("strengths", "errors")) for k in range(size)]
+        columns = [(_column(rows, name, "strengths", k), _column(rows, name, "errors", k)) for k in range(size)]
         if is_random(name):
             middle[name] = np.array([strengths.mean() for strengths, _ in columns])
             columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
-        pooled = _median(*(np.concatenate(part) for part in zip(*columns, strict=True)), 0.0, 0.0)
-        rms[name] = np.array([_median(*c, pooled, POOLED) for c in columns] if size > 1 else [pooled])
+        each, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
+        pooled = _median(each, errors, 0.0, 0.0)
+        rms[name] = np.array([_median(x, e, pooled, POOLED) for x, e in columns] if size > 1 else [pooled])
     passing = {n: _robust([f.passing_rates.get(n, 0.0) for f in alike])
                for n in sorted({n for f in alike for n in f.passing_rates})}
     return Scatter(rms, float(len(alike)), _robust([f.rate for f in alike]), passing, middle=middle)

@@ -181,12 +181,9 @@ def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
     middle = np.mean(runs, axis=0)
     out = {}
     for r, first in data.first[i].items():
-        total = 0.0
-        for run in runs:
-            change = np.nan_to_num(run - middle)
-            change[flight.phase == GROUND] = 0.0
-            total = total + np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1)
-        if not np.ndim(total) or not len(total):
+        changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - middle)) for run in runs]
+        total = np.sum([np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
+        if not len(total):
             out[r] = np.zeros(data.base[i][r].shape)
             continue
         if r == AIR:

@@ -149,6 +149,7 @@ def _passing(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float
 
 def _nominal(data: Data, name: str) -> float:
     """Log likelihood that an effect that comes and goes gains in nominal flights as long as these."""
+    assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
     return data.study.scatter.passing(name, seconds(data), LEAST_GAIN)
 
 

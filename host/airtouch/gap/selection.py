@@ -79,14 +79,14 @@ class Selection:
     @property
     def chosen(self) -> Judged | None:
         """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
-        names = {s.name for s in self.named}
-        if not names:
+        names, whole = {s.name for s in self.named}, self.whole
+        if not names or whole is None:
             return None
         names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
         terms, *fitted = ([t for t in some if t.name in names]
-                          for some in (self.whole.terms, *(f.terms for f in self.whole.fits)))
-        fits = (replace(f, terms=tuple(t)) for f, t in zip(self.whole.fits, fitted, strict=True))
-        return replace(self.whole, terms=tuple(terms), fits=tuple(fits))
+                          for some in (whole.terms, *(f.terms for f in whole.fits)))
+        fits = (replace(f, terms=tuple(t)) for f, t in zip(whole.fits, fitted, strict=True))
+        return replace(whole, terms=tuple(terms), fits=tuple(fits))
 
     @property
     def allowed(self) -> float:

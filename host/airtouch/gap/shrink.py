@@ -51,7 +51,7 @@ class Cells:
 def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
     """The cells of some flights. named: the effects named."""
     terms = _terms(named)
-    chosen = tuple(_standing_out(data, parts[1 - k], terms[1 - k]) for k in (0, 1))
+    chosen = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
     after = _energies(data, parts, terms, chosen)
     calm = max(1.0 - after.mean(), 0.0) if len(after) else 0.0
     return Cells(chosen, calm, calm + _energies(data, parts, ((), ()), chosen))

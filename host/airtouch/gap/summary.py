@@ -43,6 +43,11 @@ def over_floor(cell: Cell, value: float | None = None) -> float:
     return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, 1e-12)
 
 
+def after(cell: Cell) -> float:
+    """Gap over floor with the named effects in the model; as it was, where they were not tried in it."""
+    return (cell.gap if cell.after is None else cell.after) / max(cell.floor, 1e-12)
+
+
 def stands_out(cell: Cell) -> bool:
     """Whether the gap's interval lies above that of the floor."""
     return (cell.gap if cell.low is None else cell.low) > (cell.floor_high or cell.floor)
@@ -121,9 +126,9 @@ def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
         some = [c for c in cells if c.phase == kind and c.regime == "all"]
         if not some:
             continue
-        changed = all(c.after is not None for c in some)
+        after = [c.after / max(c.floor, 1e-12) for c in some if c.after is not None]
         made.append(Phase(kind, rms([c.gap / max(c.floor, 1e-12) for c in some]),
-                          rms([c.after / max(c.floor, 1e-12) for c in some]) if changed else None, len(some),
+                          rms(after) if len(after) == len(some) else None, len(some),
                           sum(stands_out(c) for c in some), sum(stays(c) for c in some),
                           sum(got_worse(c) for c in some), sum(energy(c) for c in some)))
     return tuple(sorted(made, key=lambda p: -p.energy))

@@ -212,14 +212,17 @@ class Twin:
         f = fine_frequencies()
         made = []
         for i, axis in enumerate(AXES):
-            sources, beyond = self._of_axis("power", row, axis, f, lambda c, axis=axis: (
-                spectra(c, row, axis, f), excess_phase(c, row, axis)))
+            sources, beyond = self._of_axis("power", row, axis, f, partial(_power_and_phase, row, axis, f))
             strengths = self.strengths[i].copy()
             if self.by_firmware and axis != "thrust":
                 strengths[0] *= (float(row["gyro_noise"][i - 1]) / self._gyro_noise()[i - 1]) ** 2
             power = strengths @ sources
             made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
         return np.stack([through_window(m) for m in made], axis=1)
+
+
+def _power_and_phase(row: Any, axis: str, f: np.ndarray, controller: Controller) -> tuple[np.ndarray, float]:
+    return spectra(controller, row, axis, f), excess_phase(controller, row, axis)
 
 
 def _same_loop(one: Any, two: Any) -> bool:

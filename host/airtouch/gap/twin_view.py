@@ -31,7 +31,7 @@ class TwinView:
 
     def __init__(self, twin: Twin | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
                  pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
-        self.twin, self.kept = twin, {}
+        self._twin, self.kept = twin, {}
         self.spectra: list[np.ndarray] = []
         self.flights: list[int] = []
         if twin is not None:
@@ -52,9 +52,9 @@ class TwinView:
             for e in edge_response.edges_of(flights[i])
             if chosen[np.argmin(np.abs(first[i][AIR] + AIR_LENGTH[AIR] // 2 - e.sample))]]
         flat = [s.ravel() for s in self.spectra]
-        flat += [edge_response.whitened(twin.edges, f, e).astype(complex) for f, _, e in self.edges]
+        flat += [edge_response.whitened(self._edge_floor, f, e).astype(complex) for f, _, e in self.edges]
         self.values = np.concatenate(flat) if flat else NOTHING.astype(complex)
-        self.floor = self._spread_out(lambda i: twin.floor)
+        self.floor = self._spread_out(lambda i: self.twin.floor)
         axis = np.arange(len(AXES)) + FIRST_CHANNEL
         self.channel = self._spread_out(lambda i: np.broadcast_to(axis, _shape(self.spectra[i])))
         self.frequency = self._spread_out(lambda i: np.repeat(frequencies()[:, None], len(AXES), axis=1))
@@ -72,6 +72,18 @@ class TwinView:
     def __len__(self) -> int:
         return len(self.values)
 
+    @property
+    def twin(self) -> Twin:
+        """The loop that the commands are held against; only asked for where there are any."""
+        assert self._twin is not None
+        return self._twin
+
+    @property
+    def _edge_floor(self) -> edge_response.EdgeFloor:
+        """The same of responses at edges."""
+        assert self.twin.edges is not None
+        return self.twin.edges
+
     def _spread_out(self, table_of: Any) -> np.ndarray:
         """A table (bins, axes) for each flight, once for each of its blocks, flattened."""
         made = [np.broadcast_to(table_of(i), s.shape).ravel() for i, s in enumerate(self.spectra)]
@@ -84,7 +96,7 @@ class TwinView:
         out = self.values.copy()
         at = len(out) - len(self.edges) * edge_response.COUNT
         for flight, _, e in self.edges:
-            out[at:at + edge_response.COUNT] -= edge_response.expected(self.twin.edges, flight, e, active)
+            out[at:at + edge_response.COUNT] -= edge_response.expected(self._edge_floor, flight, e, active)
             at += edge_response.COUNT
         return out
 

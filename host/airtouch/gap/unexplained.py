@@ -36,8 +36,7 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
     near = nearest(selection)
     out = []
     for cell in [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]:
-        over = [_over(study, f, active, cell) for f in flights]
-        over = [(f, o) for f, o in zip(flights, over, strict=True) if len(o)]
+        over = [(f, o) for f in flights if len(o := _over(study, f, active, cell))]
         if not over:
             continue
         flight, ratio = max(over, key=lambda x: float(x[1].max()))

@@ -102,7 +102,7 @@ def _found(data: Any) -> Lines:
     seen = _Seen(data, each)
     if not len(seen.share):
         return Lines([folded(widened(z, 0.0)) for z in each], 0, 0.0)
-    wide, some = SPREADS_HZ[1], np.arange(-reach, reach + 1, 2)
+    wide, some = SPREADS_HZ[1], range(-reach, reach + 1, 2)
     rough = max(some, key=lambda s: seen.gain(wide, s))
     near = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
     spread, shift = max(near, key=lambda x: seen.gain(*x))

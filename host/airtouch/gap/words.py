@@ -56,9 +56,9 @@ def _named(effect: Found) -> str:
 
 def _how_far(diagnosis: Diagnosis) -> str:
     before, after = (diagnosis.gap.get(k) for k in ("before", "after"))
+    if before is None or after is None:
+        return "How far it would close is not known."
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
-        if before is None:
-            return "How far it would close is not known."
         if diagnosis.verdict == "none":
             return f"Over all it is {short(before)} times the floor, so there is nothing to close."
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
@@ -78,7 +78,7 @@ def _how_far(diagnosis: Diagnosis) -> str:
 
 def _after_in_words(cell: Cell) -> str:
     return (f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} "
-            f"({short(ratio(cell))} to {short(cell.after / max(cell.floor, 1e-12))} times the floor)")
+            f"({short(ratio(cell))} to {short(summary.after(cell))} times the floor)")
 
 
 def remaining_in_words(cells: Sequence[Cell]) -> list[str]:

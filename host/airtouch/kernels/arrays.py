@@ -1,22 +1,25 @@
 """NumPy arrays as the kernels want them: float32, row-major."""
 
+from typing import Any
+
 import numpy as np
 
 from airtouch.kernels.library import ffi
+from airtouch.vehicle import Vehicle
 
 
-def float32(x: object) -> np.ndarray:
+def float32(x: Any) -> np.ndarray:
     """x as a contiguous float32 array; values too large for it become infinite."""
     with np.errstate(over="ignore"):
         return np.ascontiguousarray(x, dtype=np.float32)
 
 
-def pointer(x: np.ndarray, kind: str = "float *") -> object:
+def pointer(x: np.ndarray, kind: str = "float *") -> Any:
     """The address of a contiguous array; the array must outlive the call."""
     return ffi.cast(kind, x.ctypes.data)
 
 
-def vehicle_struct(vehicle: object) -> object:
+def vehicle_struct(vehicle: Vehicle) -> Any:
     """An airtouchVehicle_t from an airtouch.vehicle.Vehicle."""
     return ffi.new("airtouchVehicle_t *", {
         "mass": vehicle.mass_kg,
@@ -26,11 +29,11 @@ def vehicle_struct(vehicle: object) -> object:
     })
 
 
-def column(values: object, n: int) -> np.ndarray:
+def column(values: Any, n: int) -> np.ndarray:
     """(n,) float32 from (n,), one value, or None for NaN throughout."""
     return float32(np.broadcast_to(np.nan if values is None else values, (n,)))
 
 
-def axes(thrust_axis: object, n: int) -> np.ndarray:
+def axes(thrust_axis: Any, n: int) -> np.ndarray:
     """(n, 3) float32 from (n, 3), (3,), or None for NaN throughout: the kernels then take (0, 0, 1)."""
     return float32(np.broadcast_to(np.nan if thrust_axis is None else thrust_axis, (n, 3)))

@@ -22,20 +22,21 @@ class BandPowerBank:
         floats = call("bandPowerWork")(*self._settings[:4], channels)
         self._work = np.zeros(max(floats, 1), dtype=np.float32)
         self._state = ffi.new("char[]", call("bandPowerStateSize")())
-        if self._run(np.empty((0, channels), np.float32), reset=True) is None:
+        if not self._run(np.empty((0, channels), np.float32), reset=True)[1]:
             raise AirTouchError(f"band power: the kernel takes windows of 4 to 16384 samples and hops to 65535, "
                                 f"not {window} and {hop}")
 
     def push(self, x: np.ndarray) -> np.ndarray:
         """Powers, one row an output, float32, of the next samples (n, channels)."""
-        return self._run(float32(x), reset=False)
+        return self._run(float32(x), reset=False)[0]
 
-    def _run(self, x: np.ndarray, reset: bool) -> np.ndarray | None:
+    def _run(self, x: np.ndarray, reset: bool) -> tuple[np.ndarray, bool]:
+        """Powers, and whether the kernel takes these settings."""
         rate, window, low, high, hop = self._settings
         out = np.empty((len(x) // hop + 1, self.channels), dtype=np.float32)
         rows = call("bandPowerBatch")(pointer(x), len(x), self.channels, rate, window, low, high, hop, self._state,
                                       pointer(self._work), self._work.size, reset, pointer(out))
-        return None if rows < 0 else out[:rows]
+        return out[:max(rows, 0)], rows >= 0
 
 
 def band_power(

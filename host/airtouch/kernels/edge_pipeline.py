@@ -1,5 +1,7 @@
 """The pipeline that flies: see `airtouch.reference.edge_pipeline`."""
 
+from typing import Any
+
 import numpy as np
 
 from airtouch.errors import AirTouchError
@@ -15,7 +17,7 @@ def _event_dtype() -> np.dtype:
     kinds = {"float": np.float32, "uint32_t": np.uint32, "uint8_t": np.uint8}
     names, formats, offsets = [], [], []
     for name, field in ffi.typeof("edgeEvent_t").fields:
-        kind, shape = field.type, ()
+        kind, shape = field.type, tuple[int, ...]()
         if kind.kind == "array":
             kind, shape = kind.item, (kind.length,)
         names.append(name)
@@ -63,7 +65,7 @@ def pipeline_ram_bytes() -> int:
     return int(call("edgePipelineSize")())
 
 
-def config_struct(config: EdgePipelineConfig, vehicle: Vehicle) -> object:
+def config_struct(config: EdgePipelineConfig, vehicle: Vehicle) -> Any:
     """An edgePipelineConfig_t; AirTouchError for settings that no pipeline can have."""
     p = config.parameters
     band_bins(p.sample_rate_hz, p.band_window, (p.band_low_hz, p.band_high_hz))

@@ -2,6 +2,7 @@
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from cffi import FFI
 
@@ -17,7 +18,7 @@ def _declarations(folder: Path) -> str:
     return "\n".join(line for line in lines if not line.lstrip().startswith("#"))
 
 
-def _open(ffi: FFI) -> object:
+def _open(ffi: FFI) -> Any:
     spec = find_spec("airtouch.kernels._kernels")
     if spec is None or spec.origin is None:
         raise AirTouchError(f"the C kernels are not built: {REMEDY}")

@@ -1,14 +1,15 @@
 """The int8 and float network of gap8/kernels, whole batches and whole flights in one call."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
 from airtouch.reference.int8_network import Int8Layer, Int8Network, runs_sparse, sparse_blocks
+from airtouch.reference.stream_int8 import StreamNetwork
 
 _KIND = {"conv": 0, "max_pool": 1, "dense": 2}
 _SPARSE = {"dense": 3, "conv": 4}
@@ -17,7 +18,9 @@ _SPARSE = {"dense": 3, "conv": 4}
 class Model(Protocol):
     """What these functions need of a trained model."""
 
-    int8: Int8Network
+    @property
+    def int8(self) -> Int8Network:
+        """The network that flies."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +32,8 @@ class FloatLayer:
     output_shape: tuple[int, int, int]
     kernel: tuple[int, int]
     relu: bool = False
-    weights: np.ndarray | None = None
-    bias: np.ndarray | None = None
+    weights: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
+    bias: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
 
 
 def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
@@ -101,7 +104,7 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     return np.where(valid, _softmax(network, logits), np.nan)
 
 
-def parameter_bytes(network: Int8Network) -> int:
+def parameter_bytes(network: Int8Network | StreamNetwork) -> int:
     """Bytes that the network's constants take on the GAP8: weights, block skips and counts, bias,
     multiplier and shift."""
     total = 0
@@ -135,14 +138,14 @@ def layer_shape(layer: Int8Layer) -> list[int]:
             layer.output_zero_point, layer.output_min, 127]
 
 
-def _flat_int8(network: Int8Network) -> tuple[object, list[np.ndarray]]:
+def _flat_int8(network: Int8Network) -> tuple[Any, list[np.ndarray]]:
     """The C view of a network whose layers fit each other, and the arrays that must outlive it."""
     flat, keep = flat_layers(network.layers)
     checked(lib.networkInt8BatchArena(flat))
     return flat, keep
 
 
-def flat_layers(layers: Sequence[Int8Layer]) -> tuple[object, list[np.ndarray]]:
+def flat_layers(layers: Sequence[Int8Layer]) -> tuple[Any, list[np.ndarray]]:
     """The C view of layers, one after the other, and the arrays that must outlive it."""
     weighted = [layer for layer in layers if layer.kind != "max_pool"]
     packed = [packed_weights(layer) for layer in weighted]
@@ -186,11 +189,11 @@ def _softmax(network: Int8Network, logits: np.ndarray) -> np.ndarray:
     return 1.0 / (1.0 + np.exp(-network.layers[-1].output_scale * difference))
 
 
-def _arena(flat: object) -> object:
+def _arena(flat: Any) -> Any:
     return ffi.new("int8_t[]", lib.networkInt8BatchArena(flat))
 
 
-def pointer(kind: str, array: np.ndarray) -> object:
+def pointer(kind: str, array: np.ndarray) -> Any:
     return ffi.cast(f"{kind} *", array.ctypes.data)
 
 

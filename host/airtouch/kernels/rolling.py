@@ -1,6 +1,6 @@
 """A windowed int8 network that rolls over a flight: the answers of its windows, a sample at a time."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -8,6 +8,14 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.network import Model, flat_layers, pointer
 from airtouch.reference.int8_network import Int8Network, quantise
+
+
+class ScaledModel(Model, Protocol):
+    """A model whose inputs are on a fixed scale, each with a mean and a deviation."""
+
+    @property
+    def scale(self) -> Any:
+        """The scale; None for a model of windows, which does not roll."""
 
 
 class Rolling(NamedTuple):
@@ -60,7 +68,7 @@ def fixed_scale(mean: np.ndarray, deviation: np.ndarray, features: np.ndarray) -
     return out
 
 
-def probability_of_samples(model: Model, features: np.ndarray, stride: int) -> np.ndarray:
+def probability_of_samples(model: ScaledModel, features: np.ndarray, stride: int) -> np.ndarray:
     """P(over a platform), (n,), from fused features (n, c), by a model on a fixed scale that rolls over them.
 
     Held between two outputs; NaN before the first one and where a feature is not finite.

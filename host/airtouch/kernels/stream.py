@@ -1,5 +1,7 @@
 """The streaming int8 network of gap8/kernels, a flight in one call."""
 
+from typing import Any
+
 import numpy as np
 
 from airtouch.errors import AirTouchError
@@ -31,7 +33,7 @@ def arena_bytes(network: StreamNetwork) -> int:
     return checked(lib.streamInt8BatchArena(flat))
 
 
-def flat_stream(network: StreamNetwork) -> tuple[object, list]:
+def flat_stream(network: StreamNetwork) -> tuple[Any, list]:
     """The C view of a network, and what must outlive it.
 
     Raises AirTouchError for a graph other than convolutions in a row, the first one strided, and a head that reads

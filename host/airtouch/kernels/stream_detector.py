@@ -1,6 +1,7 @@
 """Motion channels, decoder and the whole streaming detector in C, a flight in one call."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
                   "itemsize": ffi.sizeof("streamEvent_t")})
 
 
-def motion_struct(config: MotionConfig) -> object:
+def motion_struct(config: MotionConfig) -> Any:
     """A motionConfig_t."""
     return ffi.new("motionConfig_t *", {
         "vehicle": vehicle_struct(config.vehicle)[0], "inverseScale": [1.0 / s for s in config.scale],
@@ -93,7 +94,7 @@ def motion_struct(config: MotionConfig) -> object:
         "settleSamples": config.settle_samples})
 
 
-def decoder_struct(config: DecoderConfig) -> object:
+def decoder_struct(config: DecoderConfig) -> Any:
     """A decoderConfig_t."""
     return ffi.new("decoderConfig_t *", {
         "overShare": config.over_share, "entryScore": config.entry_score, "exitScore": config.exit_score,

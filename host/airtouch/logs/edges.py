@@ -42,7 +42,7 @@ def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
     level = max(int(round(LEVEL_S / period)), 1)
     edges: list[Edge] = []
     settled = 0
-    for sample in steps:
+    for sample in map(int, steps):
         if sample < settled:
             continue
         settled = sample + settling
@@ -50,7 +50,7 @@ def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
         later = height[settled:settled + level]
         after = float(np.median(later)) if len(later) else float(height[-1])
         if abs(after - before) > step_m:
-            edges.append(Edge(int(sample), "entry" if after < before else "exit", before, after))
+            edges.append(Edge(sample, "entry" if after < before else "exit", before, after))
     return edges
 
 

@@ -53,7 +53,7 @@ def check(log: FlightLog) -> Quality:
     period = true_period(clock)
     flying, phases, edges = _flight(log)
     missing = {name: int((~np.isfinite(v)).sum()) for name, v in log.columns.items()}
-    found = {
+    found: dict[str, Any] = {
         "gaps": lost_samples(clock, period) if period else [],
         "clock_repeats": int((steps == 0).sum()),
         "clock_backwards": int((steps < 0).sum()),

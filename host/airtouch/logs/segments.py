@@ -2,7 +2,6 @@
 
 from bisect import bisect_left
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -56,9 +55,9 @@ def segments(log: FlightLog) -> list[Segment]:
             kinds[here] = KINDS.index("ground")
         elif ground_height is not None:
             _ends(kinds[here], ground_height[here])
-        for edge, following in pairwise([*crossing, None]):
+        for edge, end in zip(crossing, [*(e.sample for e in crossing[1:]), stop], strict=False):
             if edge.kind == "entry":
-                kinds[edge.sample:following.sample if following else stop] = KINDS.index("over platform")
+                kinds[edge.sample:end] = KINDS.index("over platform")
     return [Segment(KINDS[kinds[start]], start, stop) for start, stop in _constant_runs(kinds)]
 
 

@@ -31,7 +31,8 @@ class Sheet(NamedTuple):
 
 def sheet(text: bytes) -> Sheet:
     """A text, line ends LF, in parts; blank lines before the first that is no comment are left out."""
-    head = _HEAD.match(text).group()
+    found = _HEAD.match(text)
+    head = found.group() if found else b""
     first, end, rest = text[len(head):].partition(b"\n")
     comments = [line.strip() for line in _COMMENT.findall(head)]
     if first.lstrip().startswith(b"#"):

@@ -33,7 +33,10 @@ def read(data: bytes, source: str) -> FlightLog:
     Blocks with a wrong checksum are left out and a cut block gives its whole rows, both with a warning.
     Raises AirTouchError where nothing usable is in it.
     """
-    names, letters, place = _variables(data)
+    found = _variables(data) if data else None
+    if found is None:
+        raise AirTouchError(f"{source}: no old uSD log, as it does not begin with its variables")
+    names, letters, place = found
     warnings: list[str] = []
     if not _sound(data[:place], data[place:place + 4]):
         warnings.append("the checksum of the header is wrong: the log is damaged; check its values")

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
-from airtouch.detector.paper.variants import Variant
+from airtouch.detector.paper.variants import Variant, VariantModel
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID
@@ -23,10 +23,10 @@ EPOCHS, QUICK_EPOCHS = 6, 1
 class Few(Variant):
     """A variant that is trained on the first FEW of its training flights, drawn by seed."""
 
-    def fit(self, flights: Sequence[FlightLog], seed: int = 0, **options: Any) -> Any:
+    def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = EPOCHS) -> VariantModel:
         """As `Variant.fit`."""
         drawn = np.random.default_rng(seed).permutation(len(flights))[:FEW]
-        return super().fit([flights[i] for i in sorted(drawn)], seed=seed, **options)
+        return super().fit([flights[i] for i in sorted(drawn)], seed=seed, epochs=epochs)
 
 
 UNFILTERED = Variant(physical_filter=False)

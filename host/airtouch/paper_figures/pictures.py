@@ -17,7 +17,8 @@ def render(draw: Any) -> tuple[bytes, bytes]:
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context({**STYLE, "svg.hashsalt": "airtouch"}):
+    look: Any = STYLE | {"svg.hashsalt": "airtouch"}
+    with matplotlib.rc_context(look):
         canvas = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
         draw(canvas)
         files = []

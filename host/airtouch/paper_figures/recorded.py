@@ -31,7 +31,7 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
     program runs, since several figures are of the same scores."""
     found = files(job)
     options = (QUICK if job.quick else FULL)[name]
-    air = free_air.read(_air(job.flights)) if name == "best" and not job.quick else []
+    air = free_air.read(_air(job.flights)) if job.flights and name == "best" and not job.quick else []
     held = folds.by_fold(found)
     if job.quick:
         held = {QUICK_FOLD: held[QUICK_FOLD]} if QUICK_FOLD in held else dict(list(held.items())[:1])

@@ -97,7 +97,7 @@ def _dense_multiplications(model: Any) -> int:
     """Multiply-accumulates of the float network, no weight left out."""
     total = 0
     for layer in model.float_layers:
-        if layer.weights is not None:
+        if layer.weights.size:
             rows, columns, channels = layer.output_shape
             total += int(np.prod(layer.weights.shape)) * (rows * columns if layer.kind == "conv" else 1)
     return total

@@ -70,13 +70,14 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
 def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     """The record of one figure, whose picture and table are written."""
     module, function = FIGURES[name]
-    said = {claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
+    said: dict[str, dict[str, Any]] = {
+        claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
     try:
         figure: Figure = getattr(importlib.import_module(f"airtouch.paper_figures.{module}"), function)(job)
     except AirTouchError as error:
         reason = str(error) if isinstance(error, Missing) else f"it could not be made: {error}"
-        for claim in said.values():
-            claim |= {"verdict": claims.UNTESTABLE, "found": reason}
+        for record in said.values():
+            record |= {"verdict": claims.UNTESTABLE, "found": reason}
         return {"name": name, "title": name, "caption": "", "missing": reason, "claims": said, "rows": []}
     if set(figure.verdicts) != set(said):
         raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(said)}")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def sensing_range(job: Job) -> Figure:
     craft = [("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
              ("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
              ("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, mass_kg, radius, arm in craft:
         for source, curve in curves(radius, arm).items():
             there = float(curve(np.array([claimed]))[0])

@@ -69,7 +69,7 @@ def _inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(n,) whether places lie in a convex polygon, corners (k, 2) anticlockwise."""
     ahead = np.roll(corners, -1, axis=0) - corners
     side = [ahead[i, 0] * (y - corners[i, 1]) - ahead[i, 1] * (x - corners[i, 0]) for i in range(len(corners))]
-    return (np.array(side) >= 0.0).all(axis=0)
+    return np.all(np.array(side) >= 0.0, axis=0)
 
 
 def labelled(log: FlightLog, edges: Callable[[FlightLog], list[Edge]] = crossings) -> FlightLog:

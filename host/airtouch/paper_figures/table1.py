@@ -1,5 +1,7 @@
 """Table 1: power of each stage, measured where there is a log of an INA219, estimated where not."""
 
+from pathlib import Path
+
 from airtouch.errors import AirTouchError
 from airtouch.paper_figures import pictures, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE
@@ -9,18 +11,18 @@ from airtouch.power import ina219, stages
 
 def power(job: Job) -> Figure:
     """The paper's Table 1 beside a measurement or an estimate."""
-    return measured(job) if job.power_log else estimated()
+    return measured(job.power_log) if job.power_log else estimated()
 
 
-def measured(job: Job) -> Figure:
+def measured(log: Path) -> Figure:
     """From a log with a column of stages. Raises AirTouchError for one that cannot be read."""
     try:
-        trace = ina219.parse(job.power_log.read_text(encoding="utf-8", errors="replace"), str(job.power_log))
+        trace = ina219.parse(log.read_text(encoding="utf-8", errors="replace"), str(log))
     except OSError as error:
-        raise AirTouchError(f"{job.power_log}: cannot be read: {error.strerror}") from None
+        raise AirTouchError(f"{log}: cannot be read: {error.strerror}") from None
     found = ina219.by_stage(trace, tuple(stages.PAPER_MW))
     if not found:
-        raise AirTouchError(f"{job.power_log}: no column of stages; the sketch in tools/power writes one")
+        raise AirTouchError(f"{log}: no column of stages; the sketch in tools/power writes one")
     rows = [{"what": stages.NAMES.get(name, name), "mw": mw, "low_mw": mw - half, "high_mw": mw + half,
              "paper_mw": stages.PAPER_MW.get(name), "seconds": found[name].seconds, "lines": found[name].lines}
             for name, (mw, half) in ina219.added(found).items()]
@@ -30,7 +32,7 @@ def measured(job: Job) -> Figure:
                                       f"total {total:.1f} mW [{total - half:.1f}, {total + half:.1f}] over "
                                       f"{last.seconds:.0f} s"),
                 "negligible": _negligible(total - next(iter(found.values())).mw, "measured")}
-    return Figure("Power", rows, f"Measured with an INA219: {job.power_log.name}; 95 % intervals from blocks of 1 s.",
+    return Figure("Power", rows, f"Measured with an INA219: {log.name}; 95 % intervals from blocks of 1 s.",
                   verdicts, lambda canvas: _draw(canvas, rows))
 
 

@@ -14,6 +14,7 @@ UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0, "mv": 1e-3, "v": 1.0, "ma": 1e-3, "ua
 QUANTITIES = {"time": ("time", "t", "millis", "timestamp"),
               "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
               "amperes": ("current", "amperes", "i"), "stage": ("stage", "phase", "module")}
+MEASURED = ("time", "volts", "amperes")
 USUAL = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
 WITHOUT_HEADER = {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3), "stage": (3, 1.0)}
 MOST_BAD = 0.05  #: share of lines that may be unreadable (a serial line loses characters)
@@ -63,12 +64,13 @@ def parse(text: str, source: str) -> Trace:
         cells = _cells(line, separator)
         if cells == header:
             continue
-        row = [_number(cells[at].replace(",", ".")) if at < len(cells) else None
-               for at, _ in (columns[q] for q in ("time", "volts", "amperes"))]
-        if None in row or not _possible(row, columns):
+        read = [_number(cells[at].replace(",", ".")) if at < len(cells) else None
+                for at, _ in (columns[q] for q in MEASURED)]
+        row = [v for v in read if v is not None]
+        if len(row) < len(read) or not _possible(row, columns):
             bad.append(i)
             continue
-        rows.append([v * columns[q][1] for v, q in zip(row, ("time", "volts", "amperes"), strict=True)])
+        rows.append([v * columns[q][1] for v, q in zip(row, MEASURED, strict=True)])
         at = columns.get("stage", (len(cells), 1.0))[0]
         stages.append(cells[at] if at < len(cells) else "")
     if len(bad) > max(MOST_BAD * (len(rows) + len(bad)), 1):

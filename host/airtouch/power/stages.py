@@ -71,8 +71,9 @@ class Estimate:
 
 def stm32_mw(instructions: float) -> tuple[float, float]:
     """Low and high mW at the battery of so many instructions a step, 100 steps a second."""
-    return tuple(1e3 * instructions * STEP_HZ * cpi / STM32_HZ * 1e-3 * ma * BATTERY_V
+    low, high = (1e3 * instructions * STEP_HZ * cpi / STM32_HZ * 1e-3 * ma * BATTERY_V
                  for cpi, ma in zip(STM32_CPI, STM32_MA, strict=True))
+    return low, high
 
 
 def instructions(budget: dict, kernel: str) -> float:
@@ -91,7 +92,8 @@ def gap8_mw(network: dict) -> Estimate:
     """A network on the GAP8: high is plain C, low the eight cores with their own instructions where they were
     counted."""
     try:
-        count = float(network.get("step_instructions", network.get("window_instructions")))
+        count = float(network["step_instructions"] if "step_instructions" in network
+                      else network["window_instructions"])
         cycles = GAP8_CORES * float(network["cycles_8"]) if "window_instructions" in network else count
     except (KeyError, TypeError, ValueError):
         raise AirTouchError("the GAP8's budget has no instructions and cycles of a network; count again with "

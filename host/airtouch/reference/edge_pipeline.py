@@ -119,7 +119,8 @@ def decode(probability: np.ndarray, armed: np.ndarray, parameters: Parameters = 
     """
     edge = np.full(len(probability), NONE)
     over, since = False, NEVER
-    for i, (value, ready) in enumerate(zip(np.float64(probability).tolist(), np.asarray(armed).tolist(), strict=True)):
+    pairs = zip(np.asarray(probability, float).tolist(), np.asarray(armed).tolist(), strict=True)
+    for i, (value, ready) in enumerate(pairs):
         if not ready:
             over, since = False, NEVER
             continue

@@ -5,7 +5,7 @@ one scale per output channel; biases are int32 at input scale x weight scale; an
 becomes an activation by gemmlowp's double rounding (`requantise`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,8 +18,8 @@ _CHUNK = 256  # windows at a time, for memory
 class Int8Layer:
     """One layer; shapes are (rows, columns, channels).
 
-    weights: int8, conv (out, kernel rows, kernel columns, in), dense (out, inputs), pool None.
-    bias: int32 (out,). weight_scale: float32 (out,). A pool has neither, and keeps the scale.
+    weights: int8, conv (out, kernel rows, kernel columns, in), dense (out, inputs).
+    bias: int32 (out,). weight_scale: float32 (out,). A pool has none of them (size 0), and keeps the scale.
     """
 
     kind: str
@@ -31,9 +31,9 @@ class Int8Layer:
     output_scale: float
     output_zero_point: int
     relu: bool = False
-    weights: np.ndarray | None = None
-    bias: np.ndarray | None = None
-    weight_scale: np.ndarray | None = None
+    weights: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int8))
+    bias: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    weight_scale: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
 
     @property
     def output_min(self) -> int:
@@ -194,7 +194,7 @@ def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     blocks, counts, skips = [], [], []
     for row in weights.reshape(len(weights), -1, 4):
         before, start = len(blocks), 0
-        for index in np.flatnonzero(row.any(axis=1)):
+        for index in map(int, np.flatnonzero(row.any(axis=1))):
             while index - start > 255:
                 blocks.append(row[start + 255])
                 skips.append(255)

@@ -49,7 +49,7 @@ class StreamNetwork:
     @property
     def multiplications(self) -> int:
         """Multiplications with weights that are not zero, for one computed row."""
-        return int(sum(np.count_nonzero(layer.weights) for layer in self.layers))
+        return sum(int(np.count_nonzero(layer.weights)) for layer in self.layers)
 
 
 def int8_layer(layer: StreamLayer, arrays: dict[str, np.ndarray]) -> Int8Layer:

@@ -1,7 +1,8 @@
 """Plots of flights and scores, each as the bytes of a PNG."""
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,7 +19,7 @@ TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
 #: of a detector, in every plot
 COLOURS = {"best": FOUND, "paper": OTHER, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
 KINDS = {"entry": "v", "exit": "^", "edge": "o"}
-STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
+STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
 
 
 def colour_of(name: str) -> str:
@@ -43,7 +44,7 @@ def flight(
     with its FR-CFAR threshold, down range. Panes whose signal the trace lacks are left out.
     others: detectors whose edges are shown below those of `trace`, which is called `name`.
     """
-    panes = [_accelerations, _rates, _motors] if "channels" in trace.signals else []
+    panes: list[Callable[..., None]] = [_accelerations, _rates, _motors] if "channels" in trace.signals else []
     panes += [_band_power] if "band_power" in trace.signals else []
     panes += [_probability, _edges]
     panes += [_force, _cfar] if "force" in trace.signals else []

@@ -98,7 +98,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
 
-def _frequency_axis(axes: Sequence[Axes], ticks: Sequence[float]) -> None:
+def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     for ax in axes:
         ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
         ax.xaxis.set_minor_formatter(NullFormatter())

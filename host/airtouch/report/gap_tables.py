@@ -5,7 +5,7 @@ from typing import Any
 
 from airtouch.gap import summary
 from airtouch.gap.channels import CHANNELS
-from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, ratio, short, significant
+from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, interval, ratio, short, significant
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.words import quantity, seconds_in_words
 
@@ -63,7 +63,7 @@ def shaded(cell: Cell) -> dict[str, str]:
     times = ratio(cell)
     sure = significant(cell)
     colour, ink = next((c, i) for least, c, i in SHADES if times >= least) if sure else QUIET
-    title = (f"{in_words(cell)}; interval {short(cell.low)} to {short(cell.high)}, "
+    title = (f"{in_words(cell)}; interval {interval(cell) or 'not known'}, "
              f"floor {short(cell.floor)} {cell.unit}, "
              f"{cell.blocks} blocks of {cell.flights} flights")
     after = "" if cell.after is None or not sure else f"{short(cell.after / max(cell.floor, 1e-12))}×"
@@ -74,7 +74,7 @@ def shaded(cell: Cell) -> dict[str, str]:
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
     """The largest cells in figures."""
     return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": f"{short(c.gap)}",
-             "interval": "" if c.low is None else f"{short(c.low)} to {short(c.high)}",
+             "interval": interval(c),
              "after": "-" if c.after is None else f"{short(c.after)}", "floor": f"{short(c.floor)}",
              "unit": c.unit + (f"; {c.by}" if c.by else ""),
              "ratio": short(ratio(c))} for c in cells]

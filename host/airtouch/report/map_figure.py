@@ -50,9 +50,10 @@ def drawn(made: EdgeMap, title: str) -> Figure:
             ends = np.array([[point.x_m, point.y_m]]) + np.outer([-1, 1], along)
             ax.plot(*ends.T, color=COLOURS[point.kind], lw=2.5, alpha=0.4, solid_capstyle="round")
         for kind, colour in COLOURS.items():
-            at = [(p.x_m, p.y_m) for p in points if p.kind == kind]
+            at = [p for p in points if p.kind == kind]
             if at:
-                ax.scatter(*np.array(at).T, s=14, color=colour, zorder=3, label=f"{kind} ({len(at)})")
+                ax.scatter([p.x_m for p in at], [p.y_m for p in at], s=14, color=colour, zorder=3,
+                           label=f"{kind} ({len(at)})")
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
@@ -75,8 +76,10 @@ def _ends(ax: Axes, xy: np.ndarray) -> None:
     known = xy[np.isfinite(xy).all(axis=1)]
     if len(known) < 2:
         return
-    ax.scatter(*known[0], s=46, marker="o", facecolor="white", edgecolor="black", zorder=4, label="start")
-    ax.scatter(*known[-1], s=46, marker="s", facecolor="white", edgecolor="black", zorder=4, label="end")
+    first, last = known[:1], known[-1:]
+    for place, marker, label in ((first, "o", "start"), (last, "s", "end")):
+        ax.scatter(place[:, 0], place[:, 1], s=46, marker=marker, facecolor="white", edgecolor="black", zorder=4,
+                   label=label)
     passed = np.r_[0.0, np.cumsum(np.hypot(*np.diff(known, axis=0).T))]
     for part in (0.25, 0.75):
         i = int(np.clip(np.searchsorted(passed, part * passed[-1]), 1, len(known) - 1))

@@ -6,9 +6,10 @@ which ends a flight as "not finite".
 """
 
 from functools import partial
+from typing import Any
 
 from numba import njit
 
-jit = partial(njit, cache=True, error_model="numpy", _nrt=False)
+jit: Any = partial(njit, cache=True, error_model="numpy", _nrt=False)
 #: for parts of a stage that are called in one place and take records of many arrays, which a call would copy
-inlined = partial(njit, error_model="numpy", _nrt=False, inline="always")
+inlined: Any = partial(njit, error_model="numpy", _nrt=False, inline="always")

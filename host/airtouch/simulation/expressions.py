@@ -4,7 +4,7 @@ import ast
 import functools
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,8 +12,8 @@ import numpy as np
 from airtouch.errors import AirTouchError
 
 _BINARY = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
-_FUNCTIONS = {"sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)),
-              "max": max, "min": min}
+_FUNCTIONS: dict[str, Callable[..., float]] = {
+    "sin": lambda d: math.sin(math.radians(d)), "cos": lambda d: math.cos(math.radians(d)), "max": max, "min": min}
 
 
 def draw(node: Any, values: Mapping[str, Any], rng: np.random.Generator, where: str) -> Any:
@@ -54,12 +54,12 @@ def evaluate(text: str, values: Mapping[str, Any], where: str) -> float:
 
 
 @functools.lru_cache(maxsize=1000)
-def _tree(text: str) -> ast.AST:
+def _tree(text: str) -> ast.expr:
     return ast.parse(text, mode="eval").body
 
 
-def _evaluate(node: ast.AST, values: Mapping[str, Any]) -> float:
-    if isinstance(node, ast.Constant) and _number(node.value):
+def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> float:
+    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)) and _number(node.value):
         return node.value
     if isinstance(node, ast.Name):
         return values[node.id]

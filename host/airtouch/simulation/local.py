@@ -6,7 +6,6 @@ import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
@@ -35,7 +34,7 @@ def write(folder: Path, scenario: Scenario, numbers: Sequence[int], *, vehicle: 
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start,
                              initargs=(tuple(plugins),)) as pool:
         try:
-            yield from in_order(partial(pool.submit, _one, job), numbers, AHEAD * workers)
+            yield from in_order(lambda n: pool.submit(_one, job, n), numbers, AHEAD * workers)
         except BrokenProcessPool:
             raise AirTouchError("a worker process died; call the same command again to continue") from None
 

@@ -33,7 +33,7 @@ class _Pen:
         self.yaw, self.position = yaw_rad, position
         self.motors = 0.0
 
-    def top(self, place: Sequence[float]) -> float:
+    def top(self, place: Sequence[float] | np.ndarray) -> float:
         """Height of the surface at (x, y), m."""
         return top_at(self.world, place[0], place[1])
 

@@ -84,15 +84,15 @@ class App:
         Returns the kind of the edge that is reported now, "none" mostly.
         """
         edge = self._core.step(acc_world, gyro, pwm, vbat_v=vbat_v, attitude=attitude)
-        answering = self._gap8 is not None and not self.gap8_silent and now_s >= self._booted_s
+        gap8 = None if self.gap8_silent or now_s < self._booted_s else self._gap8  # None: it does not answer
         for sent in self._core.packets():
             self.sent += 1
-            reply = self._gap8.take(sent) if answering else b""
+            reply = gap8.take(sent) if gap8 else b""
             if reply:
                 self._core.receive(reply)
-        if answering and now_s >= self._beat_s:
+        if gap8 and now_s >= self._beat_s:
             self._beat_s = now_s + HEARTBEAT_S
-            beat = self._gap8.heartbeat(int(1000 * (now_s - self._booted_s)))
+            beat = gap8.heartbeat(int(1000 * (now_s - self._booted_s)))
             if beat:
                 self._core.receive(beat)
         return edge

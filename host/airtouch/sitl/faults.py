@@ -23,7 +23,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.sitl import packet as crtp
-from airtouch.sitl.packet import Packet
+from airtouch.sitl.packet import Packet, Peer
 
 KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms",
          "disconnect": "when and how long, as disconnect=3,5s", "gap8-reset": "when, as gap8-reset=3",
@@ -93,7 +93,7 @@ class Line:
         for fault in faults:
             self.add(fault)
         self._rng = rng
-        self._waiting: list[tuple[float, int, Packet, object]] = []
+        self._waiting: list[tuple[float, int, Packet, Peer]] = []
         self._count, self._last = itertools.count(), 0.0
         self.lost = 0
 
@@ -104,7 +104,7 @@ class Line:
         elif fault.kind == "late":
             self._late = max(self._late, fault.amount)
 
-    def put(self, packet: Packet, peer: object, now_s: float) -> None:
+    def put(self, packet: Packet, peer: Peer, now_s: float) -> None:
         """Send a packet to or from `peer`."""
         if any(self._rng.random() < f.amount for f in self._loss if f.everything or is_stream(packet)):
             self.lost += 1
@@ -115,11 +115,12 @@ class Line:
             self._last = due
         heapq.heappush(self._waiting, (due, next(self._count), packet, peer))
 
-    def ready(self, now_s: float) -> list[tuple[Packet, object]]:
+    def ready(self, now_s: float) -> list[tuple[Packet, Peer]]:
         """What has arrived by now, in order."""
         out = []
         while self._waiting and self._waiting[0][0] <= now_s:
-            out.append(heapq.heappop(self._waiting)[2:])
+            _, _, packet, peer = heapq.heappop(self._waiting)
+            out.append((packet, peer))
         return out
 
     def clear(self) -> None:

@@ -64,7 +64,7 @@ class Firmware:
         elif port == crtp.GENERIC and channel == 1 and data[:1] == b"\0":
             drone.commander.relax()
         elif port == crtp.LOCALIZATION and channel == 1:
-            self._stop_command({3: EMERGENCY, 4: WATCHDOG}.get(data[0] if data else None))
+            self._stop_command({3: EMERGENCY, 4: WATCHDOG}.get(data[0] if data else -1))
         elif port == crtp.HIGH_LEVEL:
             code = drone.commander.planner.command(data, drone.now_s)
             return [Packet(port, channel, (data[:3] + b"\0" * 3)[:3] + bytes([code]))]

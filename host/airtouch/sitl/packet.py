@@ -5,6 +5,7 @@ from typing import NamedTuple
 CONSOLE, PARAM, COMMANDER, MEMORY, LOG = 0, 2, 3, 4, 5
 LOCALIZATION, GENERIC, HIGH_LEVEL, SUPERVISOR, PLATFORM, LINK = 6, 7, 8, 9, 13, 15
 MOST_DATA = 30
+Peer = tuple[str, int]  #: host and port of who a packet is to or from
 
 
 class Packet(NamedTuple):

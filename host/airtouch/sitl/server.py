@@ -58,7 +58,8 @@ class Server:
         self.drone = Drone(self.plan, craft, seed, flight, active, ai_deck)
         self.firmware = Firmware(self.drone, ai_deck)
         self.recorder = Recorder(record, scene.name, craft.name, seed, flight, force) if record else None
-        self.speed, self.client = speed, None
+        self.speed = speed
+        self.client: crtp.Peer | None = None
         rng = np.random.default_rng([seed, flight, 11])
         self._up, self._down = Line(self.faults, rng), Line(self.faults, rng)
         self._todo = [f for f in self.faults if f.kind not in LINE]
@@ -172,12 +173,12 @@ class Server:
         """What the firmware answers to a packet."""
         return self.firmware.take(packet)
 
-    def send(self, packet: crtp.Packet, peer: object) -> None:
+    def send(self, packet: crtp.Packet, peer: crtp.Peer) -> None:
         """Send a packet to a client that may be gone."""
         with contextlib.suppress(OSError):
             self._socket.sendto(packet.to_bytes(), peer)
 
-    def _welcome(self, peer: object) -> None:
+    def _welcome(self, peer: crtp.Peer) -> None:
         """Another client: log data and console go there. On the ground the drone is as after its start."""
         self.client = peer
         if not self.drone.motors_on:

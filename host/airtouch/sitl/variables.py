@@ -5,6 +5,7 @@ Names, types and units as in crazyflie-firmware 2026.08; what the simulator has 
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def log_variables(drone: Drone) -> Variables:
 
     def add(group: str, names: str, kind: str, read: Callable[[Drone, int], float]) -> None:
         for i, name in enumerate(names.split()):
-            table[f"{group}.{name}"] = (kind, lambda d, i=i: read(d, i))
+            table[f"{group}.{name}"] = (kind, partial(_read, read, i))
 
     add("acc", "x y z", "float", lambda d, i: d.row[log_row.ACC + i] / G)
     add("gyro", "x y z", "float", lambda d, i: math.degrees(d.row[log_row.GYRO + i]))
@@ -79,15 +80,24 @@ def log_variables(drone: Drone) -> Variables:
     add("radio", "rssi", "uint8_t", lambda d, i: 40)
     add("radio", "isConnected", "uint8_t", lambda d, i: 1)
     for name, (kind, _, _) in app.LOGS.items():
-        table[f"{app.GROUP}.{name}"] = (kind, lambda d, name=name: d.app.read(name))
+        table[f"{app.GROUP}.{name}"] = (kind, partial(_of_app, name))
     return table
+
+
+def _read(read: Callable[[Drone, int], float], element: int, drone: Drone) -> float:
+    return read(drone, element)
+
+
+def _of_app(name: str, drone: Drone) -> float:
+    return drone.app.read(name)
 
 
 def log_items(table: Variables) -> list[Item]:
     """TOC entries, groups together."""
     groups = dict.fromkeys(name.split(".")[0] for name in table)
-    return [Item(*name.split("."), CODES[table[name][0]]) for group in groups for name in table
-            if name.startswith(group + ".")]
+    named = {group: [name for name in table if name.startswith(group + ".")] for group in groups}
+    return [Item(group, name.removeprefix(group + "."), CODES[table[name][0]]) for group in groups
+            for name in named[group]]
 
 
 def reader(table: Variables, items: list[Item], drone: Drone) -> Callable[[int], float]:

@@ -176,10 +176,10 @@ def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, 
         return max(half - int(RISE_S * RATE_HZ), settled), final, "velocity"
     gained = _gain(_horizontal(log, settled, entry))
     first = int(np.argmax(np.hypot(*gained.T)))
-    speed = float(np.hypot(*gained[first]))
+    reached = float(np.hypot(*gained[first]))
     total = np.hypot(*np.cumsum(_horizontal(log, settled, entry)[first:], axis=0).T) / RATE_HZ
-    half = first + int(np.argmax(total > 0.5 * speed))
-    return max(settled + half - int(RISE_S * RATE_HZ), settled), speed, "acceleration"
+    half = first + int(np.argmax(total > 0.5 * reached))
+    return max(settled + half - int(RISE_S * RATE_HZ), settled), reached, "acceleration"
 
 
 def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:

@@ -88,7 +88,7 @@ def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = 50, behi
 def _trims(log: FlightLog, free: np.ndarray, course: Course) -> np.ndarray:
     pwm = log.stack(PWM)[course.free]
     mean = np.nanmean(pwm, axis=1)
-    slope = np.polyfit(np.arange(len(mean)) / RATE_HZ, np.nan_to_num(mean, nan=np.nanmean(mean)), 1)[0]
+    slope = np.polyfit(np.arange(len(mean)) / RATE_HZ, np.nan_to_num(mean, nan=float(np.nanmean(mean))), 1)[0]
     return np.r_[mean.mean(), slope, 100.0 * course.before_m, np.median(free[:, [ch.ROLL, ch.PITCH, ch.YAW]], axis=0)]
 
 

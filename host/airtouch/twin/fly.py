@@ -22,7 +22,7 @@ def fly(chosen: Course, vehicle: Vehicle, levers: Sequence[Lever], values: np.nd
         fixed: Mapping[str, Any] | None = None) -> FlightLog | Diverged:
     """One recorded course in the simulator with these levers."""
     effects = lever_set.table(levers, values, fixed)
-    scene = missions.one(chosen, effects, **lever_set.mission(levers, values))
+    scene = missions.one(chosen, effects, missions.NAME, **lever_set.mission(levers, values))
     return flight.fly(scene, lever_set.craft(vehicle, levers, values), seed, number)
 
 

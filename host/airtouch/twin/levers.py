@@ -118,7 +118,7 @@ def clipped(levers: Sequence[Lever], values: np.ndarray) -> np.ndarray:
     return np.clip(values, [lever.low for lever in levers], [lever.high for lever in levers])
 
 
-def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float]) -> Vehicle:
+def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float] | np.ndarray) -> Vehicle:
     """The vehicle with its levers set."""
     changes: dict[str, Any] = {}
     for lever, value in zip(levers, values, strict=True):
@@ -134,12 +134,12 @@ def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float]) ->
     return replace(vehicle, **changes)
 
 
-def mission(levers: Sequence[Lever], values: Sequence[float]) -> dict[str, float]:
+def mission(levers: Sequence[Lever], values: Sequence[float] | np.ndarray) -> dict[str, float]:
     """What `missions.drawn` takes: height_m added to the set height, pulse_mps of the pulses in hover."""
     return {lever.key: float(v) for lever, v in zip(levers, values, strict=True) if lever.of == MISSION}
 
 
-def table(levers: Sequence[Lever], values: Sequence[float], fixed: Mapping[str, Any] | None = None,
+def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: Mapping[str, Any] | None = None,
           spread: bool = True) -> dict[str, Any]:
     """The effects of a scenario with the levers set; `fixed` are effects that no lever moves.
 

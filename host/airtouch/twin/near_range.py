@@ -65,7 +65,7 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
     return NearRange(*(float(v) for v in solved.x))
 
 
-def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
+def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, float]]:
     """For each edge: (m,) height over the floor in m, its slope in m/s, down range in m, and the scatter of their
     difference, as if each edge were one measurement."""
     down, dt = 0.01 * x[:, ch.DOWN], 1.0 / RATE_HZ

@@ -125,7 +125,7 @@ def flights(air: Sequence[FreeAir], laid: Sequence[Response],
     rng = np.random.default_rng([seed, 77])
     out, labels = [], []
     for number, response in enumerate(laid):
-        chosen = air[rng.integers(len(air))]
+        chosen = air[int(rng.integers(len(air)))]
         middle = np.median(chosen.hover, axis=0)
         others = [air[i].hover for i in rng.integers(len(air), size=HOVERS)]
         hovers = _joined([chosen.start, *(h - np.median(h, axis=0) + middle for h in others)])

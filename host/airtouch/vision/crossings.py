@@ -47,7 +47,8 @@ def film(log: FlightLog, seed: int) -> Film:
     plan = scenario.draw_flight(scenario.load(log.meta["scenario"]), log.meta["seed"], log.meta["flight"])
     corners = plan.world.corners[plan.world.first[0]:plan.world.first[1]]
     edges = tuple(true_edges(log))
-    drawn = scenes.Scene(*(draw_texture(rng) for _ in range(2)), corners, float(plan.world.surface[0, 0]))
+    floor, top = (draw_texture(rng) for _ in range(2))
+    drawn = scenes.Scene(floor, top, corners, float(plan.world.surface[0, 0]))
     return Film(log, edges, drawn, plan.values["clearance"], plan.values["speed"],
                 edges[0].sample * SAMPLE_PERIOD_S - MARGIN_S, edges[-1].sample * SAMPLE_PERIOD_S + MARGIN_S)
 

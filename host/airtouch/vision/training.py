@@ -8,6 +8,7 @@ their last bits from machine to machine.
 
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +89,8 @@ def main() -> None:
             raise AirTouchError(f"{name}: training did not converge; another seed")
         seconds = time.process_time() - started
         path = Path(__file__).with_name(f"{name}.npz")
-        np.savez_compressed(path, seconds=seconds, **{k: w.astype(np.float16) for k, w in weights.items()})
+        kept: dict[str, Any] = {k: w.astype(np.float16) for k, w in weights.items()}
+        np.savez_compressed(path, seconds=seconds, **kept)
         print(f"{path.name}: {teed.parameters(SIZES[name]):,} parameters, {seconds:.0f} s of processor time",
               flush=True)
 

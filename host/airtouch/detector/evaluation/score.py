@@ -19,8 +19,13 @@ SAMPLE_PERIOD_S = 0.01
 class TrueEdge(Protocol):
     """What is needed of a true edge (`airtouch.logs.Edge`)."""
 
-    sample: int
-    kind: str
+    @property
+    def sample(self) -> int:
+        """Index at which it is."""
+
+    @property
+    def kind(self) -> str:
+        """"entry" or "exit"."""
 
 
 @dataclass(frozen=True)

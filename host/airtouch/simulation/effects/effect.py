@@ -77,9 +77,9 @@ class Effect:
         preset = given.pop("preset", None)
         if preset is not None:
             if preset not in self.presets:
-                known = ", ".join(self.presets) or "it has none"
-                raise AirTouchError(f"{self.name} has no preset {preset!r}; known: {known}")
-            given = {**self.presets[preset], **given}
+                listed = ", ".join(self.presets) or "it has none"
+                raise AirTouchError(f"{self.name} has no preset {preset!r}; known: {listed}")
+            given = {**self.presets[str(preset)], **given}
         known = {p.name: p for p in self.parameters}
         for name in given:
             if name not in known:

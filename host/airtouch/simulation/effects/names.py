@@ -54,9 +54,10 @@ def _signal_modules(tree: ast.Module) -> Iterator[str]:
 def _parameters(tree: ast.Module) -> Iterator[str]:
     """Names of the parameters that the file declares."""
     for node in ast.walk(tree):
-        named = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Parameter"
-        if named and node.args and isinstance(node.args[0], ast.Constant):
-            yield str(node.args[0].value)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Parameter" and node.args:
+            first = node.args[0]
+            if isinstance(first, ast.Constant):
+                yield str(first.value)
 
 
 def _settings(tree: ast.Module) -> Iterator[ast.FunctionDef]:

@@ -31,7 +31,7 @@ COMPENSATIONS = ("none", "quadratic", "cubic", "vehicle")
 _F, _I = np.float64, np.int64
 GAINS = np.dtype([("p", _F), ("i", _F), ("d", _F), ("integral_limit", _F), ("output_limit", _F)])
 #: section -> key -> (type, choices or None, meaning)
-KEYS: dict[str, dict[str, tuple[Any, tuple[str, ...] | None, str]]] = {
+KEYS: dict[str, dict[str, tuple[Any, tuple[Any, ...] | None, str]]] = {
     "periods": {
         "attitude_ms": (_I, None, "of the attitude and rate loops; a multiple of 2"),
         "position_ms": (_I, None, "of the position and velocity loops; a multiple of attitude_ms"),
