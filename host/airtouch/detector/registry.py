@@ -1,9 +1,9 @@
 """The detectors, by name."""
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
@@ -40,6 +40,22 @@ class Detector(Protocol):
 
     def parameters(self, model: Any) -> dict[str, Any]:
         """What a report prints: plain numbers and text."""
+
+
+@runtime_checkable
+class Filtered(Detector, Protocol):
+    """A detector whose edges FR-CFAR may drop."""
+
+    def retune(self, model: Any, flights: Sequence[FlightLog], physical_filter: bool) -> Any:
+        """The model with decoding and lag chosen anew, with the filter or without."""
+
+
+@runtime_checkable
+class InFloat(Detector, Protocol):
+    """A detector whose network also runs in float, as trained."""
+
+    def run_float(self, log: FlightLog, model: Any = None) -> Trace:
+        """As `run`."""
 
 
 def get(name: str | Detector) -> Detector:

@@ -49,7 +49,8 @@ def weight_names(graph: Graph) -> list[str]:
 def float_logits(weights: Weights, graph: Graph, x: np.ndarray) -> np.ndarray:
     """Logits (ceil(n / stride), outputs) of channels (n, channels) float; before the first sample lie zeros."""
     def apply(layer: StreamLayer, x: np.ndarray) -> np.ndarray:
-        y = OPERATIONS[layer.operation].rows(layer, *_arrays(weights, layer), x)
+        kernel, bias = _arrays(weights, layer)
+        y = OPERATIONS[layer.operation].rows(layer, kernel, bias, x)
         return (np.maximum(y, 0.0) if layer.relu else y)[::layer.stride]
 
     return follow(graph, np.asarray(x, dtype=np.float64), apply, np.hstack)
@@ -72,7 +73,8 @@ def window_logits(weights: Weights, graph: Graph) -> Callable[[Any], Any]:
     import tensorflow as tf
 
     def apply(layer: StreamLayer, x: Any) -> Any:
-        y = OPERATIONS[layer.operation].window(layer, *_arrays(weights, layer), x)
+        kernel, bias = _arrays(weights, layer)
+        y = OPERATIONS[layer.operation].window(layer, kernel, bias, x)
         return tf.nn.relu(y) if layer.relu else y
 
     def join(parts: list) -> Any:
@@ -81,8 +83,9 @@ def window_logits(weights: Weights, graph: Graph) -> Callable[[Any], Any]:
     return lambda x: follow(graph, x, apply, join)
 
 
-def _arrays(weights: Weights, layer: StreamLayer) -> list[np.ndarray]:
-    return [weights[f"{layer.name}.{part}"] for part in PARTS]
+def _arrays(weights: Weights, layer: StreamLayer) -> tuple[np.ndarray, np.ndarray]:
+    kernel, bias = (weights[f"{layer.name}.{part}"] for part in PARTS)
+    return kernel, bias
 
 
 def _conv_rows(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: np.ndarray) -> np.ndarray:

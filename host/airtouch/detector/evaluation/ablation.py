@@ -10,7 +10,8 @@ from airtouch.detector.evaluation import crossval, evaluate, summary
 from airtouch.detector.evaluation.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.paper.variants import Variant
-from airtouch.detector.registry import Detector, get
+from airtouch.detector.registry import Detector, InFloat, get
+from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES
 
 HORIZONTAL = ("ax", "ay")
@@ -99,6 +100,8 @@ def ablate(
 
 def in_float(detector: Detector, files: Sequence[FlightFile], folds: list[dict], out: Path) -> list[FlightScore]:
     """Scores of the same folds and models, with the float network as trained; files are the flights of these folds."""
+    if not isinstance(detector, InFloat):
+        raise AirTouchError("this detector's network does not run in float")
     models = {entry["fold"]: detector.load(out / entry["model"]) for entry in folds}
     view = SimpleNamespace(run=detector.run_float, lag_s=detector.lag_s)
     readable, _ = crossval.readable_flights(files)

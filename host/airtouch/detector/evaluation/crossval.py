@@ -13,7 +13,7 @@ from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.dataset import FlightFile
 from airtouch.detector.evaluation.folds import Folds, by_fold
 from airtouch.detector.evaluation.score import FlightScore
-from airtouch.detector.registry import Detector, get
+from airtouch.detector.registry import Detector, Filtered, get
 from airtouch.detector.shared import sensors, training_set
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
@@ -46,7 +46,7 @@ def crossval(
     train on too. detector: one that is not registered, under the name given.
     """
     detector = detector or get(name)
-    if not physical_filter and not hasattr(detector, "retune"):
+    if not physical_filter and not isinstance(detector, Filtered):
         raise AirTouchError(f"{name} has no physical filter to switch off")
     folds = by_fold(files) if folds is None else folds
     out.mkdir(parents=True, exist_ok=True)
@@ -73,7 +73,7 @@ def crossval(
             started = time.monotonic()
             kept = out / f"{name}_fold{fold}_{key}.npz"
             model = model_of_fold(detector, train, kept, seed, given)
-            if not physical_filter:
+            if not physical_filter and isinstance(detector, Filtered):
                 model = detector.retune(model, train, False)
             results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], silenced), detector, model).score
                        for f in test]

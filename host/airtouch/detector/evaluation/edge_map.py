@@ -93,7 +93,7 @@ def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0
 
 
 def edge_points(
-    xy: np.ndarray, samples: np.ndarray, kinds: list[str], *, period_s: float = PERIOD_S,
+    xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = PERIOD_S,
     sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
 ) -> list[EdgePoint]:
     """Detections as points of the track.
@@ -109,7 +109,8 @@ def edge_points(
         if not np.isfinite(xy[[low, at, high]]).all() or high == low:
             continue
         speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
-        points.append(EdgePoint(int(sample), kind, *map(float, xy[at]), sigma_s * max(speed, MIN_SPEED_MPS)))
+        x, y = map(float, xy[at])
+        points.append(EdgePoint(int(sample), kind, x, y, sigma_s * max(speed, MIN_SPEED_MPS)))
     return points
 
 

@@ -174,8 +174,8 @@ def score_flight(
     said = probability >= 0.5
     if not np.isfinite(probability).any():
         known, said = airborne, over_platform(detections, len(airborne))
-    windows = tuple(
-        int(np.count_nonzero(known & mask)) for mask in (over & said, over, ~over & ~said, ~over)
-    )
+    found, there, silent, elsewhere = (int(np.count_nonzero(known & mask))
+                                       for mask in (over & said, over, ~over & ~said, ~over))
     bins = reliability(np.where(airborne, probability, np.nan), over)
-    return FlightScore(file, condition, edges, false, len(detections), airborne_s, windows, bins)
+    return FlightScore(file, condition, edges, false, len(detections), airborne_s,
+                       (found, there, silent, elsewhere), bins)

@@ -42,7 +42,7 @@ def training_flights(
     kept: list[FlightLog] = []
     left_out = 0
     for flown in batch.flights(scene, range(SPARE * count), vehicle=vehicle, without=without, seed=seed):
-        if _usable(flown):
+        if isinstance(flown, FlightLog) and _usable(flown):
             kept.append(flown)
             told("simulated flights", len(kept), count, "")
         else:

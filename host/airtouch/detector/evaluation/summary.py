@@ -82,26 +82,26 @@ def by_wind(scores: Sequence[FlightScore]) -> dict[str, dict]:
 
 def _totals(score: FlightScore) -> dict[str, float]:
     """What is added up over flights."""
-    matched = [e for e in score.edges if e.error_s is not None]
+    matched = [(e, e.error_s) for e in score.edges if e.error_s is not None]
     judged = score.false is not None
-    totals = {
+    totals: dict[str, float] = {
         "flights": 1,
         "detections": score.detections,
         "true": len(score.edges),
         "matched": len(matched),
         "missed": len(score.edges) - len(matched),
-        "false": len(score.false) if judged else 0,
+        "false": len(score.false or ()),
         "minutes": score.airborne_s / 60.0 if judged else 0.0,
-        "kind": sum(e.detected_kind not in (e.kind, "edge") for e in matched),
-        "signed_s": sum(e.error_s for e in matched),
+        "kind": sum(e.detected_kind not in (e.kind, "edge") for e, _ in matched),
+        "signed_s": sum(seconds for _, seconds in matched),
     }
     for name in ("", "entry", "exit"):
-        some = [e for e in matched if name in ("", e.kind)]
+        some = [(e, seconds) for e, seconds in matched if name in ("", e.kind)]
         totals[f"n{name}"] = len(some)
-        totals[f"s{name}"] = sum(abs(e.error_s) for e in some)
-        totals[f"m{name}"] = sum(abs(e.error_m) if e.error_m is not None else np.nan for e in some)
+        totals[f"s{name}"] = sum(abs(seconds) for _, seconds in some)
+        totals[f"m{name}"] = sum(abs(e.error_m) if e.error_m is not None else np.nan for e, _ in some)
     for radius in HIT_RADII_M:
-        totals[f"hit_{radius:.2f}"] = sum(e.error_m is not None and abs(e.error_m) <= radius for e in matched)
+        totals[f"hit_{radius:.2f}"] = sum(e.error_m is not None and abs(e.error_m) <= radius for e, _ in matched)
     for name, value in zip(("over_found", "over", "rest_found", "rest"), score.windows, strict=True):
         totals[name] = value
     for index, value in enumerate(score.bins.ravel()):

@@ -6,6 +6,7 @@ from airtouch.detector.paper import decoding, stride
 from airtouch.detector.paper.model import Model
 from airtouch.detector.paper.network import WEIGHTED
 from airtouch.detector.shared.c_source import float_literal, golden_header, golden_source, layer
+from airtouch.errors import AirTouchError
 from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
 from airtouch.parameters import DEFAULT
@@ -36,6 +37,8 @@ def _render_window(model: Model) -> dict[str, str]:
 
 def _render_rolling(model: Model) -> dict[str, str]:
     inputs, outputs = golden_samples(model.int8, stride(model))
+    if model.scale is None:
+        raise AirTouchError("this model is one of windows: it has no fixed scale to roll on")
     what = "Made-up quantised samples and the outputs that every build must give, to the last bit."
     scale = "\n".join([
         "const fixedScale_t airtouchRollingScale = {", f"    .columns = {len(model.scale.mean)},",

@@ -97,7 +97,8 @@ def parse(data: bytes, source: str) -> Model:
     arrays, metadata = archive.parse(data, source)
     fixed = metadata.get("normalisation") == FIXED
     archive.check_kind(metadata, {"format": FORMAT, "normalisation": FIXED if fixed else WINDOW}, source)
-    expected = {name: (np.float32, shape) for name, shape in weight_shapes().items()}
+    expected: dict[str, tuple[type, tuple[int, ...]]] = {
+        name: (np.float32, shape) for name, shape in weight_shapes().items()}
     if fixed:
         expected |= {f"scale.{part}": (np.float32, (INPUT_SHAPE[1],)) for part in ("mean", "deviation")}
     expected |= {f"int8.{name}": what for name, what in int8_shapes().items()}

@@ -180,7 +180,7 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
 
 
 def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
-                progress: Progress, conv_sparsity: float = 0.0) -> tuple[network.Weights, int]:
+                progress: Progress, conv_sparsity: float = 0.0) -> tuple[dict[str, np.ndarray], int]:
     """The trained weights, and after how many epochs."""
     model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
     return network.weights_of_keras(model), len(losses)
