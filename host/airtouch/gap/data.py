@@ -58,7 +58,8 @@ class Data:
         if self.study.response is not None:
             self.quiet = [self.study.response.quiet(t - b[AIR][:, :, TORQUE])
                           for t, b in zip(self.turning, _replayed(self, ()), strict=True)]
-        study, quiet = self.study, self.quiet or [None] * len(self.flights)
+        study = self.study
+        quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
                          for f, b, q in zip(self.flights, self.first, quiet, strict=True)]
         self.base = spectra(self, ())

@@ -46,8 +46,9 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
         room = begin + LENGTH[AIR] <= n
         room[room] = before[begin[room] + LENGTH[AIR]] == before[begin[room]]
         spectrum = blocks(change, begin[room], AIR)
-        if response is not None and flight.rates is not None and room.any():
-            spectrum = response.applied(quiet[room], blocks(turned, begin[room], AIR), *[spectrum] * 4)
+        if response is not None and quiet is not None and flight.rates is not None and room.any():
+            spectrum = response.applied(quiet[room], blocks(turned, begin[room], AIR), spectrum, spectrum, spectrum,
+                                        spectrum)
         total[room] += np.nan_to_num(squared(spectrum))
         count[room] += 1
     return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], WIDTH, axis=1, mode="nearest")

@@ -217,8 +217,8 @@ def _misfit(on: Trial, held: Judged, more: Judged, share: float, everywhere: boo
     whole = max(LEAST_GAIN, share * (held.gain - of_clock))
     if everywhere or _recorded(on) or not (more.full and more.fits and held.fits) or more.gain - held.gain >= whole:
         return whole
-    before, both = (sum(cell_gains(on.data, on.parts[test], j.fits[train].terms) for train, test in ROUND_TRIP)
-                    for j in (held, more))
+    before, both = (np.sum([cell_gains(on.data, on.parts[test], j.fits[train].terms) for train, test in ROUND_TRIP],
+                           axis=0) for j in (held, more))
     before, own = _axes_together(before), _axes_together(both - before)
     return max(LEAST_GAIN, share * float(np.maximum(before[own > CELL_GAIN], 0.0).sum()))
 

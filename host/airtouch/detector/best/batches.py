@@ -72,7 +72,7 @@ def batch(flights: Sequence[Flight], recipe: Recipe, rng: np.random.Generator,
     silent = _silent(recipe, rng)
     for row, flight in enumerate(drawn):
         if free_air and rng.random() < recipe.free_air_share:
-            flight = free_air[rng.integers(len(free_air))]
+            flight = free_air[int(rng.integers(len(free_air)))]
         x[row], y[row] = _crop(flight, recipe, rng)
         silent[row, list(flight.silent)] = True
     x = _augment(x, recipe, rng)
@@ -90,7 +90,7 @@ def _silent(recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
     low = 0.0
     for sensor, share in shares.items():
         rows = (draw >= low) & (draw < low + share)
-        silent[np.ix_(rows, sensors.CHANNELS_OF[sensor])] = True
+        silent[np.ix_(rows, np.array(sensors.CHANNELS_OF[sensor]))] = True
         low += share
     return silent
 

@@ -47,7 +47,7 @@ DECODER_WITHOUT = {
 #: rms timing error of held-out flights with these settings, three seeds (printed by the same tool); for maps.
 TIMING_SIGMA_S = 0.10
 #: Changes to a model's recipe where training goes on from it.
-FINE_TUNING = {"steps": 300, "peak_rate": 1e-3}
+FINE_TUNING: dict[str, Any] = {"steps": 300, "peak_rate": 1e-3}
 SPARE_SENSORS = 1  #: of acceleration, rates and motors, one may be missing
 KINDS = {1: "entry", 2: "exit"}
 

@@ -69,7 +69,7 @@ class BestModel:
         return self.decoder
 
     @staticmethod
-    def _settings(table: object) -> DecoderConfig:
+    def _settings(table: Any) -> DecoderConfig:
         try:
             return DecoderConfig(**table)
         except TypeError:
@@ -131,7 +131,8 @@ def parse(data: bytes, source: str) -> BestModel:
     arrays, metadata = archive.parse(data, source)
     archive.check_kind(metadata, KIND, source)
     recipe = _recipe(metadata.pop("recipe", None), source)
-    shapes = {name: (np.float32, shape) for name, shape in weight_shapes(recipe.graph).items()}
+    shapes: dict[str, tuple[type, tuple[int, ...]]] = {
+        name: (np.float32, shape) for name, shape in weight_shapes(recipe.graph).items()}
     for layer in recipe.graph:
         sizes = {"weights": (layer.outputs, layer.taps * layer.inputs), "bias": (layer.outputs,),
                  "weight_scale": (layer.outputs,),
@@ -141,9 +142,9 @@ def parse(data: bytes, source: str) -> BestModel:
     if "tflite" not in arrays or arrays["tflite"].dtype != np.uint8:
         raise AirTouchError(f"{source}: the TFLite file is missing from this model; {archive.REMEDY}")
     layers = [{part: arrays[f"int8.{layer.name}.{part}"] for part in _INT8} for layer in recipe.graph]
-    for layer in layers:
-        positive = (layer["scale"] > 0).all() and (layer["weight_scale"] > 0).all()
-        if not positive or not ((layer["zero_point"] >= -128) & (layer["zero_point"] <= 127)).all():
+    for made in layers:
+        positive = (made["scale"] > 0).all() and (made["weight_scale"] > 0).all()
+        if not positive or not ((made["zero_point"] >= -128) & (made["zero_point"] <= 127)).all():
             raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
     int8 = network_of(layers, recipe)
     archive.check_range(int8.layers, source)
@@ -153,7 +154,7 @@ def parse(data: bytes, source: str) -> BestModel:
     return model
 
 
-def _recipe(table: object, source: str) -> Recipe:
+def _recipe(table: Any, source: str) -> Recipe:
     wrong = AirTouchError(f"{source}: the network's shape is missing or not one that this version runs; "
                           f"{archive.REMEDY}")
     try:

@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -107,7 +108,7 @@ def _compiled(recipe: Recipe) -> tuple:
 
 def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
     """Write the state of the training, whole or not at all."""
-    arrays = {f"v{i}": np.asarray(v) for i, v in enumerate(state)}
+    arrays: dict[str, Any] = {f"v{i}": np.asarray(v) for i, v in enumerate(state)}
     made = io.BytesIO()
     np.savez(made, step=step, rng=json.dumps(rng.bit_generator.state), **arrays)
     write_bytes(made.getvalue(), path, force=True)
