@@ -137,8 +137,10 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
 
 def _of_the_loop(data: Data, selection: Selection) -> bool:
     """Whether one effect is named, and it is one of the control loop."""
-    law, one = data.study.controller, len(selection.named) == 1
-    terms = [t for t in selection.chosen.terms if t.kind == candidates.MEAN and not t.gate] if law and one else []
+    law, chosen = data.study.controller, selection.chosen
+    if law is None or chosen is None or len(selection.named) != 1:
+        return False
+    terms = [t for t in chosen.terms if t.kind == candidates.MEAN and not t.gate]
     return bool(terms) and (law.changes_loop([t.active() for t in terms]) or any(t.name in LOOP for t in terms))
 
 
