@@ -50,7 +50,7 @@ class Stepper:
         self.plant, acting = prepare(vehicle, active)
         self.state = states.empty()
         streams = np.zeros(1, loop.STREAMS)
-        for name in loop.STREAMS.names:
+        for name in loop.STREAMS.names or ():
             streams[0][name] = stream(seed, flight, name)
         effects = slots(acting, [stream(seed, flight, key) for key in _keys(acting)])
         self.flight = loop.Flight(self.plant, plan.world, plan.room, effects, streams, self.state)
