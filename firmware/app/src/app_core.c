@@ -8,7 +8,7 @@
 #include "app_paper.h"
 #include "stream_window.h"
 
-_Static_assert(EDGE_DECODER_LOGITS <= EDGE_LINK_OUTPUTS && (int)MOTION_CHANNELS <= EDGE_LINK_SAMPLE_BYTES,
+_Static_assert(EDGE_DECODER_LOGITS <= EDGE_LINK_OUTPUTS && MOTION_CHANNELS <= EDGE_LINK_SAMPLE_BYTES,
                "the packets have room for channels and logits");
 
 enum { EDGE_UNKNOWN = 3 };

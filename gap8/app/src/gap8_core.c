@@ -8,7 +8,7 @@
 
 _Static_assert(AIRTOUCH_MODEL_COLUMNS * sizeof(float) == EDGE_LINK_SAMPLE_BYTES, "a sample is a row of features");
 _Static_assert(AIRTOUCH_ROLLING_COLUMNS * sizeof(float) == EDGE_LINK_SAMPLE_BYTES, "a sample is a row of features");
-_Static_assert(EDGE_DECODER_LOGITS <= EDGE_LINK_OUTPUTS && (int)MOTION_CHANNELS <= EDGE_LINK_SAMPLE_BYTES,
+_Static_assert(EDGE_DECODER_LOGITS <= EDGE_LINK_OUTPUTS && MOTION_CHANNELS <= EDGE_LINK_SAMPLE_BYTES,
                "the packets have room for channels and logits");
 _Static_assert(AIRTOUCH_MODEL_OUTPUTS <= EDGE_LINK_OUTPUTS && AIRTOUCH_ROLLING_OUTPUTS <= EDGE_LINK_OUTPUTS,
                "an answer has room for the outputs");
