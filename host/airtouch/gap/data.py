@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.gap.channels import TORQUE, angular_acceleration, residual
+from airtouch.gap.channels import TORQUE, angular_acceleration
 from airtouch.gap.flight import Flight
-from airtouch.gap.lost_rows import bridging_power
-from airtouch.gap.motion import held
+from airtouch.gap.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.nominal_scatter import Scatter
 from airtouch.gap.response import Response
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, frequencies, starts
@@ -33,6 +32,16 @@ class Study:
     usual: Any = None  #: generic.Usual of the nominal flights
     nominal: int = 0  #: how many there were
     scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its nominal flights are those of a simulator with the same models."""
+        return self.scatter is not None and self.scatter.exact
+
+    @property
+    def recorded(self) -> bool:
+        """Whether they are not; neither where there are none."""
+        return self.scatter is not None and not self.scatter.exact
 
 
 @dataclass
@@ -114,8 +123,7 @@ def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray
 
 def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], active: Sequence[Active],
             ) -> dict[str, np.ndarray]:
-    rest = residual(flight, data.study.vehicle, (*data.study.calibration, *active))
-    rest = held(np.where(flight.bridged[:, None], np.nan, rest))
+    rest = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active))
     return {r: blocks(rest, first[r], r) for r in first}
 
 

@@ -127,8 +127,7 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
     """
     selection = select(data, candidates.every(without), say, without)
     cells = cells_of(data, selection.parts, selection.chosen)
-    scatter = data.study.scatter
-    if scatter is not None and not scatter.exact and _of_the_loop(data, selection) \
+    if data.study.recorded and _of_the_loop(data, selection) \
             and shrink_of(data, selection.parts, selection.chosen, cells).share.value < LOOP_SHARE:
         selection = replace(selection, steps=(), free_after=selection.free_before, assumed=False)
         cells = cells_of(data, selection.parts, None)
@@ -151,14 +150,15 @@ def _some(flights: Sequence[Flight]) -> list[Flight]:
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, keep).astype(int))]
 
 
-def _verdict(selection: Selection, gap: Shrink, exact: bool) -> str:
+def _verdict(selection: Selection, gap: Shrink, simulated: bool) -> str:
     """What does not stand over the floor is nothing, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
-    in both halves of the data, in whose common part the gap is measured. exact: the flights are a simulator's; there a
-    flight calmer than nominal ones, which the effects named bring to the floor, has them; a recorded one had calm air.
+    in both halves of the data, in whose common part the gap is measured. simulated: the flights are a simulator's;
+    there a flight calmer than nominal ones, which the effects named bring to the floor, has them; a recorded one had
+    calm air.
     """
-    calmed = exact and abs(gap.after - AT_FLOOR) < CALMED * abs(gap.before - AT_FLOOR)
+    calmed = simulated and abs(gap.after - AT_FLOOR) < CALMED * abs(gap.before - AT_FLOOR)
     apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
     if gap.before <= AT_FLOOR and not (apart or calmed):
         return "none"
@@ -258,8 +258,7 @@ def _ranking(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranke
     """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
     parts = selection.parts
     overall = shrink_of(data, parts, selection.chosen, cells)
-    scatter = data.study.scatter
-    verdict = _verdict(selection, overall, scatter is not None and scatter.exact)
+    verdict = _verdict(selection, overall, data.study.simulated)
     effects = _effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
     chance = agreeing(probabilities(selection, verdict == "none"), answer)

@@ -27,6 +27,7 @@ FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slop
 ROUNDS = 4  #: in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
+CELL_GAIN = 1.0  #: log likelihood that effects gain in a cell which they move
 CLOSE = 0.05  #: to neutral, scaled, where a fit of a new effect begins: some have no slope at neutral itself
 GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
 

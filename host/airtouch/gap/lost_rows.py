@@ -36,11 +36,11 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     n, count = len(flight), np.zeros(len(first))
     bad = (flight.phase == GROUND) | ~(flight.usable | flight.bridged)
     before = np.cumsum(np.concatenate([[0], bad]))
-    known, turning = _residual(flight, vehicle, calibration), angular_acceleration(flight)
+    known, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)
     for k in range(1, SHIFTS + 1):
         offset = k * n // (SHIFTS + 1)
         poorer = _without(flight, np.roll(flight.lost, offset))
-        change = _residual(poorer, vehicle, calibration) - known
+        change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - known)
         turned = angular_acceleration(poorer) - turning
         begin = (first + offset) % n
         room = begin + LENGTH[AIR] <= n
@@ -54,9 +54,9 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], WIDTH, axis=1, mode="nearest")
 
 
-def _residual(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active]) -> np.ndarray:
-    """Measured minus modelled (n, COUNT), bridged where rows were lost."""
-    return np.nan_to_num(held(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, calibration))))
+def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]) -> np.ndarray:
+    """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor."""
+    return held(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active)))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:

@@ -14,7 +14,7 @@ from airtouch.gap.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, is_
 from airtouch.gap.channels import COUNT
 from airtouch.gap.clock import clock_gain, clock_left
 from airtouch.gap.data import Data
-from airtouch.gap.fit import cell_gains, fit
+from airtouch.gap.fit import CELL_GAIN, cell_gains, fit
 from airtouch.gap.flight import PERIOD_S
 from airtouch.gap.gates import gated
 from airtouch.gap.generic import generic_gain
@@ -34,7 +34,6 @@ from airtouch.gap.selection import TEMPERATURE, UNKNOWN_GAIN, Hypothesis, Judged
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1  #: and in others: no model of air is exact
-CELL_GAIN = 1.0  #: log likelihood that an effect gains in a cell which it moves
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
 RANDOM_SHARE = 0.25  #: the same of what is random, to be named: what the model of another is wrong by looks random
 CERTAIN = 20.0  #: evidence beyond which more says no more
@@ -201,7 +200,7 @@ def _needed_beside(on: Trial, held: Judged, more: Judged) -> float:
     """Held-out log likelihood that a further effect must gain: more beside one that gains much: no model is exact."""
     names = {t.name for t in held.terms}
     new = [t for t in more.terms if t.name not in names]
-    share = RECORDED_SHARE if _recorded(on) else LEAST_SHARE
+    share = RECORDED_SHARE if on.data.study.recorded else LEAST_SHARE
     if _assumes(on.data, held.terms) and _changes_loop(on.data, new):
         share = LOOP_SHARE
     return _misfit(on, held, more, share, everywhere=is_random(more.name))
@@ -215,7 +214,8 @@ def _misfit(on: Trial, held: Judged, more: Judged, share: float, everywhere: boo
     """
     of_clock = sum(clock_gain(on.data, t)[1] for t in held.terms if t.kind == CLOCK)
     whole = max(LEAST_GAIN, share * (held.gain - of_clock))
-    if everywhere or _recorded(on) or not (more.full and more.fits and held.fits) or more.gain - held.gain >= whole:
+    looked_at = not (more.full and more.fits and held.fits)
+    if everywhere or on.data.study.recorded or looked_at or more.gain - held.gain >= whole:
         return whole
     before, both = (np.sum([cell_gains(on.data, on.parts[test], j.fits[train].terms) for train, test in ROUND_TRIP],
                            axis=0) for j in (held, more))
@@ -227,12 +227,6 @@ def _axes_together(gains: np.ndarray) -> np.ndarray:
     """Gains (GROUPS,) of cells with those of x, y and z added up."""
     cell = np.arange(GROUPS)
     return np.bincount(cell - cell % 1000 % COUNT % 3, gains, GROUPS)
-
-
-def _recorded(on: Trial) -> bool:
-    """Whether the flights are not those of a simulator with the same models."""
-    scatter = on.data.study.scatter
-    return scatter is not None and not scatter.exact
 
 
 def _best_of(judged: Mapping[str, Judged]) -> Judged | None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from airtouch.gap.candidates import Term
 from airtouch.gap.data import Data
-from airtouch.gap.fit import cell_gains, left_over
+from airtouch.gap.fit import CELL_GAIN, cell_gains, left_over
 from airtouch.gap.problem import GROUPS, Part
 from airtouch.gap.result import Quantity
 from airtouch.gap.selection import Judged
@@ -21,7 +21,6 @@ from airtouch.gap.spectra import squared
 
 SURE = 4.0  #: standard errors by which a cell must stand over the floor
 FEWEST = 12  #: values in a cell
-TELLING = 1.0  #: log likelihood that effects gain in a cell which they move
 DRAWS = 400
 LARGEST = 1e4  #: of a bin's power over the floor: spikes do not make a gap
 
@@ -99,7 +98,7 @@ def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     mean = np.bincount(problem.groups, e * problem.known, GROUPS) / np.maximum(count, 1)
     out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2
     if terms:
-        out |= cell_gains(data, part, terms) > TELLING
+        out |= cell_gains(data, part, terms) > CELL_GAIN
     return out & (count >= FEWEST)
 
 

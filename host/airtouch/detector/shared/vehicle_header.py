@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from airtouch.detector.shared.c_source import float_literal
+from airtouch.detector.shared.export import write_sources
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle
 
 FOLDER = Path("firmware/app/vehicles")  #: of a checkout
@@ -57,14 +57,8 @@ def thrust_text(vehicle: Vehicle, arm_pwm: float) -> str:
 
 def export(vehicle: Vehicle, folder: Path, force: bool = False) -> Path:
     """Write the header, `NAME.h`; AirTouchError where it exists with another content, unless forced."""
-    text, path = render(vehicle).encode(), folder / f"{vehicle.name}.h"
-    if path.exists() and path.read_bytes() != text and not force:
-        raise AirTouchError(f"{path}: exists already and differs; use --force to replace it")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise AirTouchError(f"{folder}: cannot be made: {error.strerror}") from None
-    write_bytes(text, path, force=True)
+    path = folder / f"{vehicle.name}.h"
+    write_sources({path: render(vehicle)}, force)
     return path
 
 
