@@ -11,7 +11,7 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream import run_stream as run_c
 from airtouch.reference.int8_network import Int8Layer
-from airtouch.reference.stream_graph import CONV, HEAD, StreamLayer
+from airtouch.reference.stream_graph import StreamLayer
 from airtouch.reference.stream_int8 import StreamNetwork, run_stream
 
 
@@ -33,9 +33,9 @@ def network(seed, *, width=8, channels=4, taps=3, dilations=(1, 2, 4), stride=2,
     layers += [dense(rng, taps, width, width, sparsity=sparsity) for _ in dilations]
     reads = tuple(range(first_skip, len(layers)))
     layers.append(dense(rng, len(reads), width, outputs, relu=False, sparsity=sparsity))
-    graph = (StreamLayer("first", CONV, 4, channels, width, stride=stride),
-             *(StreamLayer(f"conv{i}", CONV, taps, width, width, d) for i, d in enumerate(dilations)),
-             StreamLayer("head", HEAD, len(reads), width, outputs, relu=False, reads=reads))
+    graph = (StreamLayer("first", "conv", 4, channels, width, stride=stride),
+             *(StreamLayer(f"conv{i}", "conv", taps, width, width, d) for i, d in enumerate(dilations)),
+             StreamLayer("head", "head", len(reads), width, outputs, relu=False, reads=reads))
     return StreamNetwork(graph, tuple(layers))
 
 

@@ -8,11 +8,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
-from airtouch.reference.int8_network import Int8Layer, Int8Network, runs_sparse, sparse_blocks
+from airtouch.reference.int8_network import KINDS, Int8Layer, Int8Network, runs_sparse, sparse_blocks
 from airtouch.reference.stream_int8 import StreamNetwork
-
-_KIND = {"conv": 0, "max_pool": 1, "dense": 2}
-_SPARSE = {"dense": 3, "conv": 4}
 
 
 class Model(Protocol):
@@ -63,7 +60,7 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
     Raises AirTouchError for windows of another shape and for layers that do not fit each other.
     """
     x = np.ascontiguousarray(_windows(layers[0].input_shape, windows), dtype=np.float32)
-    shapes = np.array([[_KIND[layer.kind], *layer.input_shape, *layer.output_shape, *layer.kernel,
+    shapes = np.array([[KINDS.index(layer.kind), *layer.input_shape, *layer.output_shape, *layer.kernel,
                         layer.relu, 0, 0] for layer in layers], dtype=np.int32)
     weighted = [layer for layer in layers if layer.kind != "max_pool"]
     weights = _joined([layer.weights for layer in weighted], np.float32)
@@ -133,8 +130,8 @@ def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 def layer_shape(layer: Int8Layer) -> list[int]:
     """The twelve integers of `flatNetworkInt8_t.shapes`."""
-    kind = (_SPARSE if runs_sparse(layer) else _KIND)[layer.kind]
-    return [kind, *layer.input_shape, *layer.output_shape, *layer.kernel,
+    kind = f"sparse_{layer.kind}" if runs_sparse(layer) else layer.kind
+    return [KINDS.index(kind), *layer.input_shape, *layer.output_shape, *layer.kernel,
             layer.output_zero_point, layer.output_min, 127]
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.network import checked, flat_layers, pointer
-from airtouch.reference.stream_graph import CONV, HEAD
 from airtouch.reference.stream_int8 import StreamNetwork
 
 
@@ -40,9 +39,9 @@ def flat_stream(network: StreamNetwork) -> tuple[Any, list]:
     the last of them.
     """
     *convs, head = network.graph
-    if [layer.operation for layer in network.graph] != [CONV] * len(convs) + [HEAD] or any(
-            layer.reads or layer.stride > 1 for layer in convs[1:]) or head.reads != tuple(
-            range(head.reads[0] if head.reads else 0, len(convs))):
+    strided = any(layer.stride > 1 for layer in network.graph[1:])
+    if strided or any(layer.reads for layer in convs) or not head.reads or head.reads != tuple(
+            range(head.reads[0], len(convs))):
         raise AirTouchError("network: the C kernel runs convolutions in a row and a head that reads the last of them")
     layers, keep = flat_layers(network.layers)
     dilations = np.array([layer.dilation for layer in convs], dtype=np.int32)

@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-KINDS = ("conv", "max_pool", "dense")
+#: kinds in the order of the C kernels' `layerKind_t`; the last two keep their weights in blocks (`runs_sparse`)
+KINDS = ("conv", "max_pool", "dense", "sparse_dense", "sparse_conv")
 _CHUNK = 256  # windows at a time, for memory
 
 
 @dataclass(frozen=True)
 class Int8Layer:
-    """One layer; shapes are (rows, columns, channels).
+    """One layer; shapes are (rows, columns, channels); kind: of OPERATIONS.
 
     weights: int8, conv (out, kernel rows, kernel columns, in), dense (out, inputs).
     bias: int32 (out,). weight_scale: float32 (out,). A pool has none of them (size 0), and keeps the scale.
@@ -161,18 +162,25 @@ def run(network: Int8Network, quantised: np.ndarray) -> np.ndarray:
 
 def _run_chunk(network: Int8Network, x: np.ndarray) -> np.ndarray:
     for layer in network.layers:
-        x = _max_pool(layer, x) if layer.kind == "max_pool" else _weighted(layer, x)
+        x = OPERATIONS[layer.kind](layer, x)
     return x.reshape(len(x), -1)
 
 
-def _weighted(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
-    """A convolution or a dense layer: one matrix product of patches and weights."""
-    centred = x.reshape(-1, *layer.input_shape).astype(np.int32) - layer.input_zero_point
-    if layer.kind == "conv":
-        patches = sliding_window_view(centred, layer.kernel, axis=(1, 2))  # n, rows, columns, in, kernel
-        patches = np.moveaxis(patches, 3, 5).reshape(*patches.shape[:3], -1)
-    else:
-        patches = centred.reshape(len(x), 1, 1, -1)
+def _conv(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
+    windows = sliding_window_view(_centred(layer, x), layer.kernel, axis=(1, 2))  # n, rows, columns, in, kernel
+    return _product(layer, np.moveaxis(windows, 3, 5).reshape(*windows.shape[:3], -1))
+
+
+def _dense(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
+    return _product(layer, _centred(layer, x).reshape(-1, 1, 1, layer.weights[0].size))
+
+
+def _centred(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
+    return x.reshape(-1, *layer.input_shape).astype(np.int32) - layer.input_zero_point
+
+
+def _product(layer: Int8Layer, patches: np.ndarray) -> np.ndarray:
+    """One matrix product of patches (n, rows, columns, inputs of an output) and weights, as activations."""
     accumulator = patches @ layer.weights.reshape(len(layer.bias), -1).T.astype(np.int32) + layer.bias
     multiplier, shift = layer.multipliers()
     return requantise(accumulator, multiplier, shift, layer.output_zero_point, layer.output_min)
@@ -182,6 +190,10 @@ def _max_pool(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
     (height, width), (rows, columns, channels) = layer.kernel, layer.output_shape
     whole = x[:, :rows * height, :columns * width]
     return whole.reshape(-1, rows, height, columns, width, channels).max(axis=(2, 4))
+
+
+#: kind of a layer -> int8 output (n, *output shape) of its int8 input (n, ...), of as many values as its input shape
+OPERATIONS = {"conv": _conv, "max_pool": _max_pool, "dense": _dense}
 
 
 def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,9 +10,6 @@ from typing import TypeVar
 
 import numpy as np
 
-CONV = "conv"  #: causal convolution: row t reads rows t, t - dilation, t - 2 dilation, ... of the layer before
-HEAD = "head"  #: dense layer: row t reads row t of several layers
-
 Rows = TypeVar("Rows")
 
 
@@ -20,11 +17,12 @@ Rows = TypeVar("Rows")
 class StreamLayer:
     """One layer of a stream's network.
 
-    name: prefix of its arrays in a model file. operation: CONV or HEAD. inputs: values of a row that it reads, of each
-    tap. outputs: values of a row that it gives. taps: rows that it reads; of a head one of each layer in `reads`.
-    dilation: rows between two taps. stride: rows of its input to one of its own. relu: negative outputs become 0.
-    pruned: training sets blocks of its weights to zero. reads: indices of the layers that it reads; () is the layer
-    before, or the network's input.
+    name: prefix of its arrays in a model file. operation: what it does with the rows that it reads
+    (`detector.best.operations`). inputs: values of a row that it reads, of each tap. outputs: values of a row that it
+    gives. taps: rows that it reads; with `reads` one of each of those layers. dilation: rows between two taps. stride:
+    rows of its input to one of its own. relu: negative outputs become 0. pruned: training sets blocks of its weights to
+    zero. reads: indices of the layers whose newest rows it reads side by side; () is the past of the layer before, or
+    of the network's input.
     """
 
     name: str
@@ -71,7 +69,7 @@ def receptive_samples(graph: Sequence[StreamLayer]) -> int:
     """Samples of the past, the newest included, that an output depends on."""
     samples, stride = 1, 1
     for layer in graph:
-        if layer.operation == CONV:
+        if not layer.reads:
             samples += (layer.taps - 1) * layer.dilation * stride
         stride *= layer.stride
     return samples

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.reference.int8_network import Int8Layer, requantise
-from airtouch.reference.stream_graph import CONV, HEAD, StreamLayer, follow, receptive_samples, taps_of
+from airtouch.reference.int8_network import OPERATIONS, Int8Layer
+from airtouch.reference.stream_graph import StreamLayer, follow, receptive_samples, taps_of
 
 
 @dataclass(frozen=True)
 class StreamNetwork:
     """A graph and the int8 layer of each of its layers.
 
-    layers: kind "dense", input_shape (taps, 1, inputs), weights (outputs, taps * inputs), oldest tap first.
+    layers: input_shape (taps, 1, inputs); of kind "dense", weights (outputs, taps * inputs), oldest tap first.
     """
 
     graph: tuple[StreamLayer, ...]
@@ -52,14 +52,14 @@ class StreamNetwork:
         return sum(int(np.count_nonzero(layer.weights)) for layer in self.layers)
 
 
-def int8_layer(layer: StreamLayer, arrays: dict[str, np.ndarray]) -> Int8Layer:
+def int8_layer(layer: StreamLayer, kind: str, arrays: dict[str, np.ndarray]) -> Int8Layer:
     """The int8 layer of a layer of the graph.
 
-    arrays: weights int8 (outputs, ...), bias int32 (outputs,), weight_scale float32 (outputs,), scale float32 and
-    zero_point int32 of input and output, (2,).
+    kind: of `int8_network.OPERATIONS`. arrays: weights int8 (outputs, ...), bias int32 (outputs,), weight_scale float32
+    (outputs,), scale float32 and zero_point int32 of input and output, (2,).
     """
     (scale_in, scale_out), (zero_in, zero_out) = arrays["scale"], arrays["zero_point"]
-    return Int8Layer("dense", (layer.taps, 1, layer.inputs), (1, 1, layer.outputs), (1, 1), float(scale_in),
+    return Int8Layer(kind, (layer.taps, 1, layer.inputs), (1, 1, layer.outputs), (1, 1), float(scale_in),
                      int(zero_in), float(scale_out), int(zero_out), layer.relu,
                      arrays["weights"].reshape(layer.outputs, -1), arrays["bias"], arrays["weight_scale"])
 
@@ -69,25 +69,8 @@ def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
     int8 = iter(network.layers)  # `follow` takes the layers in order
 
     def apply(layer: StreamLayer, x: np.ndarray) -> np.ndarray:
-        return OPERATIONS[layer.operation](layer, next(int8), x)[::layer.stride]
+        arrays = next(int8)
+        patches = x if layer.reads else np.hstack(taps_of(layer, x, arrays.input_zero_point))
+        return OPERATIONS[arrays.kind](arrays, patches).reshape(len(x), layer.outputs)[::layer.stride]
 
     return follow(network.graph, np.asarray(quantised, dtype=np.int8), apply, np.hstack)
-
-
-def _conv(layer: StreamLayer, int8: Int8Layer, x: np.ndarray) -> np.ndarray:
-    return _dense(int8, np.hstack(taps_of(layer, x, int8.input_zero_point)))
-
-
-def _head(layer: StreamLayer, int8: Int8Layer, x: np.ndarray) -> np.ndarray:
-    return _dense(int8, x)
-
-
-#: operation -> int8 output (n, outputs) of its int8 input (n, ...)
-OPERATIONS = {CONV: _conv, HEAD: _head}
-
-
-def _dense(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
-    centred = x.astype(np.int32) - layer.input_zero_point
-    accumulator = centred @ layer.weights.T.astype(np.int32) + layer.bias
-    multiplier, shift = layer.multipliers()
-    return requantise(accumulator, multiplier, shift, layer.output_zero_point, layer.output_min)

@@ -1,16 +1,16 @@
-"""The network of `best` in float: what each operation of its graph is in NumPy, in Keras and over one window.
+"""The network of `best` in float: arrays of weights, NumPy, Keras for training, TensorFlow over one window.
 
-The graph itself is `Recipe.graph`; `reference.stream_int8` has the same operations in int8.
+The graph is `Recipe.graph`; what each of its operations does is in `operations`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.outputs import OUTPUTS
-from airtouch.reference.stream_graph import CONV, HEAD, StreamLayer, follow, taps_of
+from airtouch.reference.stream_graph import StreamLayer, follow
 
 if TYPE_CHECKING:
     import keras
@@ -19,20 +19,6 @@ Graph = Sequence[StreamLayer]
 Weights = Mapping[str, np.ndarray]  #: "<layer>.kernel" (taps, inputs, outputs) and "<layer>.bias" (outputs,), float32
 #: names of a layer's arrays, in the order of Keras' variables
 PARTS = ("kernel", "bias")
-
-
-@dataclass(frozen=True)
-class Operation:
-    """What one operation is in float.
-
-    rows(layer, kernel, bias, x): NumPy, a row of output for each row of input. keras(layer): a new Keras layer.
-    window(layer, kernel, bias, x): TensorFlow, over a window (1, 1, rows, inputs) without a past. All without ReLU but
-    `keras`, whose layer has it.
-    """
-
-    rows: Callable[[StreamLayer, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-    keras: Callable[[StreamLayer], "keras.Layer"]
-    window: Callable[[StreamLayer, np.ndarray, np.ndarray, Any], Any]
 
 
 def weight_shapes(graph: Graph) -> dict[str, tuple[int, ...]]:
@@ -63,9 +49,14 @@ def keras_model(graph: Graph) -> "keras.Model":
     def join(parts: list) -> Any:
         return keras.layers.Concatenate()(parts)
 
+    start = keras.initializers.Constant([output.start_bias for output in OUTPUTS])
+
+    def apply(layer: StreamLayer, x: Any) -> Any:
+        options = {"bias_initializer": start} if layer is graph[-1] else {}
+        return OPERATIONS[layer.operation].keras(layer, **options)(x)
+
     inputs = keras.Input((None, graph[0].inputs))
-    return keras.Model(inputs, follow(graph, inputs, lambda layer, x: OPERATIONS[layer.operation].keras(layer)(x),
-                                      join))
+    return keras.Model(inputs, follow(graph, inputs, apply, join))
 
 
 def window_logits(weights: Weights, graph: Graph) -> Callable[[Any], Any]:
@@ -86,41 +77,3 @@ def window_logits(weights: Weights, graph: Graph) -> Callable[[Any], Any]:
 def _arrays(weights: Weights, layer: StreamLayer) -> tuple[np.ndarray, np.ndarray]:
     kernel, bias = (weights[f"{layer.name}.{part}"] for part in PARTS)
     return kernel, bias
-
-
-def _conv_rows(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return sum(rows @ values for rows, values in zip(taps_of(layer, x, 0.0), kernel, strict=True)) + bias
-
-
-def _conv_keras(layer: StreamLayer) -> "keras.Layer":
-    import keras
-
-    return keras.layers.Conv1D(layer.outputs, layer.taps, strides=layer.stride, dilation_rate=layer.dilation,
-                               padding="causal", activation="relu" if layer.relu else None)
-
-
-def _conv_window(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: Any) -> Any:
-    import tensorflow as tf
-
-    return tf.nn.conv2d(x, kernel[None], (1, layer.stride), "VALID", dilations=(1, layer.dilation)) + bias
-
-
-def _head_rows(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return x @ kernel.reshape(-1, layer.outputs) + bias
-
-
-def _head_keras(layer: StreamLayer) -> "keras.Layer":
-    import keras
-
-    start = keras.initializers.Constant([output.start_bias for output in OUTPUTS])
-    return keras.layers.Dense(layer.outputs, activation="relu" if layer.relu else None, bias_initializer=start)
-
-
-def _head_window(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: Any) -> Any:
-    import tensorflow as tf
-
-    return tf.nn.conv2d(x, kernel.reshape(1, 1, -1, layer.outputs), 1, "VALID") + bias
-
-
-OPERATIONS = {CONV: Operation(_conv_rows, _conv_keras, _conv_window),
-              HEAD: Operation(_head_rows, _head_keras, _head_window)}

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.detector.best.network import Weights, window_logits
+from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.shared.tensorflow import convert, read_weighted
 from airtouch.reference.stream_int8 import StreamNetwork, int8_layer
@@ -43,4 +44,5 @@ def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tu
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
     """The int8 network from the arrays of each layer (`reference.stream_int8.int8_layer`)."""
     graph = recipe.graph
-    return StreamNetwork(graph, tuple(int8_layer(layer, part) for layer, part in zip(graph, arrays, strict=True)))
+    return StreamNetwork(graph, tuple(int8_layer(layer, OPERATIONS[layer.operation].kind, part)
+                                      for layer, part in zip(graph, arrays, strict=True)))

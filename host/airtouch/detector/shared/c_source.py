@@ -5,17 +5,15 @@ import hashlib
 import numpy as np
 
 from airtouch.kernels.network import layer_shape, packed_weights
-from airtouch.reference.int8_network import Int8Layer
-
-_KINDS = ("LAYER_CONV", "LAYER_MAX_POOL", "LAYER_DENSE", "LAYER_SPARSE_DENSE", "LAYER_SPARSE_CONV")
+from airtouch.reference.int8_network import KINDS, Int8Layer
 
 
 def layer(name: str, of: Int8Layer) -> tuple[str, str]:
     """The C arrays of one layer, whose names begin with `name`, and the initialiser of its layerInt8_t."""
     kind, *shape = layer_shape(of)
     sizes = [", ".join(map(str, shape[start:stop])) for start, stop in ((0, 3), (3, 6), (6, 8), (8, 11))]
-    head = (f"{{.kind = {_KINDS[kind]}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), LAYER_KERNEL({sizes[2]}), "
-            f"LAYER_RANGE({sizes[3]})")
+    head = (f"{{.kind = LAYER_{KINDS[kind].upper()}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), "
+            f"LAYER_KERNEL({sizes[2]}), LAYER_RANGE({sizes[3]})")
     if of.kind == "max_pool":
         return "", head + "}"
     weights, counts, skips = packed_weights(of)
