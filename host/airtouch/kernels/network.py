@@ -32,6 +32,11 @@ class FloatLayer:
     weights: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
     bias: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
 
+    @property
+    def weighted(self) -> bool:
+        """Whether it has weights."""
+        return self.weights.size > 0
+
 
 def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
     """int8 logits (n, 2) of normalised windows (n, 100, 3), float32. Reference: `int8_network.infer_int8`.
@@ -62,7 +67,7 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
     x = np.ascontiguousarray(_windows(layers[0].input_shape, windows), dtype=np.float32)
     shapes = np.array([[KINDS.index(layer.kind), *layer.input_shape, *layer.output_shape, *layer.kernel,
                         layer.relu, 0, 0] for layer in layers], dtype=np.int32)
-    weighted = [layer for layer in layers if layer.kind != "max_pool"]
+    weighted = [layer for layer in layers if layer.weighted]
     weights = _joined([layer.weights for layer in weighted], np.float32)
     bias = _joined([layer.bias for layer in weighted], np.float32)
     flat = ffi.new("flatNetworkFloat_t *", {
@@ -106,7 +111,7 @@ def parameter_bytes(network: Int8Network | StreamNetwork) -> int:
     multiplier and shift."""
     total = 0
     for layer in network.layers:
-        if layer.kind != "max_pool":
+        if layer.weighted:
             weights, counts, skips = packed_weights(layer)
             total += weights.size + 2 * counts.size + skips.size + 9 * len(layer.bias)
     return total
@@ -144,7 +149,7 @@ def _flat_int8(network: Int8Network) -> tuple[Any, list[np.ndarray]]:
 
 def flat_layers(layers: Sequence[Int8Layer]) -> tuple[Any, list[np.ndarray]]:
     """The C view of layers, one after the other, and the arrays that must outlive it."""
-    weighted = [layer for layer in layers if layer.kind != "max_pool"]
+    weighted = [layer for layer in layers if layer.weighted]
     packed = [packed_weights(layer) for layer in weighted]
     padded = [np.pad(np.ravel(weights), (0, -weights.size % 4)) for weights, _, _ in packed]
     constants = [layer.c_constants() for layer in weighted]

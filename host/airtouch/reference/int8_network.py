@@ -37,6 +37,11 @@ class Int8Layer:
     weight_scale: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
 
     @property
+    def weighted(self) -> bool:
+        """Whether it has weights."""
+        return self.weights.size > 0
+
+    @property
     def output_min(self) -> int:
         """Lower clamp of the output: its zero point for a ReLU."""
         return max(self.output_zero_point, -128) if self.relu else -128
@@ -104,7 +109,7 @@ def rolling_multiplications(network: Int8Network, stride: int) -> float:
 
 def _weights_used(layer: Int8Layer) -> int:
     """Weights that are multiplied with one position of the input."""
-    if layer.kind == "max_pool":
+    if not layer.weighted:
         return 0
     return 4 * len(sparse_blocks(layer.weights)[0]) if runs_sparse(layer) else layer.weights.size
 
@@ -221,7 +226,7 @@ def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def runs_sparse(layer: Int8Layer) -> bool:
     """Whether blocks of four (five bytes each, two an output for their count) take less room."""
-    if layer.kind == "max_pool" or layer.weights[0].size % 4:
+    if not layer.weighted or layer.weights[0].size % 4:
         return False
     _, counts, skips = sparse_blocks(layer.weights)
     return 5 * len(skips) + 2 * len(counts) < layer.weights.size

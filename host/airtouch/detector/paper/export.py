@@ -135,7 +135,7 @@ def _decoding(model: Model, prefix: str) -> str:
 
 def _model_source(network: Int8Network, header: str, variable: str) -> str:
     names = iter(WEIGHTED)
-    parts = [layer("" if one.kind == "max_pool" else next(names), one) for one in network.layers]
+    parts = [layer(next(names) if one.weighted else "", one) for one in network.layers]
     arrays = [text for text, _ in parts if text]
     rows = [f"    {initialiser}," for _, initialiser in parts]
     first, last = network.layers[0], network.layers[-1]

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.detector.paper.network import INPUT_SHAPE, float_layers, weight_shapes
+from airtouch.detector.paper.graph import INPUT_SHAPE
+from airtouch.detector.paper.network import float_layers, weight_shapes
 from airtouch.detector.paper.normalisation import FIXED, WINDOW, FixedScale
 from airtouch.detector.paper.quantisation import arrays_of_network, int8_shapes, network_of_arrays
 from airtouch.detector.shared import archive

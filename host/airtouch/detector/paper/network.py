@@ -1,4 +1,4 @@
-"""The paper's network (section 5.2): its shapes, its weights, and Keras and C views of them.
+"""The paper's network (section 5.2): its weights, and Keras and C views of it. `graph` is the list of its layers.
 
 Input (100, 3, 1); 16 filters of 3 x 1, ReLU, pool 2 x 1; 32 filters of 3 x 1, ReLU, pool
 2 x 1; dense 16, ReLU; dense 2. It gives logits: softmax comes after, outside the network.
@@ -10,29 +10,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from airtouch.detector.paper.graph import GRAPH, INPUT_SHAPE, OPERATIONS
 from airtouch.detector.shared.pruning import BLOCK, keep_mask, polynomial_sparsity
 from airtouch.kernels.network import FloatLayer
 
 if TYPE_CHECKING:
     import keras
 
-INPUT_SHAPE = (100, 3, 1)  #: rows (samples), columns (sensors), channels
-WEIGHTED = ("conv1", "conv2", "dense1", "dense2")
+#: Keras kernels by layer: convolutions (rows, columns, in, out), dense (in, out).
+KERNEL_SHAPES = {layer.name: layer.kernel_shape for layer in GRAPH if layer.kernel_shape}
+WEIGHTED = tuple(KERNEL_SHAPES)
 #: The first dense layer holds 35,328 of the 36,944 weights.
 PRUNED = "dense1"
 #: Holds 1,536, each used 138 times a window: most of the arithmetic where a network rolls over samples.
 PRUNED_CONV = "conv2"
-#: Keras kernels: convolutions (rows, columns, in, out), dense (in, out).
-KERNEL_SHAPES = {"conv1": (3, 1, 1, 16), "conv2": (3, 1, 16, 32), "dense1": (2208, 16), "dense2": (16, 2)}
-#: kind, weights, input shape, output shape, kernel, ReLU: what every view is made of.
-GRAPH = (
-    ("conv", "conv1", (100, 3, 1), (98, 3, 16), (3, 1), True),
-    ("max_pool", None, (98, 3, 16), (49, 3, 16), (2, 1), False),
-    ("conv", "conv2", (49, 3, 16), (47, 3, 32), (3, 1), True),
-    ("max_pool", None, (47, 3, 32), (23, 3, 32), (2, 1), False),
-    ("dense", "dense1", (23, 3, 32), (1, 1, 16), (1, 1), True),
-    ("dense", "dense2", (1, 1, 16), (1, 1, 2), (1, 1), False),
-)
 
 Weights = Mapping[str, np.ndarray]  #: "conv1.kernel", "conv1.bias", ... float32, as Keras lays them out
 
@@ -48,10 +39,10 @@ def weight_shapes() -> dict[str, tuple[int, ...]]:
 
 def float_layers(weights: Weights) -> list[FloatLayer]:
     """The network for `airtouch.kernels.network.infer_float`."""
-    return [FloatLayer(kind, before, after, kernel, relu) if name is None else
-            FloatLayer(kind, before, after, kernel, relu, kernel_of_c(weights[f"{name}.kernel"]),
-                       weights[f"{name}.bias"])
-            for kind, name, before, after, kernel, relu in GRAPH]
+    return [FloatLayer(of.operation, of.input_shape, of.output_shape, of.kernel, of.relu,
+                       *((kernel_of_c(weights[f"{of.name}.kernel"]), weights[f"{of.name}.bias"])
+                         if of.kernel_shape else ()))
+            for of in GRAPH]
 
 
 def kernel_of_c(kernel: np.ndarray) -> np.ndarray:
@@ -64,21 +55,10 @@ def build_keras(constraints: Mapping[str, object] | None = None, rows: int = INP
     import keras
 
     constraints = constraints or {}
-
-    def conv(name: str) -> keras.Layer:
-        rows, columns, _, filters = KERNEL_SHAPES[name]
-        return keras.layers.Conv2D(filters, (rows, columns), activation="relu", name=name,
-                                   kernel_constraint=constraints.get(name))
-
-    def dense(name: str, activation: str | None) -> keras.Layer:
-        return keras.layers.Dense(KERNEL_SHAPES[name][1], activation=activation, name=name,
-                                  kernel_constraint=constraints.get(name))
-
-    return keras.Sequential([
-        keras.Input((rows, *INPUT_SHAPE[1:])), conv("conv1"), keras.layers.MaxPooling2D((2, 1)),
-        conv("conv2"), keras.layers.MaxPooling2D((2, 1)), keras.layers.Flatten(),
-        dense("dense1", "relu"), dense("dense2", None),
-    ], name="airtouch_paper")
+    layers = [one for of in GRAPH
+              for one in OPERATIONS[of.operation].keras(of, **(
+                  {"kernel_constraint": constraints.get(of.name)} if of.kernel_shape else {}))]
+    return keras.Sequential([keras.Input((rows, *INPUT_SHAPE[1:])), *layers], name="airtouch_paper")
 
 
 def weights_of_keras(model: "keras.Model") -> dict[str, np.ndarray]:

@@ -1,9 +1,9 @@
 """Float weights to the int8 network (section 5.3), with scales as TensorFlow Lite chooses them."""
 
-
 import numpy as np
 
-from airtouch.detector.paper.network import GRAPH, INPUT_SHAPE, KERNEL_SHAPES, WEIGHTED, Weights
+from airtouch.detector.paper.graph import GRAPH, INPUT_SHAPE, OPERATIONS
+from airtouch.detector.paper.network import KERNEL_SHAPES, WEIGHTED, Weights
 from airtouch.detector.shared.tensorflow import convert, read_weighted
 from airtouch.reference.int8_network import Int8Layer, Int8Network
 
@@ -26,16 +26,10 @@ def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
     import tensorflow as tf
 
     def network(x):
-        for kind, name, _, _, kernel, relu in GRAPH:
-            if kind == "max_pool":
-                x = tf.nn.max_pool2d(x, kernel, kernel, "VALID")
-                continue
-            values, bias = weights[f"{name}.kernel"], weights[f"{name}.bias"]
-            if kind == "conv":
-                x = tf.nn.conv2d(x, values, 1, "VALID") + bias
-            else:
-                x = tf.matmul(tf.reshape(x, (1, values.shape[0])), values) + bias
-            x = tf.nn.relu(x) if relu else x
+        for of in GRAPH:
+            kernel, bias = weights.get(f"{of.name}.kernel"), weights.get(f"{of.name}.bias")
+            x = OPERATIONS[of.operation].window(of, kernel, bias, x)
+            x = tf.nn.relu(x) if of.relu else x
         return x
 
     return convert(network, (1, *INPUT_SHAPE), windows)
@@ -57,22 +51,22 @@ def network_of_arrays(arrays: dict[str, np.ndarray]) -> Int8Network:
     """The int8 network from the arrays of `int8_shapes`; activations are input, then each weighted layer."""
     layers = []
     at = 0  # which activation the layer reads
-    for kind, name, before, after, kernel, relu in GRAPH:
+    for of in GRAPH:
+        shapes = (of.operation, of.input_shape, of.output_shape, of.kernel)
         scale, zero_point = float(arrays["scale"][at]), int(arrays["zero_point"][at])
-        if name is None:
-            layers.append(Int8Layer(kind, before, after, kernel, scale, zero_point, scale, zero_point))
+        if not of.kernel_shape:
+            layers.append(Int8Layer(*shapes, scale, zero_point, scale, zero_point))
             continue
         at += 1
-        layers.append(Int8Layer(kind, before, after, kernel, scale, zero_point,
-                                float(arrays["scale"][at]), int(arrays["zero_point"][at]), relu,
-                                arrays[f"{name}.weights"], arrays[f"{name}.bias"],
-                                arrays[f"{name}.weight_scale"]))
+        layers.append(Int8Layer(*shapes, scale, zero_point, float(arrays["scale"][at]), int(arrays["zero_point"][at]),
+                                of.relu, arrays[f"{of.name}.weights"], arrays[f"{of.name}.bias"],
+                                arrays[f"{of.name}.weight_scale"]))
     return Int8Network(tuple(layers))
 
 
 def arrays_of_network(network: Int8Network) -> dict[str, np.ndarray]:
     """The inverse of `network_of_arrays`."""
-    weighted = [layer for layer in network.layers if layer.kind != "max_pool"]
+    weighted = [layer for layer in network.layers if layer.weighted]
     arrays = {}
     for name, layer in zip(WEIGHTED, weighted, strict=True):
         arrays[f"{name}.weights"], arrays[f"{name}.bias"] = layer.weights, layer.bias

@@ -90,7 +90,7 @@ def check_range(layers: Sequence[Int8Layer], source: str) -> None:
     """No accumulator may leave what the kernels' rounding takes, 2^28, whatever the input; AirTouchError where one may.
     An output whose weights pruning took is a constant; its bias may fill int32, its scale must be below one."""
     for layer in layers:
-        if layer.kind == "max_pool":
+        if not layer.weighted:
             continue
         real = layer.weight_scale.astype(np.float64) * (layer.input_scale / layer.output_scale)
         weights = np.abs(layer.weights.astype(np.int64)).reshape(len(layer.bias), -1).sum(axis=1)

@@ -14,7 +14,7 @@ def layer(name: str, of: Int8Layer) -> tuple[str, str]:
     sizes = [", ".join(map(str, shape[start:stop])) for start, stop in ((0, 3), (3, 6), (6, 8), (8, 11))]
     head = (f"{{.kind = LAYER_{KINDS[kind].upper()}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), "
             f"LAYER_KERNEL({sizes[2]}), LAYER_RANGE({sizes[3]})")
-    if of.kind == "max_pool":
+    if not of.weighted:
         return "", head + "}"
     weights, counts, skips = packed_weights(of)
     bias, multiplier, shift = of.c_constants()

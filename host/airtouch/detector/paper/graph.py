@@ -1,0 +1,126 @@
+"""The paper's network as a list of layers, and what each operation is in Keras and in TensorFlow over a window.
+
+C (`kernels.network`), NumPy (`reference.int8_network`), training, quantisation and export follow the list.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import keras
+
+Shape = tuple[int, int, int]  #: rows, columns, channels
+CONV, MAX_POOL, DENSE = "conv", "max_pool", "dense"  #: kinds of `reference.int8_network`
+
+INPUT_SHAPE: Shape = (100, 3, 1)  #: samples, sensors, one value
+
+
+class Row(NamedTuple):
+    """A line of the list. kernel: rows and columns that it reads. outputs: channels, 0 for as many as it reads."""
+
+    name: str
+    operation: str
+    kernel: tuple[int, int] = (1, 1)
+    outputs: int = 0
+    relu: bool = False
+
+
+LAYERS = (
+    Row("conv1", CONV, (3, 1), 16, relu=True),
+    Row("pool1", MAX_POOL, (2, 1)),
+    Row("conv2", CONV, (3, 1), 32, relu=True),
+    Row("pool2", MAX_POOL, (2, 1)),
+    Row("dense1", DENSE, outputs=16, relu=True),
+    Row("dense2", DENSE, outputs=2),
+)
+
+
+@dataclass(frozen=True)
+class PaperLayer:
+    """One layer with its shapes. kernel_shape: of its weights as Keras lays them out, () for a layer without."""
+
+    name: str
+    operation: str
+    input_shape: Shape
+    output_shape: Shape
+    kernel: tuple[int, int]
+    relu: bool
+    kernel_shape: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Operation:
+    """What one operation is.
+
+    output_shape, kernel_shape (input shape, row): of a layer. keras(layer, **options): new Keras layers, the last one
+    with these options. window(layer, kernel, bias, x): TensorFlow, of (1, rows, columns, channels), without ReLU.
+    """
+
+    output_shape: Callable[[Shape, Row], Shape]
+    kernel_shape: Callable[[Shape, Row], tuple[int, ...]]
+    keras: Callable[..., list["keras.Layer"]]
+    window: Callable[[PaperLayer, np.ndarray | None, np.ndarray | None, Any], Any]
+
+
+def graph_of(rows: Sequence[Row], input_shape: Shape) -> tuple[PaperLayer, ...]:
+    """The layers of a list, each with the shape that the one before leaves it."""
+    layers: list[PaperLayer] = []
+    for row in rows:
+        before, of = layers[-1].output_shape if layers else input_shape, OPERATIONS[row.operation]
+        layers.append(PaperLayer(row.name, row.operation, before, of.output_shape(before, row), row.kernel, row.relu,
+                                 of.kernel_shape(before, row)))
+    return tuple(layers)
+
+
+def _conv_keras(layer: PaperLayer, **options: Any) -> list["keras.Layer"]:
+    import keras
+
+    return [keras.layers.Conv2D(layer.output_shape[2], layer.kernel, activation="relu" if layer.relu else None,
+                                name=layer.name, **options)]
+
+
+def _conv_window(layer: PaperLayer, kernel: np.ndarray | None, bias: np.ndarray | None, x: Any) -> Any:
+    import tensorflow as tf
+
+    return tf.nn.conv2d(x, kernel, 1, "VALID") + bias
+
+
+def _pool_keras(layer: PaperLayer, **options: Any) -> list["keras.Layer"]:
+    import keras
+
+    return [keras.layers.MaxPooling2D(layer.kernel, name=layer.name, **options)]
+
+
+def _pool_window(layer: PaperLayer, kernel: np.ndarray | None, bias: np.ndarray | None, x: Any) -> Any:
+    import tensorflow as tf
+
+    return tf.nn.max_pool2d(x, layer.kernel, layer.kernel, "VALID")
+
+
+def _dense_keras(layer: PaperLayer, **options: Any) -> list["keras.Layer"]:
+    import keras
+
+    flat = [keras.layers.Flatten()] if layer.input_shape[:2] != (1, 1) else []
+    return [*flat, keras.layers.Dense(layer.output_shape[2], activation="relu" if layer.relu else None, name=layer.name,
+                                      **options)]
+
+
+def _dense_window(layer: PaperLayer, kernel: np.ndarray | None, bias: np.ndarray | None, x: Any) -> Any:
+    import tensorflow as tf
+
+    return tf.matmul(tf.reshape(x, (1, int(np.prod(layer.input_shape)))), kernel) + bias
+
+
+OPERATIONS = {
+    CONV: Operation(lambda at, row: (at[0] - row.kernel[0] + 1, at[1] - row.kernel[1] + 1, row.outputs),
+                    lambda at, row: (*row.kernel, at[2], row.outputs), _conv_keras, _conv_window),
+    MAX_POOL: Operation(lambda at, row: (at[0] // row.kernel[0], at[1] // row.kernel[1], at[2]),
+                        lambda at, row: (), _pool_keras, _pool_window),
+    DENSE: Operation(lambda at, row: (1, 1, row.outputs),
+                     lambda at, row: (int(np.prod(at)), row.outputs), _dense_keras, _dense_window),
+}
+
+GRAPH = graph_of(LAYERS, INPUT_SHAPE)
