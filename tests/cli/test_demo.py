@@ -7,6 +7,7 @@ from click.testing import CliRunner
 
 from airtouch.cli import demo, flights
 from airtouch.detector import best
+from airtouch.detector.evaluation import demo_flights
 from airtouch.errors import AirTouchError
 from made_flight import SMALL
 
@@ -19,7 +20,7 @@ def run(*arguments):
 def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
     pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
     monkeypatch.setattr(demo, "find_flights", lambda: None)
-    monkeypatch.setattr(demo, "GENERATED", 8)
+    monkeypatch.setattr(demo_flights, "GENERATED", 8)
     monkeypatch.setattr(demo, "STEPS", SMALL.steps)
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     out = tmp_path / "demo"
@@ -41,8 +42,8 @@ def test_few_flights_are_too_few(generated, tmp_path):
 
 
 def test_split_is_by_flight(generated, tmp_path):
-    train, test, _ = demo.flights_of(tmp_path, generated, None)
-    assert train and test and not {f.path for f in train} & {f.path for f in test}
+    chosen = demo_flights.choose(generated, tmp_path)
+    assert chosen.train and chosen.test and not {f.path for f in chosen.train} & {f.path for f in chosen.test}
 
 
 def test_where_flights_are_looked_for(tmp_path, monkeypatch):

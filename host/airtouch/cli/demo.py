@@ -7,19 +7,16 @@ from typing import Any
 
 import click
 
-from airtouch import logs
 from airtouch.cli import scores as show
 from airtouch.cli.flights import find_flights
 from airtouch.detector import registry
-from airtouch.detector.evaluation import dataset, evaluate
-from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation import demo_flights, evaluate
 from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 
-TRAIN, TEST, EPOCHS, STEPS = 52, 18, 8, 800  #: as much as fits in the time on two cores
+EPOCHS, STEPS = 8, 800  #: as much as fits in the time on two cores
 SCORED = ("best", "paper", "baseline")  #: detectors
-GENERATED, SCENARIO = 32, "paper-low"  #: simulated flights, where none are recorded
 SHOWN = 4  #: flights plotted in the report
 
 
@@ -49,9 +46,11 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     steps = Steps(started)
 
     steps.say("Flights")
-    train, test, where = flights_of(out, flights, speed)
-    click.echo(f"  {where}: {len(train)} to train on, {len(test)} held out, split by flight")
-    training, left_out = readable(train)
+    chosen = demo_flights.choose(flights or find_flights(), out / "flights", speed,
+                                 lambda line: click.echo(f"airtouch: {line}", err=True))
+    test, where = chosen.test, chosen.where
+    click.echo(f"  {where}: {len(chosen.train)} to train on, {len(test)} held out, split by flight")
+    training, left_out = demo_flights.readable(chosen.train)
 
     steps.say(f"Training, short: {epochs} epochs, pruned, int8; thresholds from training flights")
     short = {"paper": {"epochs": epochs}, "best": {"steps": STEPS}}
@@ -96,57 +95,6 @@ class Steps:
         """Print the next heading."""
         self.number += 1
         click.echo(f"\n[{time.monotonic() - self.started:4.0f} s] {self.number}. {what}")
-
-
-def flights_of(
-    out: Path, folder: Path | None, speed: float | None
-) -> tuple[list[FlightFile], list[FlightFile], str]:
-    """(training flights, held-out flights, what they are)."""
-    folder = folder or find_flights()
-    if folder is not None:
-        files, where = dataset.collect([folder], speed), f"recorded flights in {folder}"
-    else:
-        files, where = generated(out / "flights"), f"flights of the simulator ({out / 'flights'})"
-    if len(files) < 4:
-        raise AirTouchError(f"{folder}: {len(files)} flights are too few to train and to test; "
-                            "at least 4 are needed")
-    fold = [i if f.condition.fold is None else f.condition.fold for i, f in enumerate(files)]
-    test = [f for f, k in zip(files, fold, strict=True) if k % 4 == 0]
-    train = [f for f, k in zip(files, fold, strict=True) if k % 4 != 0]
-    return spread(train, TRAIN), spread(test, TEST), where
-
-
-def generated(folder: Path) -> list[FlightFile]:
-    """Simulated flights, written with their manifest; compiles the simulator on the first call."""
-    from airtouch.simulation import batch, scenario, store
-    from airtouch.simulation.flight import Diverged
-
-    scene = scenario.load(SCENARIO)
-    folder.mkdir(parents=True, exist_ok=True)
-    for number, flown in enumerate(batch.flights(scene, GENERATED)):
-        path = store.path_of(folder, scene.name, 0, number)
-        path.unlink(missing_ok=True)
-        if isinstance(flown, Diverged):
-            click.echo(f"airtouch: {flown}", err=True)
-        else:
-            logs.write(flown, path)
-    store.write_manifest(folder, scene, 0, GENERATED)
-    return dataset.collect([folder])
-
-
-def spread(files: list[FlightFile], most: int) -> list[FlightFile]:
-    """At most `most` of them, evenly over the list, so that every condition stays in."""
-    return files if len(files) <= most else [files[i * len(files) // most] for i in range(most)]
-
-
-def readable(files: Sequence[FlightFile]) -> tuple[list[Any], list[tuple[str, str]]]:
-    """Logs to train on, and what cannot be used."""
-    from airtouch.detector.evaluation.crossval import readable_flights
-
-    found, left_out = readable_flights(files)
-    if not found:
-        raise AirTouchError(f"no flight to train on; the first was left out because: {left_out[0][1]}")
-    return list(found.values()), left_out
 
 
 def fit(name: str, training: Sequence[Any], options: dict[str, Any]) -> Any:

@@ -12,16 +12,13 @@ import click
 
 from airtouch import logs
 from airtouch.cli import Suggesting
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError
 from airtouch.logs.rosbag import is_bag
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
 RERUN = ".rrd"  #: written, never read
 FOREIGN = (".ulg",)  #: read in folders as well
 FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
-#: what the table calls a group of channels -> the column that tells whether it is there
-GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
-          "position": "x_m", "velocity": "vx_mps", "attitude": "roll_rad", "rpm": "rpm_1"}
 
 
 @click.group(name="logs", cls=Suggesting)
@@ -50,7 +47,7 @@ def info(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs info flights/*.csv.gz
     """
-    found, left_out = _each(files, _summary)
+    found, left_out = _each(files, lambda path: logs.summary(logs.read(path)))
     if as_json:
         _print_json(found, left_out)
     else:
@@ -171,19 +168,6 @@ def _progress(paths: list[Path]) -> Iterable[Path]:
     from rich.progress import track
 
     return track(paths, description="flights", console=Console(stderr=True), transient=True)
-
-
-def _summary(path: Path) -> dict[str, Any]:
-    log = logs.read(path)
-    report = logs.check(log)
-    return {
-        "source": log.source, "format": report.format, "samples": report.samples,
-        "duration_s": report.duration_s, "rate_hz": report.rate_hz,
-        "channels": [name for name, column in GROUPS.items() if log.has(column)],
-        "entries": sum(edge.kind == "entry" for edge in report.edges),
-        "exits": sum(edge.kind == "exit" for edge in report.edges),
-        "condition": shown(str(log.meta.get("condition", ""))), "warnings": len(report.warnings),
-    }
 
 
 def _print_table(rows: list[dict[str, Any]]) -> None:

@@ -1,15 +1,12 @@
 """`airtouch map`: the edges of a flight in the plane."""
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
 from airtouch import logs
-from airtouch.detector import registry
-from airtouch.detector.evaluation import dataset, evaluate
-from airtouch.detector.trace import Detection
+from airtouch.detector.evaluation import dataset
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 
@@ -47,17 +44,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
     edge_map.track(log, speed or file.condition.speed_mps)  # which may be missing, told before the detector runs
-    found: Sequence[logs.Edge | Detection]
-    if truth:
-        found, lag, model_sigma = logs.true_edges(log), 0.0, 0.01
-    else:
-        module = registry.get(detector)
-        evaluate.check(log, evaluate.spare_of(module))
-        trained = module.load(model)
-        trained = module.model_for(trained, log) if hasattr(module, "model_for") else trained
-        found, lag = module.run(log, trained).edges, module.lag_s(trained)
-        model_sigma = getattr(trained, "metadata", {}).get("sigma_s", edge_map.ASSUMED_SIGMA_S)
-    made = edge_map.edge_map(log, found, lag_s=lag, sigma_s=sigma or model_sigma,
+    found = edge_map.true(log) if truth else edge_map.felt(log, detector, model)
+    made = edge_map.edge_map(log, found.edges, lag_s=found.lag_s, sigma_s=sigma or found.sigma_s,
                              speed_mps=speed or file.condition.speed_mps, heading_deg=heading)
     content = edge_map.geojson(made.points, made.platforms, {
         "flight": flight.name, "detector": "truth" if truth else detector, "position": made.position,

@@ -11,11 +11,10 @@ from typing import Any
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from airtouch import logs
 from airtouch.cli.flights import need_flights
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
-from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation import crossval, dataset, evaluate
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
@@ -116,17 +115,10 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
 
 def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
     """The logs that can be trained on with `spare` sensors missing, and how many could not."""
-    chosen, failures = [], 0
-    for file in dataset.collect(paths or (need_flights(),)):
-        try:
-            log = logs.read(file.path)
-            evaluate.check(log, spare)
-            if evaluate.truth(log) is None:
-                raise AirTouchError(f"{file.path}: no down range in this log, so no truth to train on")
-            chosen.append(log)
-        except AirTouchError as error:
-            click.echo(f"airtouch: {error}", err=True)
-            failures += 1
+    found, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    chosen, failures = list(found.values()), len(left_out)
     if not chosen:
         raise AirTouchError("no flight that can be trained on")
     return chosen, failures

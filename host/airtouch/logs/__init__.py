@@ -4,9 +4,9 @@ from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.files import read, write
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
-from airtouch.logs.quality import Quality, check
+from airtouch.logs.quality import Quality, check, summary
 from airtouch.logs.resample import resample
 from airtouch.logs.segments import Segment, segments
 
 __all__ = ["Edge", "FlightLog", "Quality", "Segment", "airborne", "check", "read", "resample", "segments",
-           "true_edges", "write"]
+           "summary", "true_edges", "write"]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, shown
 from airtouch.logs.channel_faults import duplicates, saturated, spikes, stuck
 from airtouch.logs.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
@@ -13,6 +13,9 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import Segment, segments
 
+#: group of channels -> the column that tells whether it is there
+GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
+          "position": "x_m", "velocity": "vx_mps", "attitude": "roll_rad", "rpm": "rpm_1"}
 SHORT_FLIGHT_S = 5.0  #: less than this in the air is worth a warning
 
 
@@ -45,6 +48,19 @@ class Quality:
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return asdict(self) | {"lost": self.lost}
+
+
+def summary(log: FlightLog) -> dict[str, Any]:
+    """One flight in a row of plain data: format, length, rate, groups of channels, true edges, warnings."""
+    report = check(log)
+    return {
+        "source": log.source, "format": report.format, "samples": report.samples,
+        "duration_s": report.duration_s, "rate_hz": report.rate_hz,
+        "channels": [name for name, column in GROUPS.items() if log.has(column)],
+        "entries": sum(edge.kind == "entry" for edge in report.edges),
+        "exits": sum(edge.kind == "exit" for edge in report.edges),
+        "condition": shown(str(log.meta.get("condition", ""))), "warnings": len(report.warnings),
+    }
 
 
 def check(log: FlightLog) -> Quality:

@@ -89,14 +89,17 @@ def crossval(
     return scores, entries, left_out
 
 
-def readable_flights(files: Sequence[FlightFile],
-                     spare: int = 0) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
-    """Logs by path, and those that cannot be used with the reason; `spare` sensors may be missing."""
+def readable_flights(files: Sequence[FlightFile], spare: int = 0,
+                     scored: bool = True) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
+    """Logs by path, and those that cannot be used with the reason; `spare` sensors may be missing.
+
+    scored: they are to be scored in metres too, so their speed must be known.
+    """
     logs: dict[Path, FlightLog] = {}
     left_out = []
     for file in files:
         try:
-            log = evaluate.read_flight(file, spare)
+            log = evaluate.read_flight(file, spare) if scored else evaluate.read_usable(file, spare)
             if evaluate.truth(log) is None:
                 raise AirTouchError(f"{file.path}: no down range in this log, so no true edges to train on")
             logs[file.path] = log

@@ -8,17 +8,21 @@ its outline. Everything is in metres, in the frame of the positions given.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, mapping
 
+from airtouch.detector import registry
+from airtouch.detector.evaluation import evaluate
 from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
-from airtouch.logs import Edge
+from airtouch.logs import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 
 ASSUMED_SIGMA_S = 0.1  #: timing error of a detection where the model does not state one
+TRUE_SIGMA_S = 0.01  #: timing error of an edge of the down range: a sample
 PERIOD_S = 0.01  #: between two samples, where nothing else is said
 MIN_SPEED_MPS = 0.05  #: below it a timing error is not turned into less than this much distance
 
@@ -58,6 +62,33 @@ class EdgeMap:
     position: str
     lag_s: float
     sigma_s: float
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Edges of a flight, by how much they are late, and 1-sigma of their time, s."""
+
+    edges: Sequence[Edge | Detection]
+    lag_s: float
+    sigma_s: float
+
+
+def true(log: FlightLog) -> Timed:
+    """The edges of the down range."""
+    return Timed(true_edges(log), 0.0, TRUE_SIGMA_S)
+
+
+def felt(log: FlightLog, detector: str = "best", model: Path | None = None) -> Timed:
+    """The edges that a detector feels, with the shipped model for None.
+
+    Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
+    """
+    module = registry.get(detector)
+    evaluate.check(log, evaluate.spare_of(module))
+    trained = module.load(model)
+    trained = module.model_for(trained, log) if hasattr(module, "model_for") else trained
+    return Timed(module.run(log, trained).edges, module.lag_s(trained),
+                 getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
 
 
 def edge_map(log: FlightLog, found: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,

@@ -34,11 +34,17 @@ class Result:
 
 def read_flight(file: FlightFile, spare: int = 0) -> FlightLog:
     """A log that can be scored; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
-    log = logs.read(file.path)
-    check(log, spare)
+    log = read_usable(file, spare)
     if truth(log) and file.condition.speed_mps is None:
         raise AirTouchError(f"{file.path}: speed unknown, so errors in metres are too: "
                             "give --speed, or speed_mps in a manifest.csv beside the flight")
+    return log
+
+
+def read_usable(file: FlightFile, spare: int = 0) -> FlightLog:
+    """A log that a detector can use; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
+    log = logs.read(file.path)
+    check(log, spare)
     return log
 
 

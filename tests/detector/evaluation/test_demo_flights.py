@@ -1,0 +1,36 @@
+"""The demo's flights are split by fold, held-out flights are in no way trained on, and conditions stay in."""
+
+from pathlib import Path
+
+import pytest
+
+from airtouch.detector.evaluation import demo_flights
+from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.errors import AirTouchError
+
+
+def files(folds):
+    return [FlightFile(Path(f"{i}.csv"), Condition(fold=fold)) for i, fold in enumerate(folds)]
+
+
+def test_whole_folds_are_held_out():
+    train, test = demo_flights.split(files([0, 1, 2, 3, 4, 0, 1, 2, 3, 4]))
+    assert {f.condition.fold for f in test} == {0, 4} and {f.condition.fold for f in train} == {1, 2, 3}
+    assert len(train) + len(test) == 10
+
+
+def test_flights_without_folds_are_held_out_by_place():
+    train, test = demo_flights.split(files([None] * 9))
+    assert [f.path.stem for f in test] == ["0", "4", "8"]
+    assert [f.path.stem for f in train] == ["1", "2", "3", "5", "6", "7"]
+
+
+def test_a_choice_is_spread_over_the_whole_list():
+    assert demo_flights.spread(list(range(100)), 4) == [0, 25, 50, 75]
+    assert demo_flights.spread([1, 2], 4) == [1, 2]
+
+
+def test_too_few_flights_are_told(monkeypatch, tmp_path):
+    monkeypatch.setattr(demo_flights.dataset, "collect", lambda folders, speed: files([0, 1, 2]))
+    with pytest.raises(AirTouchError, match="3 flights are too few"):
+        demo_flights.choose(tmp_path, tmp_path / "simulated")
