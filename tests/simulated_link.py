@@ -181,7 +181,7 @@ class SimulatedDrone(Server):
     def tick(self) -> None:
         """10 ms pass."""
         with self._turn:
-            self._tick(lambda _: None)
+            self.step(lambda _: None)
 
     def send(self, packet: Packet, peer: "Link") -> None:
         """To one of the links."""

@@ -25,7 +25,7 @@ def retraced(legs):
 
 @pytest.mark.parametrize("name", [*mission.names(), "zigzag", "l-shape", "paper-mixed", "circle"])
 def test_legs_are_the_path_that_the_simulator_flies(name):
-    path = mission._folder() / f"{name}.toml"
+    path = mission.shipped_folder() / f"{name}.toml"
     scene = scenario.load(path) if path.is_file() else scenario.load(name)
     rows = scenario.draw_flight(scene, 3, 2).setpoints
     legs = mission.load(name, 3, 2).legs
@@ -73,7 +73,8 @@ def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
 @pytest.mark.parametrize("name", ["sweep", "there-and-back"])
 def test_the_shipped_detector_feels_the_edges_of_a_first_flight(name):
     """Six virtual flights, drawn anew: at most every fifth edge is missed (of 20 flights: results.md)."""
-    flown = [log.with_columns({}, speed_mps=0.3) for log in at.simulate(mission._folder() / f"{name}.toml", 6, seed=7)]
+    path = mission.shipped_folder() / f"{name}.toml"
+    flown = [log.with_columns({}, speed_mps=0.3) for log in at.simulate(path, 6, seed=7)]
     score = at.evaluate(flown)
     assert score["edges"] == 6 * {"sweep": 2, "there-and-back": 4}[name]
     assert score["missed"] <= 0.2

@@ -66,22 +66,22 @@ def test_sensors_get_the_chips_own_units():
     readings[at.ACC + 2], readings[at.ACC + 5] = 9.81, 1e4
     readings[at.GYRO] = np.deg2rad(100.0)
     readings[at.RANGE], readings[at.FLOW:at.FLOW + 2] = 0.8, (3.4, -2.0)
-    values = struct.unpack("<12hH2h", flight._block(readings, rest))
+    values = struct.unpack("<12hH2h", flight.sensor_block(readings, rest))
     assert values[0] == round(100.0 / (4000 / 65536)) and values[8] == round(65536 / 48) and values[11] == 32767
     assert values[12] == 800 and values[13:] == (2, -3) and rest == pytest.approx([0.4, 0.0])
     readings[at.RANGE] = np.nan
-    assert struct.unpack("<12hH2h", flight._block(readings, rest))[12] == flight.NO_RANGE_MM
+    assert struct.unpack("<12hH2h", flight.sensor_block(readings, rest))[12] == flight.NO_RANGE_MM
     assert rest == pytest.approx([-0.2, 0.0]), "parts of counts are owed"
 
 
 def test_set_points_are_packets_in_the_drones_own_axes():
     row = np.zeros(setpoint.SETPOINT_SIZE)
     row[setpoint.MOTORS], row[setpoint.VX], row[setpoint.Z], row[setpoint.YAW] = 1.0, 0.3, 0.8, np.pi / 2
-    kind, length, header, order, ahead, left, rate, height = struct.unpack("<BBBBffff", flight._order(row))
+    kind, length, header, order, ahead, left, rate, height = struct.unpack("<BBBBffff", flight.set_point_packet(row))
     assert (kind, length, header >> 4, header & 3, order) == (0, 18, 7, 0, 5)
     assert (ahead, left, rate, height) == pytest.approx((0.0, -0.3, 0.0, 0.8), abs=1e-6)
     row[setpoint.MOTORS] = 0.0
-    assert flight._order(row)[3:] == b"\0"
+    assert flight.set_point_packet(row)[3:] == b"\0"
 
 
 def test_a_command_that_differs_is_counted():

@@ -12,8 +12,8 @@ from airtouch.detector.evaluation.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
-from airtouch.gap.candidates import _unsteady
-from airtouch.gap.diagnose import _with_random_part
+from airtouch.gap.candidates import random_part_of
+from airtouch.gap.diagnose import with_random_part
 from airtouch.gap.result import Found, Quantity
 from airtouch.logs.flight_log import PWM
 from airtouch.simulation import batch, effects, replay, scenario
@@ -120,10 +120,11 @@ def test_an_unsteady_effect_is_reported_so_that_it_can_be_switched_on(mean):
     def force(values):
         return replay.wrench_of(Active(effects.get("ground_effect"), values), signals, 3)
 
-    part = replace(_unsteady("ground_effect"), values={**_unsteady("ground_effect").values, "turbulence": 0.25})
+    part = random_part_of("ground_effect")
+    part = replace(part, values={**part.values, "turbulence": 0.25})
     named = Found("ground_effect", {k: Quantity(v, 0.0, 0.1) for k, v in {**part.values, "strength": mean,
                                                                           "turbulence": 0.0}.items()})
-    made = {k: q.value for k, q in _with_random_part(named, part).parameters.items()}
+    made = {k: q.value for k, q in with_random_part(named, part).parameters.items()}
     fitted = force(part.values) - force({**part.values, "turbulence": 0.0})
     assert np.abs(fitted).max() > 1e-4
     assert force(made) - force({**made, "turbulence": 0.0}) == pytest.approx(fitted, abs=1e-9)

@@ -41,9 +41,9 @@ def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_be
     rng = np.random.default_rng(1)
     n, groups = 4000, np.repeat([3, 7], 2000)
     power = np.where(groups == 3, 2.5, 0.4) * rng.exponential(size=n)
-    free, level = generic._factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, *generic.LOOSE)
+    free, level = generic.power_factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, *generic.LOOSE)
     np.testing.assert_allclose(free[[3, 7]], np.log([2.5, 0.4]), atol=4.0 / np.sqrt(2000))
-    still, at_rest = generic._factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, np.zeros(generic.GROUPS),
+    still, at_rest = generic.power_factors(power, np.full(n, 1e6), np.full(n, 1e6), groups, np.zeros(generic.GROUPS),
                                       np.full(generic.GROUPS, 1e-6))
     np.testing.assert_allclose(still[[3, 7]], 0.0, atol=1e-3)
     expected = [0.5 * 2000 * (f - 1.0 - np.log(f)) for f in (2.5, 0.4)]  # Kullback-Leibler, half overlapping blocks
@@ -51,9 +51,9 @@ def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_be
 
 
 def test_what_may_be_there_gains_half_and_costs_log_two_at_most():
-    assert generic._perhaps(0.0) == 0.0
-    np.testing.assert_allclose(generic._perhaps(-50.0), -np.log(2.0))
-    np.testing.assert_allclose(generic._perhaps(50.0), 50.0 - np.log(2.0))
+    assert generic.gain_at_even_odds(0.0) == 0.0
+    np.testing.assert_allclose(generic.gain_at_even_odds(-50.0), -np.log(2.0))
+    np.testing.assert_allclose(generic.gain_at_even_odds(50.0), 50.0 - np.log(2.0))
 
 
 def test_columns_are_the_signals_that_they_are_named_after():
@@ -75,7 +75,7 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
     """Its coefficient is force per mass; with the effect in the registry it is named instead."""
     one = flown(1, 45, {"sideways": {"push": PUSH}})
     data = Data(study, one)
-    found = [generic._chosen(generic._Half(data, p, ()), 1, study.usual)[generic.BASIS.index("vx")]
+    found = [generic.coefficients(generic.HalfResiduals(data, p, ()), 1, study.usual)[generic.BASIS.index("vx")]
              for p in halves(data)]
     np.testing.assert_allclose(found, PUSH / VEHICLE.mass_kg, rtol=0.35)
     assert gain_of(study, one) > 30.0

@@ -10,7 +10,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap import calibrate, flight, random_effects, vibration_lines
 from airtouch.gap.candidates import every, terms
 from airtouch.gap.data import Data
-from airtouch.gap.diagnose import _effects
+from airtouch.gap.diagnose import chosen_effects
 from airtouch.gap.select import select
 from airtouch.gap.spectra import AIR, REST, frequencies
 from airtouch.simulation.batch import flights as simulated
@@ -135,7 +135,7 @@ def test_power_of_lines_is_that_of_simulated_flights(study_apart, amplitude):
 def named(study, flights):
     data = Data(study, flights)
     found = select(data, every())
-    return [s.name for s in found.steps], {e.name: e.parameters for e in _effects(data, found)}, data
+    return [s.name for s in found.steps], {e.name: e.parameters for e in chosen_effects(data, found)}, data
 
 
 @pytest.mark.parametrize(("amplitude", "seed"), [(0.3, 41), (1.0, 42), (3.0, 43)])

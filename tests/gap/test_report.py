@@ -308,4 +308,4 @@ def test_advised_commands_can_be_given():
 
 def test_the_page_shows_the_docs_own_effect():
     page = (Path(airtouch.__file__).parents[1] / "docs/effects.md").read_text()
-    assert gap_report._example() in page
+    assert gap_report.example_effect() in page

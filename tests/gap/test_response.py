@@ -90,7 +90,7 @@ def test_turning_under_an_outside_torque_is_the_closed_loop_s():
     c = loop_model.Controller(0.01, 6.0, 0.4)
     f = np.geomspace(0.8, 20.0, 12)
     s = 2j * np.pi * f
-    plant, *_, whole = loop_model._parts(c, row, "roll", f)
+    plant, *_, whole = loop_model.loop_parts(c, row, "roll", f)
     strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     turning = loop_model.turning_per_command(c, row, "roll", strengths, f)
     np.testing.assert_allclose(turning, -s / whole, rtol=1e-9)

@@ -4,7 +4,7 @@ import pytest
 
 from airtouch.gap import candidates
 from airtouch.gap.data import Data
-from airtouch.gap.diagnose import _best_shape
+from airtouch.gap.diagnose import best_shape
 from airtouch.gap.problem import whole_of
 from gap_flights import flown
 
@@ -13,5 +13,5 @@ from gap_flights import flown
 def test_the_shape_that_was_flown_is_found_whichever_was_taken_before(study, fade):
     data = Data(study, flown(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
     for taken in candidates.terms("ground_effect"):
-        found = _best_shape(data, whole_of(data), [taken], None).terms[0].values
+        found = best_shape(data, whole_of(data), [taken], None).terms[0].values
         assert found["fade"] == fade

@@ -73,7 +73,7 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     row, changed = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
     seen = spectrum(effects)
     for i, axis in enumerate(loop_model.AXES):
-        strengths, _, _ = twin._fit(loop_model.firmware(row, axis), row, axis, nominal[:, i])
+        strengths, _, _ = twin.noise_strengths(loop_model.firmware(row, axis), row, axis, nominal[:, i])
         f, fine = twin.frequencies(), twin.fine_frequencies()
         expected = twin.through_window(
             strengths @ loop_model.spectra(loop_model.firmware(changed, axis), changed, axis, fine))

@@ -278,8 +278,8 @@ def test_damaged_packed_data_in_the_public_flights_are_no_traceback(tmp_path):
     """A right gzip header before damaged data raises zlib.error, which is no ValueError."""
     path = tmp_path / "f.csv.gz"
     path.write_bytes(gzip.compress(b"1,2\n" * 100)[:10] + b"\xff" * 40)
-    assert not public._has(path, "0")
-    assert public._from_folder(tmp_path)("f.csv.gz", "0") is None
+    assert not public.has_file(path, "0")
+    assert public.from_folder(tmp_path)("f.csv.gz", "0") is None
 
 
 def test_recovery_leaves_out_rows_without_a_time_and_keeps_a_file_without_any(tmp_path):

@@ -148,7 +148,7 @@ def test_the_flight_is_recorded(tmp_path):
     path = tmp_path / "flight.csv"
     server = Server("hover", port=0, record=path)
     for _ in range(150):
-        server._tick(lambda _: None)
+        server.step(lambda _: None)
     server.close()
     server.recorder.write()
     log = logs.read(path)

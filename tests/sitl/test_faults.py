@@ -59,7 +59,7 @@ def flying(bench, *faults, detector=2, **settings):
 
     def pass_(seconds):
         for _ in range(round(100 * seconds)):
-            craft.server._tick(lambda _: None)
+            craft.server.step(lambda _: None)
 
     assert craft.high_level("<BBff?f", 7, 0, 0.5, 0.0, True, 1.5) == 0
     pass_(2.5)

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import logs
+from airtouch import vehicle as vehicles
 from airtouch.cli import airtouch
 from airtouch.detector import best
 from airtouch.detector.evaluation.dataset import Condition, FlightFile
@@ -102,18 +103,18 @@ def test_flights_without_acceleration_train_a_detector_without(made, quick, tmp_
 
 @pytest.mark.slow
 def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(made, quick, tmp_path, monkeypatch):
-    from airtouch.cli import adapt as cli
-    from airtouch.twin import edge_fit
-    monkeypatch.setattr(cli, "ROUNDS", 1)
-    monkeypatch.setattr(cli, "BATCH", 40)
+    from airtouch.cli.progress import Bar
+    from airtouch.twin import calibrate, edge_fit
+    monkeypatch.setattr(calibrate, "ROUNDS", 1)
+    monkeypatch.setattr(calibrate, "BATCH", 40)
     flights, work = flights_of(made, 5), tmp_path / "work"
     folder = write(tmp_path / "flights", flights)
     listed = [replace(f, file=replace(f.file, path=folder / f"flight_{i}.csv.gz")) for i, f in enumerate(flights)]
 
     def courses(some):
-        scene, _, said = cli._twin(None, None, some, None, work, 0)
-        assert f"fitted to {len(some)} of them" in said
-        return scene.table["values"]["course"]["choice"]
+        twin = calibrate.of_flights([f.file.path for f in some], vehicles.load(), work, bar=Bar)
+        assert f"fitted to {len(some)} of them" in twin.what
+        return twin.scenario.table["values"]["course"]["choice"]
 
     first, refine = courses(listed[:4]), edge_fit.refine
     monkeypatch.setattr(edge_fit, "refine", lambda *_, **__: pytest.fail("fitted again"))
@@ -142,7 +143,7 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     monkeypatch.setattr(adapt, "_scores", lambda path, flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
     flights = flights_of(made, 8)
-    held, half = adapt._hold_out(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
+    held, half = adapt.held_out_scores(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
     assert sorted(held) == sorted(half) == sorted(str(f.file.path) for f in flights)
     for test, train in scored:
         assert not test & train and train

@@ -64,7 +64,7 @@ def set_parameter(name: str, value: float) -> bytes:
     return crtp(PARAM, BY_NAME, b"\0" + name.replace(".", "\0").encode() + b"\0" + bytes([kind]) + raw)
 
 
-def _order(row: np.ndarray) -> bytes:
+def set_point_packet(row: np.ndarray) -> bytes:
     """The set-point packet of a mission's row: velocities about the drone's own heading, a height; or stop."""
     if row[setpoint.MOTORS] < 0.5:
         return crtp(COMMANDER, 0, bytes([STOP]))
@@ -73,7 +73,7 @@ def _order(row: np.ndarray) -> bytes:
     return crtp(COMMANDER, 0, struct.pack("<Bffff", HOVER, ahead, left, 0.0, row[setpoint.Z]))
 
 
-def _block(readings: np.ndarray, rest: np.ndarray) -> bytes:
+def sensor_block(readings: np.ndarray, rest: np.ndarray) -> bytes:
     """What the board's sensors are given. rest (2,): parts of counts of the flow that are still owed."""
     gyro = np.clip(np.round(readings[at.GYRO:at.GYRO + 6] / GYRO_LSB), -32768, 32767).astype("<i2")
     acc = np.clip(np.round(readings[at.ACC:at.ACC + 6] / ACC_LSB), -32768, 32767).astype("<i2")
@@ -120,7 +120,7 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
                 break
             if any(begin <= (step - wait) * at.STEP_S < end for begin, end in blind_s):
                 plant.readings[at.RANGE] = np.nan
-            board.say("I", _block(plant.readings, rest))
+            board.say("I", sensor_block(plant.readings, rest))
             now = (step - wait) * at.STEP_S
             if step % loop.LOG_STEPS == 0:
                 state = struct.pack("<BBBff", BATTERY_STATE, 9, 0, plant.readings[at.VOLTS], 0.0)
@@ -129,7 +129,7 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
                     for name, value in (parameters or {}).items():
                         board.say("L", set_parameter(name, value))
                 if step >= wait:
-                    board.say("L", _order(plan.setpoints[(step - wait) // loop.LOG_STEPS]))
+                    board.say("L", set_point_packet(plan.setpoints[(step - wait) // loop.LOG_STEPS]))
                 rows.append([now, *plant.place, *motors, *(values[n] for n in ESTIMATE),
                              values["range.zrange"] / 1000.0, plant.top])
             if values["airtouch.edges"] > edges:

@@ -13,8 +13,6 @@ from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
 
-ROUNDS, BATCH = 8, 160  #: of a twin that is fitted on the way
-BARE = "paper-mixed"  #: scenario where no twin can be fitted
 MORE = 5  #: flights that the outlook is given for
 
 
@@ -53,9 +51,11 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     more over a platform are held out in turn to say what to expect. What is done is kept beside --out, in a
     folder that ends in .adapt: the same command goes on after a stop.
     """
+    from airtouch import vehicle as vehicles
     from airtouch.detector import best
     from airtouch.detector.evaluation import dataset, summary
-    from airtouch.twin import adapt
+    from airtouch.detector.shared import sensors
+    from airtouch.twin import adapt, calibrate
 
     need("train", "training")
     started = time.monotonic()
@@ -73,39 +73,18 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
                             "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
-    scene, craft, where = _twin(twin_folder, vehicle, labelled, speed, work, seed)
-    click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; {where}")
+    twin = calibrate.of_folder(twin_folder) if twin_folder else calibrate.of_flights(
+        [f.file.path for f in labelled if not sensors.missing(f.log)], vehicles.load(vehicle) if vehicle else
+        vehicles.load(), work, speed_mps=speed, seed=seed, bar=Bar)
+    click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
+               f"{twin.what}")
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     with Stages() as stages:
-        adapted = adapt.adapt(usable, scene, craft, work, start=start, seed=seed, hold_out=hold_out,
+        adapted = adapt.adapt(usable, twin.scenario, twin.vehicle, work, start=start, seed=seed, hold_out=hold_out,
                               withhold=withhold_range, progress=stages, command=typed)
     adapted.model.save(out, force)
     _say(adapted, adapt, summary, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
-
-
-def _twin(folder: Path | None, vehicle: str | None, flights: Any, speed: float | None, work: Path,
-          seed: int) -> tuple[Any, Any, str]:
-    """(scenario, vehicle, in words) of a twin: its folder's, one fitted now, or the simulator as it is."""
-    from airtouch import vehicle as vehicles
-    from airtouch.detector.shared import sensors
-    from airtouch.simulation import scenario
-    from airtouch.twin import calibrate, files
-    from airtouch.twin import flights as recordings
-
-    if folder is not None:
-        return (scenario.load(folder / files.SCENARIO), vehicles.load(str(folder / files.VEHICLE)), f"twin of {folder}")
-    craft = vehicles.load(vehicle) if vehicle else vehicles.load()
-    paths = [f.file.path for f in flights if not sensors.missing(f.log)]
-    if len(paths) < recordings.FEWEST:
-        return (scenario.load(BARE), craft, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
-                f"acceleration, gyro, motors and down range, here are {len(paths)}; simulator as it is")
-    with Bar("reading again") as bar:
-        recorded = recordings.recorded(paths, speed_mps=speed, progress=bar)
-    kept = work / f"twin_{calibrate.key(recorded, craft, flights=BATCH, seed=seed)}"
-    calibrate.calibrate(recorded, craft, kept, rounds=ROUNDS, flights=BATCH, seed=seed, bar=Bar)
-    return (scenario.load(kept / files.SCENARIO), vehicles.load(str(kept / files.VEHICLE)),
-            f"twin fitted to {len(recorded.courses)} of them")
 
 
 def _say(found: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:

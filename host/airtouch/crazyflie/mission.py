@@ -64,7 +64,7 @@ class Mission:
 
 def names() -> list[str]:
     """The missions that come with the package."""
-    return sorted(f.name[:-5] for f in _folder().iterdir() if f.name.endswith(".toml"))
+    return sorted(f.name[:-5] for f in shipped_folder().iterdir() if f.name.endswith(".toml"))
 
 
 def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
@@ -84,7 +84,7 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
 def scene_of(name_or_path: str | Path) -> scenario.Scenario:
     """The world and mission of that name (ready ones and scenarios) or .toml file. AirTouchError names what is near."""
     if str(name_or_path) in names():
-        text = (_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
+        text = (shipped_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
         return scenario.parse(text, str(name_or_path))
     if Path(name_or_path).suffix != ".toml" and str(name_or_path) not in scenario.names():
         near = nearest(str(name_or_path), [*names(), *scenario.names()])
@@ -151,5 +151,6 @@ def _speeds(legs: Sequence[Leg]) -> list[float]:
             for a, b in zip(before, legs, strict=True)]
 
 
-def _folder():
+def shipped_folder():
+    """The folder of the missions that come with the package."""
     return resources.files("airtouch") / "crazyflie" / "missions"

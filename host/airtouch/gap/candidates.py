@@ -189,7 +189,7 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
                                               if name not in without}
     for name in UNSTEADY:
         if name in out:
-            shaking: list[tuple[Term, ...]] = [(*v, _unsteady(name)) for v in out[name]]
+            shaking: list[tuple[Term, ...]] = [(*v, random_part_of(name)) for v in out[name]]
             out[name] = shaking if name in SHAKES else out[name] + shaking
     for name in COMPANIONS:
         if name in out and COMPANIONS[name] not in without:
@@ -203,10 +203,10 @@ def gated(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
     without = set(without)
     out: dict[str, list[tuple[Term, ...]]] = {name: [(t,) for t in terms(name)] for name in GATED
                                               if name in EFFECTS and name not in without}
-    return {n: [(*t, _unsteady(n)) for t in v] if n in UNSTEADY else v for n, v in out.items()}
+    return {n: [(*t, random_part_of(n)) for t in v] if n in UNSTEADY else v for n, v in out.items()}
 
 
-def _unsteady(name: str) -> Term:
+def random_part_of(name: str) -> Term:
     """The random part of an effect, where and when its mean part acts."""
     effect = get(name)
     neutral = {"turbulence": 0.0, **({"width": 0.0} if name == "downwash" else {})}

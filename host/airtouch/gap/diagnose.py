@@ -167,14 +167,14 @@ def _verdict(selection: Selection, gap: Shrink, simulated: bool) -> str:
     return "none" if selection.chosen is None else "effect"
 
 
-def _effects(data: Data, selection: Selection) -> list[Found]:
+def chosen_effects(data: Data, selection: Selection) -> list[Found]:
     """The effects chosen, fitted anew on all the data, with 90 % intervals."""
     judged = selection.whole
     if selection.chosen is None or judged is None:
         return []
     others = [t for t in judged.terms if t.kind != CLOCK]
     whole = whole_of(data)
-    fitted = (_best_shape(data, whole, others, _middle(judged)) if others
+    fitted = (best_shape(data, whole, others, _middle(judged)) if others
               else Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0))
     chosen = {t.name for t in selection.chosen.terms}
     out, place = [], 0
@@ -185,7 +185,7 @@ def _effects(data: Data, selection: Selection) -> list[Found]:
         if t.name not in chosen:
             continue
         if t.companion:
-            out = [_with_random_part(e, t) for e in out]
+            out = [with_random_part(e, t) for e in out]
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
         known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
@@ -199,7 +199,7 @@ def _effects(data: Data, selection: Selection) -> list[Found]:
     return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
 
 
-def _best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray | None) -> Fit:
+def best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray | None) -> Fit:
     """Effects fitted to all the data, in the shape that gains most; another than that found must earn its choice."""
     best = fit(data, whole, terms, start)
     for i, term in enumerate(terms):
@@ -212,7 +212,7 @@ def _best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarra
     return best
 
 
-def _with_random_part(effect: Found, part: Term) -> Found:
+def with_random_part(effect: Found, part: Term) -> Found:
     """An effect with its random part as fitted, so that it can be switched on as it stands.
 
     The part was fitted at its own strength (1, of the published curve), while the effect has one strength for
@@ -259,7 +259,7 @@ def _ranking(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranke
     parts = selection.parts
     overall = shrink_of(data, parts, selection.chosen, cells)
     verdict = _verdict(selection, overall, data.study.simulated)
-    effects = _effects(data, selection) if verdict == "effect" else []
+    effects = chosen_effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
     chance = agreeing(probabilities(selection, verdict == "none"), answer)
     out = []

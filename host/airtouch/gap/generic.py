@@ -73,7 +73,7 @@ class _Cell:
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 
 
-class _Half:
+class HalfResiduals:
     """What a hypothesis leaves of a half: values, the power that they should have, and the basis there.
 
     cells: every channel of every flight; what nominal flights may have of a column, each flight has for itself.
@@ -130,7 +130,7 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:
     return out
 
 
-def _chosen(half: _Half, channel: int, usual: Usual) -> np.ndarray:
+def coefficients(half: HalfResiduals, channel: int, usual: Usual) -> np.ndarray:
     """Coefficients (columns,) that a channel asks for, one column after another; zero for the others."""
     cells = [c for c in half.cells if c.channel == channel]
     n, found = len(BASIS), np.zeros(len(BASIS))
@@ -162,8 +162,8 @@ def _gain(told: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
     return 0.5 * float(right[free] @ np.linalg.solve(told[np.ix_(free, free)], right[free]))
 
 
-def _factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.ndarray, middle: np.ndarray,
-             spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def power_factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.ndarray, middle: np.ndarray,
+                  spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log likelihood there."""
     out = middle.copy()
     count = np.bincount(groups, minlength=GROUPS)
@@ -188,36 +188,36 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     nothing = np.zeros(len(BASIS))
     linear = power = 0.0
     for train, test in ((0, 1), (1, 0)):
-        a, b = (_Half(data, parts[k], terms[train]) for k in (train, test))
+        a, b = (HalfResiduals(data, parts[k], terms[train]) for k in (train, test))
         left = [h.values.copy() for h in (a, b)]
         for channel in range(CHANNELS):
-            found = _chosen(a, channel, usual)
+            found = coefficients(a, channel, usual)
             gained = 0.0
             for k, h in enumerate((a, b)):
                 for cell in (c for c in h.cells if c.channel == channel):
                     left[k][cell.own], level = h.without(cell, found, usual)
                     if h is b and found.any():
                         gained += level - h.without(cell, nothing, usual)[1]
-            linear += float(_perhaps(gained)) if found.any() else 0.0
+            linear += float(gain_at_even_odds(gained)) if found.any() else 0.0
         one, two = (h.powers(x) for x, h in zip(left, (a, b), strict=True))
         middle, spread = usual.power
-        _, usually = _factors(*one, middle, spread)
-        found, freely = _factors(*one, middle, LOOSE[1])
+        _, usually = power_factors(*one, middle, spread)
+        found, freely = power_factors(*one, middle, LOOSE[1])
         used = freely - usually > CHANCE
         used &= found > middle  # quieter than nominal flights, or than its data sheet, is no gap
-        gained = _factors(*two, found, spread)[1] - _factors(*two, middle, spread)[1]
-        power += float(_perhaps(gained[used]).sum())
+        gained = power_factors(*two, found, spread)[1] - power_factors(*two, middle, spread)[1]
+        power += float(gain_at_even_odds(gained[used]).sum())
     return linear, power
 
 
-def _perhaps(gain: np.ndarray | float) -> np.ndarray:
+def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
     """Log likelihood gained by something that is there with probability one half."""
     return np.logaddexp(gain, 0.0) - np.log(2.0)
 
 
 def usual_of(data: Data) -> Usual:
     """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
-    halves = [_Half(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
+    halves = [HalfResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
     n = len(halves)
     if n < 2:
         return nothing_usual()
@@ -236,7 +236,7 @@ def usual_of(data: Data) -> Usual:
         for cell in h.cells:
             left[cell.own] = h.without(cell, np.zeros(len(BASIS)), usual)[0]
         e, nu, tail, groups = h.powers(left)
-        log_power[i] = _factors(e, nu, tail, groups, *LOOSE)[0]
+        log_power[i] = power_factors(e, nu, tail, groups, *LOOSE)[0]
         count = np.bincount(groups, OVERLAP_WEIGHT * nu / (nu + 3.0), GROUPS)
         chance[i, count > 0.0] = 1.0 / count[count > 0.0]
     there = np.isfinite(chance)
@@ -247,7 +247,7 @@ def usual_of(data: Data) -> Usual:
     return Usual(usual.columns, np.stack([middle, np.sqrt(own * (1.0 + 1.0 / count))]))
 
 
-def _one_by_one(half: _Half, cell: _Cell) -> tuple[np.ndarray, np.ndarray]:
+def _one_by_one(half: HalfResiduals, cell: _Cell) -> tuple[np.ndarray, np.ndarray]:
     """Coefficient and variance (columns,) of every column of a cell, each beside the offsets alone."""
     n = len(BASIS)
     left = half.without(cell, np.zeros(n), nothing_usual())[0]

@@ -146,7 +146,7 @@ def _aliases(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         return np.zeros((0, len(f)))
     folded = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
     fixed = _fixed(c, folded)
-    plant, rate, angle, velocity, whole = _parts(c, row, axis, folded)
+    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, folded)
     kick = _kick(c, fixed)
     turned = plant * -(rate + angle) / (1.0 + plant * whole)
     return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * turned
@@ -205,13 +205,15 @@ def _difference(f: np.ndarray) -> np.ndarray:
 def torque_per_command(row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N."""
     f = np.maximum(f, 0.05)
-    return 2j * np.pi * f * _parts(firmware(row, axis), row, axis, f)[0]
+    return 2j * np.pi * f * loop_parts(firmware(row, axis), row, axis, f)[0]
 
 
-def _parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Plant; the controller's rate (climb), angle (height) and velocity paths, each of the measured rate (climb)
+def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Transfer functions at frequencies f, Hz, each complex and as long as f: plant, rate path, angle path, velocity
+    path and the whole controller.
 
-    and its integrals; and all together.
+    A path is from the measured rate, through its integrals, to the command; on the height axis rate, angle and
+    velocity are climb, height and its integral.
     """
     fixed = _fixed(c, f)
     s = fixed.s
@@ -274,7 +276,7 @@ def _fixed_at(period: float, hold: float, lowpass: float, chip: float, acc: floa
 
 
 def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
-    plant, *_, whole = _parts(c, row, axis, f)
+    plant, *_, whole = loop_parts(c, row, axis, f)
     return plant * whole
 
 
@@ -283,7 +285,7 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     f = np.maximum(f, 0.05)
     if axis == "thrust":
         s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-        plant, climb, _, _, whole = _parts(c, row, axis, f)
+        plant, climb, _, _, whole = loop_parts(c, row, axis, f)
         size = 1.0 / (1.0 + plant * whole)
         climbs = np.abs(whole * size) ** 2
         sources = [np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4, np.abs(whole / s * size) ** 2]
@@ -296,7 +298,7 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration."""
     s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-    plant, rate, angle, velocity, whole = _parts(c, row, axis, f)
+    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
     size = 1.0 / (1.0 + plant * whole)
     k = c.gain * float(row["rate_gain"])
     tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])

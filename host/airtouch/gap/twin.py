@@ -345,7 +345,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     slopes = slopes_of(every, hardness, frequencies())
     power = typical(every / slopes.level(hardness))
     row = prepare(vehicle, calibration)[0][0]
-    documented = [_fit(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
+    documented = [noise_strengths(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
     found = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
     weight = 0.5 * len(every)
     by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
@@ -368,9 +368,9 @@ def typical(power: np.ndarray) -> np.ndarray:
     return found
 
 
-def _fit(controller: Controller, row: Any, axis: str, power: np.ndarray,
-         steps: int = 300) -> tuple[np.ndarray, float, Controller]:
-    """Noise strengths of highest Whittle likelihood, its negative per block, and the controller."""
+def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarray,
+                    steps: int = 300) -> tuple[np.ndarray, float, Controller]:
+    """Noise strengths of highest Whittle likelihood for a command's power, its negative a block, and the controller."""
     shapes = through_window(spectra(controller, row, axis, fine_frequencies()))
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
@@ -394,12 +394,12 @@ def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, 
         return Controller(values[0], values[1], values[2] if free == 3 else 0.0)
 
     def cost(x: np.ndarray) -> float:
-        return 8.0 * _fit(controller(x), row, axis, power, 40)[1] + 0.5 * float(x @ x)
+        return 8.0 * noise_strengths(controller(x), row, axis, power, 40)[1] + 0.5 * float(x @ x)
 
     corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in (-1.0, 0.5)]
     best = min((minimize(cost, x[0], method="Nelder-Mead", options={
         "initial_simplex": x, "maxfev": 80, "xatol": 0.03, "fatol": 0.02}) for x in corners), key=lambda r: r.fun)
-    return _fit(controller(best.x), row, axis, power)
+    return noise_strengths(controller(best.x), row, axis, power)
 
 
 def shapes() -> np.ndarray:

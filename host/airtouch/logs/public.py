@@ -37,12 +37,12 @@ def fetch(
     """
     if source is not None and not source.is_dir():
         raise AirTouchError(f"{source}: no such folder; --from takes the folder that holds the CSV files")
-    read = _from_folder(source) if source is not None else _from_network(base_url)
+    read = from_folder(source) if source is not None else _from_network(base_url)
     out.mkdir(parents=True, exist_ok=True)
     states: dict[str, list[str]] = {"present": [], "new": [], "failed": []}
     for row in registry():
         target = out / row["file"]
-        state = "present" if _has(target, row["sha256"]) else _place(read, row, target)
+        state = "present" if has_file(target, row["sha256"]) else _place(read, row, target)
         states[state].append(row["file"])
         if progress:
             progress(row["file"], state)
@@ -50,7 +50,7 @@ def fetch(
     return states
 
 
-def _has(path: Path, sha256: str) -> bool:
+def has_file(path: Path, sha256: str) -> bool:
     """Whether the file is there, can be unpacked and has this hash."""
     try:
         return hashlib.sha256(load_bytes(path)).hexdigest() == sha256
@@ -66,7 +66,8 @@ def _place(read: Callable[[str, str], bytes | None], row: dict[str, str], target
     return "new"
 
 
-def _from_folder(folder: Path) -> Callable[[str, str], bytes | None]:
+def from_folder(folder: Path) -> Callable[[str, str], bytes | None]:
+    """read(name, sha256) of files in a folder, packed or not: the content, None where it cannot be read or unpacked."""
     def read(name: str, sha256: str) -> bytes | None:
         for path in (folder / name, folder / name.removesuffix(".gz")):
             try:

@@ -60,12 +60,12 @@ def crossings(log: FlightLog) -> list[Edge]:
     drone is, y included.
     """
     plan = scenario.draw_flight(scenario.load(log.meta["scenario"]), log.meta["seed"], log.meta["flight"])
-    over = _inside(plan.world.corners[plan.world.first[0]:plan.world.first[1]], log["x_m"], log["y_m"])
+    over = inside(plan.world.corners[plan.world.first[0]:plan.world.first[1]], log["x_m"], log["y_m"])
     steps = np.flatnonzero(np.diff(over.astype(int))) + 1
     return [Edge(int(s), "entry" if over[s] else "exit", np.nan, np.nan) for s in steps]
 
 
-def _inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(n,) whether places lie in a convex polygon, corners (k, 2) anticlockwise."""
     ahead = np.roll(corners, -1, axis=0) - corners
     side = [ahead[i, 0] * (y - corners[i, 1]) - ahead[i, 1] * (x - corners[i, 0]) for i in range(len(corners))]

@@ -78,11 +78,11 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
     return template.render({
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
         "legend": gap_tables.LEGEND, "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
-        "example": _example() if own else "",
+        "example": example_effect() if own else "",
         "has_after": any(c.after is not None for c in cells), "version": __version__})
 
 
-def _example() -> str:
+def example_effect() -> str:
     """The effect file that the page shows."""
     return (resources.files("airtouch.simulation.effects") / "own_effect.py.txt").read_text("utf-8")
 

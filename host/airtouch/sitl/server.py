@@ -105,13 +105,17 @@ class Server:
                     start += behind / self.speed
                     self.slept_s += behind
                 self._receive()
-                self._tick(told)
+                self.step(told)
         finally:
             self.close()
             if self.recorder:
                 self.recorder.write()
 
-    def _tick(self, told: Callable[[str], None]) -> None:
+    def step(self, told: Callable[[str], None]) -> None:
+        """One step of PERIOD_S: packets from the client, faults that begin, the firmware, packets to the client.
+
+        told: is given what the firmware printed, line by line.
+        """
         drone = self.drone
         self._exchange(drone.now_s)
         self._begin_faults(drone.now_s)

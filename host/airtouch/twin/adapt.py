@@ -103,7 +103,7 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     twin_only = _scores(work / f"twin_{key}.json", labelled, twin)
     held, half = [], []
     if hold_out and len(labelled) >= FEWEST:
-        held, half = _hold_out(flights, labelled, flown, start, twin, work, key, seed, progress, command)
+        held, half = held_out_scores(flights, labelled, flown, start, twin, work, key, seed, progress, command)
     last = [_without_range(f) for f in flights] if withhold else flights
     name = "unlabelled" if withhold else "all"
     model = _model(work / f"{name}_{key}.npz",
@@ -154,9 +154,13 @@ def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight]
                     steps=TWIN_STEPS["shipped" if start else "scratch"] if labelled else TUNE_STEPS, **settings)
 
 
-def _hold_out(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
-              twin: BestModel, work: Path, key: str, seed: int, progress: Progress | None, command: str,
-              ) -> tuple[list[FlightScore], list[FlightScore]]:
+def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
+                    twin: BestModel, work: Path, key: str, seed: int, progress: Progress | None, command: str,
+                    ) -> tuple[list[FlightScore], list[FlightScore]]:
+    """Scores of the labelled flights, each by a model that has not seen it: of all the others, and of half of them.
+
+    The labelled flights are dealt into FOLDS parts by seed. Models and scores are kept in `work` under `key`.
+    """
     order = np.random.default_rng([seed, 7]).permutation(len(labelled))
     others = [f for f in flights if not f.labelled]
     folds = min(FOLDS, len(labelled))

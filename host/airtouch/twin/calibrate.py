@@ -1,6 +1,6 @@
 """A twin from recorded flights: the rounds of the fit, then the levers that act at edges, then the files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,8 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import vehicle as vehicles
+from airtouch.simulation import scenario
 from airtouch.simulation.batch import available_cores
+from airtouch.simulation.scenario import Scenario
 from airtouch.twin import edge_fit, files, fit
+from airtouch.twin import flights as recordings
 from airtouch.twin import levers as lever_set
 from airtouch.twin.fit import Target
 from airtouch.twin.flights import Recorded
@@ -17,6 +21,8 @@ from airtouch.twin.levers import Lever
 from airtouch.vehicle import Vehicle
 
 FIT = "fit.json"
+ROUNDS, BATCH = 8, 160  #: rounds, and flights a round, of a twin that is fitted for a detector
+BARE = "paper-mixed"  #: scenario where no twin can be fitted
 #: bar(stage) is a context whose value is called with (done, total, note)
 Bars = Callable[[str], AbstractContextManager[Callable[[int, int, str], None]]]
 
@@ -29,6 +35,39 @@ class Calibrated:
     levers: tuple[Lever, ...]
     values: np.ndarray
     history: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Twin:
+    """What flies like one drone: a scenario, a vehicle, and in words where they come from."""
+
+    scenario: Scenario
+    vehicle: Vehicle
+    what: str
+
+
+def of_folder(folder: Path) -> Twin:
+    """The twin that `airtouch twin` wrote."""
+    return Twin(scenario.load(folder / files.SCENARIO), vehicles.load(str(folder / files.VEHICLE)), f"twin of {folder}")
+
+
+def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps: float | None = None, seed: int = 0,
+               bar: Bars) -> Twin:
+    """A twin fitted to flights over a platform that have every sensor; with too few of them the simulator as it is.
+
+    work: folder under which the fit is kept; the same call does not fit again. speed_mps: commanded, of flights whose
+    manifest does not say.
+    """
+    if len(paths) < recordings.FEWEST:
+        return Twin(scenario.load(BARE), vehicle, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
+                    f"acceleration, gyro, motors and down range, here are {len(paths)}; simulator as it is")
+    with bar("reading again") as told:
+        recorded = recordings.recorded(paths, speed_mps=speed_mps,
+                                       progress=lambda done, total: told(done, total, ""))
+    out = work / f"twin_{key(recorded, vehicle, flights=BATCH, seed=seed)}"
+    calibrate(recorded, vehicle, out, rounds=ROUNDS, flights=BATCH, seed=seed, bar=bar)
+    return Twin(scenario.load(out / files.SCENARIO), vehicles.load(str(out / files.VEHICLE)),
+                f"twin fitted to {len(recorded.courses)} of them")
 
 
 def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, flights: int, seed: int, bar: Bars,

@@ -94,7 +94,7 @@ def test_landings_and_take_offs_are_in_the_crops():
     recipe = best.Recipe(batch=1, crop=512, warm_up=128, warp=0.0, mirror=0.0, phases=0.3, edge_share=0.4)
     flight = batches.flight_of(made_flight(0), recipe)
     rng = np.random.default_rng(0)
-    starts = np.array([batches._start(flight, recipe, 1.0, rng) for _ in range(2000)])
+    starts = np.array([batches.crop_start(flight, recipe, 1.0, rng) for _ in range(2000)])
     last = np.mean(starts + recipe.crop >= len(flight.x) - 1)
     first = np.mean(starts <= np.argmax(flight.airborne) - batches.AHEAD)
     assert 0.10 < last < 0.25 and 0.10 < first < 0.25

@@ -99,7 +99,7 @@ def _crop(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.
     """One crop, its time stretched by up to `warp`; before and after the flight its first and last sample repeat."""
     speed = 1.0 + recipe.warp * rng.uniform(-1, 1)
     last = len(flight.x) - 1
-    start = _start(flight, recipe, speed, rng)
+    start = crop_start(flight, recipe, speed, rng)
     t = np.clip(start + speed * np.arange(recipe.crop), 0, last)
     low = np.minimum(t.astype(int), last - 1)
     part = (t - low)[:, None].astype(np.float32)
@@ -107,7 +107,7 @@ def _crop(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.
     return x, flight.goals[np.round(t[::STRIDE]).astype(int)]
 
 
-def _start(flight: Flight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
+def crop_start(flight: Flight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
     """Where a crop starts, samples: before an edge, at take-off, at landing, or anywhere in the flight.
 
     A crop that lies anywhere seldom holds the last second of its flight, so landings are drawn by themselves.
