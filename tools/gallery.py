@@ -24,7 +24,7 @@ from airtouch.detector import baseline, best, paper
 from airtouch.detector.evaluation import edge_map
 from airtouch.detector.evaluation.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.evaluate import evaluate_flight
-from airtouch.detector.evaluation.score_report import found_within
+from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.logs.files import write_bytes
 from airtouch.report.figures import error_distribution, flight
 from airtouch.report.map_figure import edge_map as draw_map
@@ -86,7 +86,7 @@ def virtual_errors(count: int = 20) -> bytes:
         scores[name] = [evaluate_flight(FlightFile(Path(log.source),
                                                    Condition(speed_mps=log.meta["condition"]["speed"])),
                                         log, module, model).score for log in flights]
-    return error_distribution({name: found_within(some) for name, some in scores.items()})
+    return error_distribution({name: hit_curve(some) for name, some in scores.items()})
 
 
 def photograph(browser: str, page: Path, width: int, height: int) -> bytes:

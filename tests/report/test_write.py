@@ -11,7 +11,7 @@ from airtouch.detector.evaluation.evaluate import Result
 from airtouch.detector.evaluation.score import score_flight
 from airtouch.detector.evaluation.score_report import (
     ShownFlight,
-    found_within,
+    hit_curve,
     reliability_of,
     score_report,
     shown_flights,
@@ -94,15 +94,15 @@ def test_plots_are_made_of_whatever_is_there():
     bare = Trace(np.full(N, np.nan), [])
     for image in (figures.flight(flight.log, bare, None, {}), figures.reliability({"none": reliability_of([])}),
                   figures.reliability({"paper": reliability_of([flight.score])}),
-                  figures.error_distribution({"paper": found_within([flight.score])})):
+                  figures.error_distribution({"paper": hit_curve([flight.score])})):
         assert image.startswith(b"\x89PNG") and len(image) > 5000
 
 
 def test_curves_are_those_of_the_edges_and_samples():
     one, other = shown().score, shown(detections=()).score
-    found = found_within([one, other])
-    np.testing.assert_allclose(found.distance_m, [0.02])  # 0.1 s at 0.2 m/s
-    assert found.edges == 4 and found.share.tolist() == [0.25]  # one of four
+    hits = hit_curve([one, other])
+    np.testing.assert_allclose(hits.distance_m, [0.0, 0.02, 1.0])  # 0.1 s at 0.2 m/s
+    assert hits.edges == 4 and hits.share.tolist() == [0.0, 0.25, 0.25]  # one of four
     curve = reliability_of([one])
     assert curve.samples.sum() == pytest.approx(1.0)
     assert np.sum(curve.samples * np.abs(curve.stated - curve.truly)) == pytest.approx(curve.ece)

@@ -70,14 +70,14 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
         left_out += [f for f in failures if f not in left_out]
     if not results[names[0]]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
-    made = score_report({name: [r.score for r in some] for name, some in results.items()},
-                        shown_flights(results, SHOWN))
-    show.console().print(show.table(made.summaries, where))
+    scored = score_report({name: [r.score for r in some] for name, some in results.items()},
+                          shown_flights(results, SHOWN))
+    show.console().print(show.table(scored.summaries, where))
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
 
     steps.say("Report")
-    write_report(report, f"AirTouch demo: {where}", made,
+    write_report(report, f"AirTouch demo: {where}", scored,
                  parameters={f"{n}: {key}": value for n, model in models.items()
                              for key, value in registry.get(n).parameters(model).items()},
                  command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)
@@ -100,11 +100,11 @@ class Steps:
 def fit(name: str, training: Sequence[Any], options: dict[str, Any]) -> Any:
     """A detector's model, with a bar for its longest stage."""
     with click.progressbar(length=1000, label=f"  {name:8}", show_percent=True) as bar:
-        def told(stage: str, done: int, total: int, note: str) -> None:
+        def progress(stage: str, done: int, total: int, note: str) -> None:
             if stage != "features":
                 bar.update(1000 * done // total - bar.pos)
 
-        model = registry.get(name).fit(training, progress=told, **options)
+        model = registry.get(name).fit(training, progress=progress, **options)
         bar.update(1000 - bar.pos)
         return model
 
@@ -115,7 +115,7 @@ def order(name: str) -> int:
 
 
 def export(name: str, model: Any, out: Path) -> None:
-    """The model file, and the C sources made of it."""
+    """Write the model file, and the C sources generated from it, to `out`/model."""
     from airtouch.detector.shared import export as gap8
 
     folder = out / "model"

@@ -43,21 +43,21 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
         check_free(path, force)
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
-    edge_map.track(log, speed or file.condition.speed_mps)  # which may be missing, told before the detector runs
-    found = edge_map.true(log) if truth else edge_map.felt(log, detector, model)
-    made = edge_map.edge_map(log, found.edges, lag_s=found.lag_s, sigma_s=sigma or found.sigma_s,
-                             speed_mps=speed or file.condition.speed_mps, heading_deg=heading)
-    content = edge_map.geojson(made.points, made.platforms, {
-        "flight": flight.name, "detector": "truth" if truth else detector, "position": made.position,
-        "lag_s": made.lag_s, "sigma_s": made.sigma_s})
+    edge_map.track(log, speed or file.condition.speed_mps)  # raises if both are missing, before the detector runs
+    source = edge_map.true(log) if truth else edge_map.felt(log, detector, model)
+    plane = edge_map.edge_map(log, source.edges, lag_s=source.lag_s, sigma_s=sigma or source.sigma_s,
+                              speed_mps=speed or file.condition.speed_mps, heading_deg=heading)
+    content = edge_map.geojson(plane.points, plane.platforms, {
+        "flight": flight.name, "detector": "truth" if truth else detector, "position": plane.position,
+        "lag_s": plane.lag_s, "sigma_s": plane.sigma_s})
     from airtouch.report.map_figure import edge_map as draw
 
     write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)
-    write_bytes(draw(made, f"{flight.name}: {len(made.points)} edges ({made.position})"), picture, force)
-    for point in made.points:
+    write_bytes(draw(plane, f"{flight.name}: {len(plane.points)} edges ({plane.position})"), picture, force)
+    for point in plane.points:
         click.echo(f"{point.kind:5} at {point.sample * 0.01:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
                    f"1-sigma {point.sigma_m:.3f} m")
-    for number, platform in enumerate(made.platforms):
+    for number, platform in enumerate(plane.platforms):
         if platform.outline is not None:
             click.echo(f"platform {number}: {platform.outline.area:.3f} m^2, outline 1-sigma {platform.sigma_m:.3f} m")
     click.echo(f"written: {out}, {picture}")

@@ -93,11 +93,11 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 
 
-def _check_free(kept: Path, resume: bool, force: bool) -> None:
-    if kept.exists() and not (resume or force):
-        raise AirTouchError(f"{kept.parent}: holds a twin already; --resume goes on with it, --force starts anew")
+def _check_free(fit_file: Path, resume: bool, force: bool) -> None:
+    if fit_file.exists() and not (resume or force):
+        raise AirTouchError(f"{fit_file.parent}: holds a twin already; --resume goes on with it, --force starts anew")
     if force and not resume:
-        kept.unlink(missing_ok=True)
+        fit_file.unlink(missing_ok=True)
 
 
 def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:

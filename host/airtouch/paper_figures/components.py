@@ -13,7 +13,6 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID
 from airtouch.paper_figures.figure import Figure, Job
-from airtouch.paper_figures.overall import errors_m
 
 FEW = 10  #: training flights where the paper says that its loss helps most
 EPOCHS, QUICK_EPOCHS = 6, 1
@@ -68,12 +67,12 @@ def df_loss(job: Job) -> Figure:
                                   + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
     caption = (f"{_caption(job, rows)} Lambda is 0.1; the paper does not say its own. The lower half is trained on "
                f"{FEW} flights, where the paper expects most of it.")
-    errors = {what: (errors_m(some), rows[what]["edges"]) for what, (some, _) in scored.items()}
+    groups = {what: some for what, (some, _) in scored.items()}
     styles = {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
                                                else "paper"], "ls": "--" if "flights" in what else "-"}
               for what in scored}
     return Figure("The disturbance-force loss", table, caption, verdicts,
-                  lambda canvas: pictures.found_within(canvas.subplots(), errors, styles))
+                  lambda canvas: pictures.hit_curves(canvas.subplots(), groups, styles))
 
 
 def time_resolution(job: Job) -> Figure:

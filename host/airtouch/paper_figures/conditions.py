@@ -5,7 +5,6 @@ from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, simulated, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
-from airtouch.paper_figures.overall import errors_m
 
 DETECTORS = ("best", "paper")
 HEIGHTS = ("paper-4cm", "paper-9cm", "paper-12cm")
@@ -53,8 +52,7 @@ def by_height(job: Job) -> Figure:
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
-            pictures.found_within(axes, {f"{h}, {kind}": (errors_m(some), sum(len(s.edges) for s in some))
-                                         for (n, h, kind), some in groups.items() if n == name})
+            pictures.hit_curves(axes, {f"{h}, {kind}": some for (n, h, kind), some in groups.items() if n == name})
             if name == "paper":
                 axes.plot(0.05, low, "k*", ms=9)
                 axes.plot(0.05, high, "kv", ms=6)
@@ -67,18 +65,19 @@ def by_height(job: Job) -> Figure:
 
 def by_angle(job: Job) -> Figure:
     """Performance:1e: recorded flights by approach angle."""
-    found = {name: recorded.scores(job, name)[0] for name in DETECTORS}
+    scores = {name: recorded.scores(job, name)[0] for name in DETECTORS}
     table, rows = [], {}
-    for name, some in found.items():
+    for name, some in scores.items():
         for angle in sorted({s.condition.angle_deg for s in some if s.condition.angle_deg is not None}):
             group = [s for s in some if s.condition.angle_deg == angle and s.condition.height == "low"]
             if group:
                 rows[name, angle] = row = summary.summarise(group)
                 table.append(words.table_row(f"{name}, {angle:+.0f}°", row, detector=name, angle_deg=angle))
-    steep = {name: {size: summary.summarise([s for s in some if s.condition.height == "low"
-                                             and abs(s.condition.angle_deg or 0.0) == size])
-                    for size in (0.0, 10.0, 20.0)}
-             for name, some in found.items()}
+    groups = {name: {size: [s for s in some if s.condition.height == "low"
+                            and abs(s.condition.angle_deg or 0.0) == size]
+                     for size in (0.0, 10.0, 20.0)}
+              for name, some in scores.items()}
+    steep = {name: {size: summary.summarise(some) for size, some in sizes.items()} for name, sizes in groups.items()}
 
     def text(name: str) -> str:
         return f"{name}: " + ", ".join(f"{size:.0f}° {words.metres(r)} and {words.missed(r)}"
@@ -88,14 +87,11 @@ def by_angle(job: Job) -> Figure:
     verdicts = {"angle": words.judged(words.worse(steep["paper"][0.0], steep["paper"][20.0]), both),
                 "angle-sides": words.judged(*_sides(rows))}
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
-               + recorded.said(job, len(found["best"]), sum(len(s.edges) for s in found["best"])))
+               + recorded.said(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
-            pictures.found_within(axes, {
-                f"{size:.0f}°": ([e.error_m for s in found[name] for e in s.edges if e.error_m is not None
-                                  and abs(s.condition.angle_deg or 0.0) == size and s.condition.height == "low"],
-                                 row["edges"]) for size, row in steep[name].items()})
+            pictures.hit_curves(axes, {f"{size:.0f}°": some for size, some in groups[name].items()})
             axes.set_title(name)
 
     return Figure("Errors by approach angle", table, caption, verdicts, draw)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.report.figures import COLOURS, MUTED, STYLE
 
 PAPER = "#444444"  #: what the paper says, in every plot
@@ -48,14 +50,13 @@ def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper
     axes.legend(fontsize=7, frameon=False, ncols=len(errors) + 1, loc="upper left")
 
 
-def found_within(axes: Any, errors: Mapping[str, tuple[Sequence[float], int]], styles: Mapping[str, Any] | None = None,
-                 ) -> None:
-    """Share of all true edges found within a distance; misses keep a curve below 1. name -> (errors, edges)."""
-    for name, (values, edges) in errors.items():
-        steps = np.sort(np.abs(values))
-        if edges:
-            axes.step(np.r_[0.0, steps, 1.0], np.r_[0.0, np.arange(1, len(steps) + 1), len(steps)] / edges,
-                      where="post", label=f"{name} ({edges})", **((styles or {}).get(name, {})))
+def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: Mapping[str, Any] | None = None) -> None:
+    """Draw the hit curve of each group of flights, name -> its scores. styles: name -> keywords of its line."""
+    for name, some in scores.items():
+        curve = hit_curve(some)
+        if curve.edges:
+            axes.step(curve.distance_m, curve.share, where="post", label=f"{name} ({curve.edges})",
+                      **((styles or {}).get(name, {})))
     axes.set(xlim=(0, 0.4), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges")
     axes.grid(alpha=0.25)
     axes.legend(fontsize=7, frameon=False, loc="lower right")

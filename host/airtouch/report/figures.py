@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
-from airtouch.detector.evaluation.score_report import Found, Reliability
+from airtouch.detector.evaluation.score_report import HitCurve, Reliability
 from airtouch.detector.shared.channels import NAMES
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
@@ -79,16 +79,15 @@ def reliability(curves: Mapping[str, Reliability]) -> bytes:
         return png(figure)
 
 
-def error_distribution(curves: Mapping[str, Found]) -> bytes:
-    """Share of all true edges found within a distance; misses keep the curve below 1."""
+def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
+    """PNG of hit curves, one a detector: share of all true edges detected within a distance."""
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
         for name, curve in curves.items():
             if curve.edges:
-                share = np.r_[0.0, curve.share]
-                ax.step(np.r_[0.0, curve.distance_m, 1.0], np.r_[share, share[-1]],
-                        where="post", color=colour_of(name), label=f"{name}, {curve.edges} edges")
+                ax.step(curve.distance_m, curve.share, where="post", color=colour_of(name),
+                        label=f"{name}, {curve.edges} edges")
         ax.set(xlim=(0, 0.5), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges",
                title="Edges found within a distance")
         ax.grid(alpha=0.25)

@@ -39,7 +39,7 @@ def write_report(
     page = template.render(
         title=title, answers=answers, summaries=made.summaries, columns=COLUMNS, cell=cell,
         breakdowns=made.breakdowns,
-        errors=embed(figures.error_distribution(made.found)), reliability=embed(figures.reliability(made.reliability)),
+        errors=embed(figures.error_distribution(made.hits)), reliability=embed(figures.reliability(made.reliability)),
         flights=[{"name": f.score.file, "text": in_words(f.score),
                   "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in made.flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)

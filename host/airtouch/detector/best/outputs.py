@@ -30,21 +30,21 @@ class Output:
 
 def _over(over: np.ndarray, edges: Sequence[logs.Edge], recipe: Recipe) -> np.ndarray:
     """Over a platform, `over_delay` samples late."""
-    wanted = np.zeros(len(over), np.float32)
-    wanted[recipe.over_delay:] = over[:len(over) - recipe.over_delay]
-    return wanted
+    goal = np.zeros(len(over), np.float32)
+    goal[recipe.over_delay:] = over[:len(over) - recipe.over_delay]
+    return goal
 
 
 def _event(kind: str) -> Callable[[np.ndarray, Sequence[logs.Edge], Recipe], np.ndarray]:
     """Edges of this kind: bumps of height 1, `delay` samples after their edge."""
-    def goal(over: np.ndarray, edges: Sequence[logs.Edge], recipe: Recipe) -> np.ndarray:
-        wanted, t = np.zeros(len(over), np.float32), np.arange(len(over))
+    def bumps(over: np.ndarray, edges: Sequence[logs.Edge], recipe: Recipe) -> np.ndarray:
+        goal, t = np.zeros(len(over), np.float32), np.arange(len(over))
         for edge in edges:
             if edge.kind == kind:
                 bump = np.exp(-0.5 * np.square((t - edge.sample - recipe.delay) / recipe.event_sigma))
-                wanted = np.maximum(wanted, bump.astype(np.float32))
-        return wanted
-    return goal
+                goal = np.maximum(goal, bump.astype(np.float32))
+        return goal
+    return bumps
 
 
 OUTPUTS = (

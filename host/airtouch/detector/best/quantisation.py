@@ -11,24 +11,25 @@ from airtouch.detector.shared.tensorflow import convert, read_weighted
 from airtouch.reference.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
-FEW = 5  #: windows of a flight
+FEW = 5  #: windows of a flight; with fewer the two at its ends, on the ground, would be a large share
 
 
 def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESENTATIVE) -> np.ndarray:
-    """Windows (count, receptive samples, channels), evenly spaced over the flights' channels [(n, channels), ...].
+    """Windows that set the range of each activation, (count, receptive samples, channels) float32.
 
-    Where there are few of each flight none is at its ends, which lie on the ground.
+    flights: channels of each flight, [(n, channels), ...]. The windows are evenly spaced over each flight; with fewer
+    than FEW windows a flight none is at its ends, where the drone stands on the ground.
     """
     length = recipe.receptive_samples
     usable = [x for x in flights if len(x) >= length]
     each = -(-count // max(len(usable), 1))
     few = each < FEW
     ends = 0.5 / each if few else 0.0
-    found = [x[s:s + length] for x in usable
-             for s in np.linspace(ends * (len(x) - length), (1 - ends) * (len(x) - length), each).astype(int)]
+    windows = [x[s:s + length] for x in usable
+               for s in np.linspace(ends * (len(x) - length), (1 - ends) * (len(x) - length), each).astype(int)]
     if few:
-        found = [found[i * len(found) // count] for i in range(min(count, len(found)))]
-    return np.stack(found[:count]).astype(np.float32)
+        windows = [windows[i * len(windows) // count] for i in range(min(count, len(windows)))]
+    return np.stack(windows[:count]).astype(np.float32)
 
 
 def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:

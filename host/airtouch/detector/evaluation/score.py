@@ -17,11 +17,11 @@ SAMPLE_PERIOD_S = 0.01
 
 
 class TrueEdge(Protocol):
-    """What is needed of a true edge (`airtouch.logs.Edge`)."""
+    """What a score reads of a true edge (`airtouch.logs.Edge`)."""
 
     @property
     def sample(self) -> int:
-        """Index at which it is."""
+        """Index of the crossing, in samples of 10 ms."""
 
     @property
     def kind(self) -> str:
@@ -32,7 +32,7 @@ class TrueEdge(Protocol):
 class EdgeScore:
     """One true edge and the detection matched with it, if any.
 
-    error_s, error_m: positive is early, as in the paper; the lag is already taken off.
+    error_s, error_m: positive is early, as in the paper; the detector's lag is already subtracted.
     """
 
     kind: str
@@ -47,8 +47,9 @@ class EdgeScore:
 class FlightScore:
     """The score of one flight; everything in it is additive over flights.
 
-    false: samples of unmatched detections, None where the truth is not known.
-    windows: airborne samples (over and found, over, not over and found, not over).
+    false: samples of unmatched detections, None where the true edges are unknown.
+    windows: counts of airborne samples (true positives, positives, true negatives, negatives), positive being
+    over a platform.
     bins: reliability table, (10, 3). airborne_s: seconds in the air. note: what limits the result, one line.
     in_training: whether the model was trained on this flight.
     """
@@ -65,9 +66,11 @@ class FlightScore:
     in_training: bool = False
 
     def balanced_accuracy(self) -> float | None:
-        """Mean of the shares found over and not over a platform; None without both."""
-        over_found, over, rest_found, rest = self.windows
-        return 0.5 * (over_found / over + rest_found / rest) if over and rest else None
+        """Mean of sensitivity and specificity of the windows, 0 to 1; None without positives or without negatives."""
+        true_positives, positives, true_negatives, negatives = self.windows
+        if not positives or not negatives:
+            return None
+        return 0.5 * (true_positives / positives + true_negatives / negatives)
 
     def as_dict(self) -> dict:
         """The flight's entry in `per_flight` of the JSON."""
@@ -113,10 +116,10 @@ def match(true: Sequence[float], detected: Sequence[float], tolerance: float) ->
 def score_edges(
     true: Sequence[TrueEdge], detections: Sequence[Detection], speed_mps: float | None, lag_s: float = 0.0
 ) -> tuple[tuple[EdgeScore, ...], tuple[int, ...]]:
-    """(one score a true edge, samples of the unmatched detections).
+    """One score for each true edge, and the samples of the detections that match none.
 
-    The lag (s, constant, learnt in training) is taken off every detection first.
-    Kinds do not matter for the match. Without a speed, errors in metres are None.
+    The lag (s, constant, learnt in training) is subtracted from every detection first.
+    An entry may match an exit. Without a speed, errors in metres are None.
     """
     places = [d.sample - lag_s / SAMPLE_PERIOD_S for d in detections]
     pairs = dict(match([e.sample for e in true], places, TOLERANCE_S / SAMPLE_PERIOD_S))
@@ -125,18 +128,18 @@ def score_edges(
         if index not in pairs:
             scores.append(EdgeScore(edge.kind, edge.sample))
             continue
-        found = detections[pairs[index]]
+        detection = detections[pairs[index]]
         error_s = (edge.sample - places[pairs[index]]) * SAMPLE_PERIOD_S
         error_m = None if speed_mps is None else error_s * speed_mps
-        scores.append(EdgeScore(edge.kind, edge.sample, found.sample, found.kind, error_s, error_m))
+        scores.append(EdgeScore(edge.kind, edge.sample, detection.sample, detection.kind, error_s, error_m))
     used = set(pairs.values())
     return tuple(scores), tuple(d.sample for i, d in enumerate(detections) if i not in used)
 
 
 def over_platform(edges: Sequence[TrueEdge] | Sequence[Detection], samples: int) -> np.ndarray:
-    """(samples,) bool: whether the last edge so far was an entry; a first exit means over until then.
+    """Whether the drone is over a platform at each sample, (samples,) bool: the last edge so far was an entry.
 
-    An "edge" of unknown kind changes the state.
+    If the first edge is an exit, the drone was over a platform before it. An "edge" of unknown kind toggles the state.
     """
     over = np.zeros(samples, bool)
     if edges and edges[0].kind == "exit":
@@ -159,10 +162,10 @@ def score_flight(
 ) -> FlightScore:
     """The score of one flight of n samples.
 
-    true: edges, or None where the log holds no down range: then nothing can be
-    called false. airborne: (n,) bool. probability: (n,), windows count as over
-    from 0.5; a detector without probabilities is judged by the state between its
-    detections. Every detection of the log counts, on the ground too.
+    true: edges, or None where the log has no down range; then no detection is called false.
+    airborne: (n,) bool. probability: (n,) of being over a platform; 0.5 and more predicts it. A detector
+    without probabilities (all NaN) is judged by the state between its detections. Detections on the
+    ground count too.
     """
     airborne_s = float(np.count_nonzero(airborne)) * SAMPLE_PERIOD_S
     if true is None:
@@ -171,11 +174,11 @@ def score_flight(
     edges, false = score_edges(true, detections, condition.speed_mps, lag_s)
     over = over_platform(true, len(airborne))
     known = airborne & np.isfinite(probability)
-    said = probability >= 0.5
+    predicted = probability >= 0.5
     if not np.isfinite(probability).any():
-        known, said = airborne, over_platform(detections, len(airborne))
-    found, there, silent, elsewhere = (int(np.count_nonzero(known & mask))
-                                       for mask in (over & said, over, ~over & ~said, ~over))
+        known, predicted = airborne, over_platform(detections, len(airborne))
+    true_positives, positives, true_negatives, negatives = (
+        int(np.count_nonzero(known & mask)) for mask in (over & predicted, over, ~over & ~predicted, ~over))
     bins = reliability(np.where(airborne, probability, np.nan), over)
     return FlightScore(file, condition, edges, false, len(detections), airborne_s,
-                       (found, there, silent, elsewhere), bins)
+                       (true_positives, positives, true_negatives, negatives), bins)

@@ -13,12 +13,13 @@ from airtouch.detector.trace import Trace
 from airtouch.logs import Edge
 from airtouch.logs.flight_log import FlightLog
 
-MISSED_S = 3.0  #: what a missed edge counts when flights are ranked, twice the time in which a detection may serve one
+MISSED_S = 3.0  #: s, penalty of a missed edge when flights are ranked; twice `score.TOLERANCE_S`
+CURVE_END_M = 1.0  #: m, where hit curves end if no error is larger; plots show less
 
 
 @dataclass(frozen=True)
 class ShownFlight:
-    """One flight to plot: its log, what the first detector said, and the others' edges."""
+    """One flight to plot: its log, the trace and score of the first detector, and the traces of the others."""
 
     log: FlightLog
     trace: Trace
@@ -28,8 +29,12 @@ class ShownFlight:
 
 
 @dataclass(frozen=True)
-class Found:
-    """Share (n,) of all true edges found within a distance (n,), m, ascending; edges: how many there are."""
+class HitCurve:
+    """Share of all true edges that are detected within a distance: a step curve.
+
+    distance_m, share: (n+2,), ascending, from distance 0 to at least 1 m. The share holds from one distance to the
+    next. Missed edges keep it below 1. edges: number of true edges.
+    """
 
     distance_m: np.ndarray
     share: np.ndarray
@@ -55,28 +60,29 @@ class ScoreReport:
 
     summaries: Mapping[str, dict[str, Any]]
     breakdowns: Mapping[str, Mapping[str, dict[str, Any]]]
-    found: Mapping[str, Found]
+    hits: Mapping[str, HitCurve]
     reliability: Mapping[str, Reliability]
     flights: Sequence[ShownFlight]
 
 
 def score_report(scores: Mapping[str, Sequence[FlightScore]], flights: Sequence[ShownFlight] = ()) -> ScoreReport:
-    """Everything that a report on some detectors shows. scores: detector -> its flights, that of interest first."""
+    """Everything that a report on detectors shows. scores: detector -> its flights; the report is about the first."""
     first = next(iter(scores))
     return ScoreReport(
         {name: summary.summarise(some) for name, some in scores.items()},
         {f"{first} by height": summary.by_height(scores[first]),
          f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
          f"{first} by wind": summary.by_wind(scores[first])},
-        {name: found_within(some) for name, some in scores.items()},
+        {name: hit_curve(some) for name, some in scores.items()},
         {name: reliability_of(some) for name, some in scores.items()}, flights)
 
 
-def found_within(scores: Sequence[FlightScore]) -> Found:
-    """How many of all true edges are found within a distance; misses keep the share below 1."""
+def hit_curve(scores: Sequence[FlightScore]) -> HitCurve:
+    """The hit curve of some flights. An edge without a distance error (missed, or flown at unknown speed) is no hit."""
     edges = [e for s in scores for e in s.edges]
     errors = np.sort([abs(e.error_m) for e in edges if e.error_m is not None])
-    return Found(errors, np.arange(1, len(errors) + 1) / max(len(edges), 1), len(edges))
+    hits = np.r_[0, np.arange(1, len(errors) + 1), len(errors)]
+    return HitCurve(np.r_[0.0, errors, max([CURVE_END_M, *errors])], hits / max(len(edges), 1), len(edges))
 
 
 def reliability_of(scores: Sequence[FlightScore]) -> Reliability:
@@ -88,17 +94,17 @@ def reliability_of(scores: Sequence[FlightScore]) -> Reliability:
 
 
 def shown_flights(results: Mapping[str, Sequence[evaluate.Result]], most: int) -> list[ShownFlight]:
-    """At most so many flights of the first detector, from the best found to the worst, with the others' edges."""
+    """At most `most` flights of the first detector, from its best to its worst, with the other detectors' traces."""
     first, *others = results
     ranked = sorted(results[first], key=_badness)
     chosen = [ranked[i * (len(ranked) - 1) // max(most - 1, 1)] for i in range(min(most, len(ranked)))]
     traces = {name: {r.score.file: r.trace for r in results[name]} for name in others}
     return [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
-                        {name: found[r.score.file] for name, found in traces.items() if r.score.file in found})
+                        {name: of[r.score.file] for name, of in traces.items() if r.score.file in of})
             for r in chosen]
 
 
 def _badness(result: evaluate.Result) -> float:
-    """Seconds: errors of the edges, MISSED_S for each that was missed; and one for each false edge."""
+    """Rank of a flight in seconds: the edges' absolute errors, MISSED_S for each missed one, 1 s for each false one."""
     errors = [abs(e.error_s) if e.error_s is not None else MISSED_S for e in result.score.edges]
     return sum(errors) + len(result.score.false or ())
