@@ -1,4 +1,4 @@
-"""Flight logs: the schema, readers, writers, truth, segments and quality."""
+"""Flight logs: schema, readers, writers, true edges, phases of a flight, and quality checks."""
 
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.files import read, write

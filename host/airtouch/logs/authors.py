@@ -26,10 +26,10 @@ LAYOUTS = {
 
 
 def read(text: Sheet, source: str) -> FlightLog:
-    """A FlightLog from an authors' CSV.
+    """The FlightLog of an authors' CSV. The number of columns tells the layout (`LAYOUTS`).
 
-    12, 13 and 14 columns give `acc_world_*`; with the quaternion of the 13-column
-    layout `acc_*` are in the body frame, otherwise they repeat the world values and
+    12, 13 and 14 columns give `acc_world_*`. With the quaternion of the 13-column layout
+    `acc_*` are in the body frame. Otherwise they repeat the world values, and
     meta["acc_frame"] and a warning say so. Raises AirTouchError for other widths
     and for rows that are not numbers.
     """
@@ -71,10 +71,10 @@ def read(text: Sheet, source: str) -> FlightLog:
 
 
 def range_m(millimetres: np.ndarray, zero_is_invalid: bool = False) -> np.ndarray:
-    """A range in metres, NaN where it is invalid.
+    """Ranges in metres, (n,), NaN where invalid: negative, or 32767 mm and more.
 
-    0 of the down range is a surface too near to measure and stays; 0 of the
-    Multi-ranger means that the deck or the sensor did not answer.
+    A down range of 0 is valid: the surface is too near to measure. A Multi-ranger
+    value of 0 is invalid (zero_is_invalid): the deck or the sensor did not answer.
     """
     invalid = (millimetres >= INVALID_RANGE_MM) | (millimetres < 0)
     if zero_is_invalid:
@@ -92,6 +92,6 @@ def _body(world: np.ndarray, columns: dict[str, np.ndarray], meta: dict) -> np.n
 
 
 def _condition(source: str) -> str:
-    """What follows date and time in the file's name: `h79`, `+10d`, `windR`, or nothing."""
+    """The condition in a file's name, after date and time: `h79`, `+10d`, `windR` or ""."""
     match = re.match(r"imu_data_\d{4}-\d{4}_?(.*?)\.csv", Path(source).name)
     return match.group(1) if match else ""

@@ -12,13 +12,13 @@ from airtouch.errors import AirTouchError, shown
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.logs.table import Sheet, named_table
 
-DEEPEST = 50  #: levels of lists in lists in a metadata value
-LONGEST_WARNING = 400  #: characters of a warning that comes with a file
+DEEPEST = 50  #: levels of nesting that a metadata value may have; Python's JSON parser overflows the stack at 1000
+LONGEST_WARNING = 400  #: characters; a stored warning is cut to it, so that a damaged file cannot fill the screen
 _KEY = re.compile(r"[A-Za-z_][\w .-]*")
 
 
 def read(text: Sheet, source: str) -> FlightLog:
-    """A FlightLog from a canonical CSV.
+    """The FlightLog of a canonical CSV.
 
     Metadata values are JSON, or plain text where they are not. Columns that the
     schema does not know are kept and named in a warning.
@@ -41,7 +41,7 @@ def read(text: Sheet, source: str) -> FlightLog:
 
 
 def to_bytes(log: FlightLog, compress: bool = False) -> bytes:
-    """The file's bytes; every value is written so that it is read back exactly."""
+    """The bytes of a canonical CSV. Every value is read back exactly as it was."""
     lines = [f"# {key}: {json.dumps(value, default=plain)}" for key, value in stored_meta(log).items()]
     names = ordered_names(log)
     lines.append(",".join(names))
@@ -52,14 +52,14 @@ def to_bytes(log: FlightLog, compress: bool = False) -> bytes:
 
 
 def plain_csv(log: FlightLog) -> bytes:
-    """A header line and numbers alone, missing ones empty: for PlotJuggler, spreadsheets and other readers."""
+    """The bytes of a CSV without metadata, empty cells for NaN: for PlotJuggler, spreadsheets and other programs."""
     names = ordered_names(log)
     cells = [[_shortest(v) if v == v else "" for v in log.columns[name].tolist()] for name in names]
     return ("\n".join([",".join(names), *(",".join(row) for row in zip(*cells, strict=True))]) + "\n").encode()
 
 
 def ordered_names(log: FlightLog) -> list[str]:
-    """Column names as they are written: the schema's order, then any others.
+    """The column names in the order in which they are written: the schema's, then the others by alphabet.
 
     Raises AirTouchError for a log without columns and for a name that a CSV cannot hold.
     """
@@ -73,7 +73,10 @@ def ordered_names(log: FlightLog) -> list[str]:
 
 
 def stored_meta(log: FlightLog) -> dict[str, Any]:
-    """Metadata that goes into a file: where it came from under `origin` and `origin_format`."""
+    """The metadata to write into a file. `source` and `format` become `origin` and `origin_format`.
+
+    Raises AirTouchError for a key that is not made of letters, digits and _.
+    """
     meta = {k: v for k, v in log.meta.items() if k not in ("source", "format")}
     for key, name in (("source", "origin"), ("format", "origin_format")):
         if key in log.meta:
@@ -92,7 +95,7 @@ def _shortest(value: float) -> str:
 
 
 def json_value(text: str) -> Any:
-    """The value of a JSON text; the text itself where it is none, or nested more than 50 deep."""
+    """The value of a JSON text. Text that is not JSON, or is nested more than 50 deep, is returned as it is."""
     depth = np.cumsum([(c in "[{") - (c in "]}") for c in text]) if text.count("[") + text.count("{") > DEEPEST else [0]
     try:
         return json.loads(text) if max(depth) <= DEEPEST else text
@@ -101,11 +104,11 @@ def json_value(text: str) -> Any:
 
 
 def stored_warnings(meta: dict[str, Any]) -> list[str]:
-    """The warnings that were written with a log, as a list of short printable texts."""
+    """The warnings that were stored with a log, each printable and at most 400 characters long."""
     stored = meta.get("warnings")
     return [shown(str(w), LONGEST_WARNING) for w in stored] if isinstance(stored, list) else []
 
 
 def plain(value: Any) -> Any:
-    """What JSON lacks, as something that it has."""
+    """A NumPy array or number as a Python list or number; anything else as text. For `json.dumps(default=...)`."""
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)

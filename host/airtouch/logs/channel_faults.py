@@ -1,26 +1,26 @@
-"""Faults of single channels: repeated, stuck, saturated, spiky."""
+"""Faults of single channels: duplicates, stuck values, saturation, spikes."""
 
 import numpy as np
 
 from airtouch.logs.clock import sample_period
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, AXES, GYRO, PWM, RANGES, FlightLog
 
-STUCK_S = 0.5  #: no sensor or motor value in flight stays the same for longer
-GYRO_LIMIT = np.deg2rad(2000.0)  #: full scale of the BMI088's gyro as configured
-ACC_LIMIT = 24 * 9.81  #: full scale of its accelerometer
-INT16_LIMIT = 32.767  #: where accelerations logged as int16 mm/s^2 end
+STUCK_S = 0.5  #: s; a sensor or motor value that does not change for longer in flight is stuck
+GYRO_LIMIT = np.deg2rad(2000.0)  #: rad/s, full scale of the BMI088's gyro as the firmware configures it
+ACC_LIMIT = 24 * 9.81  #: m/s^2, full scale of its accelerometer
+INT16_LIMIT = 32.767  #: m/s^2, largest acceleration that an int16 in mm/s^2 can hold
 PWM_LIMIT = 65535.0
-#: least height of a spike: far above noise and manoeuvres, in the channel's unit
+#: least height of a spike in the channel's unit: far above noise and manoeuvres
 SPIKE_FLOOR = {**dict.fromkeys(ACC + ACC_WORLD, 5.0), **dict.fromkeys(GYRO, 3.0),
                **dict.fromkeys(("zrange_m", *RANGES), 0.3), **dict.fromkeys(ATTITUDE[:2], 0.3),
                **dict.fromkeys((f"{a}_m" for a in AXES), 0.3), "vbat_V": 0.3}
-SPIKE_NOISE = 12.0  #: and this many times the channel's own sample-to-sample noise
+SPIKE_NOISE = 12.0  #: least height of a spike in multiples of the channel's sample-to-sample noise
 
 
 def duplicates(log: FlightLog) -> list[tuple[str, str]]:
-    """Pairs of channels of which one is the other, or the other scaled.
+    """Pairs of channels that are equal up to scale and offset.
 
-    The world accelerations that stand in for missing body ones are no fault.
+    World accelerations that stand in for missing body accelerations are no fault.
     """
     if len(log) < 3:
         return []
@@ -43,17 +43,17 @@ def duplicates(log: FlightLog) -> list[tuple[str, str]]:
 
 
 def _without_copies(pairs: list[tuple[str, str]], log: FlightLog) -> list[tuple[str, str]]:
-    """Pairs through `acc_*` left out where those merely repeat the world values."""
+    """The pairs without those that contain `acc_*`, where `acc_*` repeat the world accelerations."""
     if log.meta.get("acc_frame") != "world":
         return pairs
     return [pair for pair in pairs if not set(pair) & set(ACC)]
 
 
 def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
-    """Stretches (channel, start, stop) without any change: the whole log, or in flight.
+    """Intervals of samples (channel, start, stop) in which a channel does not change.
 
-    In flight: motors, rates and accelerations that hold one value for more than 0.5 s,
-    and rotor speeds for more than 1 s.
+    Any channel that is constant over the whole log; and in flight motors, rates and accelerations
+    that are constant for more than 0.5 s, and rotor speeds for more than 1 s. flying: (n,) bool.
     """
     period = sample_period(log)
     limits = {**dict.fromkeys(ACC + ACC_WORLD + GYRO + PWM, STUCK_S),
@@ -73,7 +73,7 @@ def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
 
 
 def saturated(log: FlightLog) -> dict[str, int]:
-    """Samples at or beyond the end of each channel's scale."""
+    """Number of samples at full scale or beyond, by channel; channels without any are absent."""
     limits = {**dict.fromkeys(PWM, PWM_LIMIT), **dict.fromkeys(GYRO, 0.999 * GYRO_LIMIT),
               **dict.fromkeys(ACC, 0.999 * ACC_LIMIT)}
     counts = {name: int((np.abs(log[name]) >= limit).sum())
@@ -85,9 +85,9 @@ def saturated(log: FlightLog) -> dict[str, int]:
 
 
 def spikes(log: FlightLog) -> dict[str, list[int]]:
-    """Single samples far from both neighbours, which agree with one another.
+    """Indices of spikes, by channel: single samples far from both neighbours, which agree with each other.
 
-    The motors are left out: their kicks come from set-point steps and are real.
+    Motors are not tested: steps of the set point make real spikes in their commands.
     """
     names = [name for name in SPIKE_FLOOR if name in log.columns]
     if not names or len(log) < 5:
@@ -103,7 +103,7 @@ def spikes(log: FlightLog) -> dict[str, list[int]]:
 
 
 def _medians(values: np.ndarray) -> np.ndarray:
-    """The median of each row of (k, n), NaN left out; 0 where a row has no number."""
+    """The median of each row of (k, n), NaN ignored, (k,); 0 for a row that is all NaN."""
     ordered = np.sort(values, axis=1)  # NaN come last
     count = (~np.isnan(values)).sum(axis=1)
     below, above = np.maximum(count - 1, 0) // 2, count // 2

@@ -1,4 +1,4 @@
-"""The clock of a log: true rate, the samples that were lost on the way, and those in order."""
+"""The clock of a log: sample period, lost samples, and samples with rising times."""
 
 from bisect import bisect_left
 from dataclasses import dataclass
@@ -7,16 +7,16 @@ import numpy as np
 
 from airtouch.logs.flight_log import FlightLog
 
-WINDOW = 100  #: samples on both sides over which the least delay is taken
-LEAST_AFTER = 20  #: samples that must follow, to tell a loss from a burst at the end
-FASTEST_S = 1e-4  #: between samples; the fastest IMU on a Crazyflie gives 6.7 kHz
-SLOWEST_S = 5.0  #: between samples; the firmware's slowest log block comes every 2.55 s
-LATEST_S = 1e10  #: no clock shows more, even one that counts from 1970
+WINDOW = 100  #: samples before and after a suspected loss over which the least delay is taken
+LEAST_AFTER = 20  #: samples that must follow a loss; fewer may be a burst of late packets at the end
+FASTEST_S = 1e-4  #: s, shortest sample period accepted; the fastest IMU on a Crazyflie gives 6.7 kHz
+SLOWEST_S = 5.0  #: s, longest sample period accepted; the firmware's slowest log block comes every 2.55 s
+LATEST_S = 1e10  #: s, largest time accepted; a clock that counts from 1970 shows 1.8e9
 
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples lost before `sample`, and for how long nothing came."""
+    """A gap in a log: the index of the first sample after it, samples lost, and its length in seconds."""
 
     sample: int
     lost: int
@@ -24,7 +24,7 @@ class Gap:
 
 
 def sample_period(log: FlightLog) -> float:
-    """Seconds between samples: meta["sample_period_s"], else the clock's median step, else 0.01."""
+    """Sample period in seconds: meta["sample_period_s"], else the clock's median step, else 0.01."""
     known = log.meta.get("sample_period_s")
     if isinstance(known, (int, float)) and FASTEST_S <= known <= SLOWEST_S:
         return float(known)
@@ -38,8 +38,10 @@ def sample_period(log: FlightLog) -> float:
 
 
 def true_period(time_s: np.ndarray) -> float | None:
-    """Seconds between samples: the median slope over long stretches, so that bursts and a few
-    lost samples do not count. None for a clock that does not run, or not at 0.0001 to 5 s."""
+    """Sample period in seconds: the median slope of time over index, robust to bursts and a few lost samples.
+
+    None for a clock that stands still or runs backwards, and for a period outside 0.0001 to 5 s.
+    """
     lag = max(min(500, len(time_s) // 16), min(50, len(time_s) // 4), 1)
     if len(time_s) < 2:
         return None
@@ -51,11 +53,10 @@ def true_period(time_s: np.ndarray) -> float | None:
 
 
 def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
-    """Gaps after which the clock stays behind for good. Samples without a time are passed over.
+    """Gaps in which samples were lost. Samples without a time are skipped. period: s.
 
-    A host clock that stamps arrivals is late in bursts and then catches up: only a
-    delay whose minimum over the next second is at least 0.7 periods above that
-    of the second before is a loss.
+    Arrival times are late in bursts and then catch up; that is no loss. Samples are lost where
+    the least delay of the next WINDOW samples is at least 0.7 periods above that of the WINDOW before.
     """
     time_s = np.asarray(time_s, dtype=np.float64)
     with np.errstate(invalid="ignore"):
@@ -78,11 +79,10 @@ def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
 
 
 def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
-    """When the samples were taken, seconds from the first that has a time, and the gaps.
+    """Times at which the samples were taken, (n,) s from the first that has a time, and the gaps.
 
-    Logs with meta["sample_period_s"] carry arrival times: there the index is the
-    clock, moved on by the samples that were lost. Others carry the drone's own
-    clock, which is taken as it is.
+    A log with meta["sample_period_s"] holds arrival times. Its times are index times period, plus
+    the samples lost so far. Any other log holds the drone's own clock, which is used as it is.
     """
     clock = log["t_s"] if log.has("t_s") else np.arange(len(log)) * sample_period(log)
     stated = log.meta.get("sample_period_s")
@@ -100,7 +100,7 @@ def regular_time(log: FlightLog) -> tuple[np.ndarray, list[Gap]]:
 
 
 def rising(time_s: np.ndarray) -> np.ndarray:
-    """Indices of the most samples whose times rise: a wrong time costs its own sample and no other."""
+    """Indices of the longest subsequence with rising times: a wrong time costs its own sample and no other."""
     place = np.flatnonzero(np.isfinite(time_s))
     times = time_s[place]
     if not (np.diff(times) <= 0).any():

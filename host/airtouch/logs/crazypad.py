@@ -9,12 +9,12 @@ from airtouch.logs.variables import to_columns
 
 
 def matches(names: list[str]) -> bool:
-    """Whether a header is CrazyPAD's: world accelerations and no gyro."""
+    """True for CrazyPAD's header: world accelerations and no gyro."""
     return "timestamp_ms" in names and "stateEstimate.ax" in names and "gyro.x" not in names
 
 
 def read(text: Sheet, source: str) -> FlightLog:
-    """A FlightLog; `m*_pwm` are the values after battery compensation, as the motors got them."""
+    """The FlightLog of a CrazyPAD CSV. `m*_pwm` are after battery compensation, as sent to the motors."""
     meta = {"source": source, "format": "crazypad", "vehicle": "crazyflie-2.1", "condition": "",
             "warnings": []}
     match = re.match(r"pad_(.*)_(E\d+)_log\d+", Path(source).name)
@@ -24,6 +24,6 @@ def read(text: Sheet, source: str) -> FlightLog:
 
 
 def read_variables(text: Sheet, source: str, meta: dict) -> FlightLog:
-    """A CSV whose header names Crazyflie log variables, with `timestamp_ms` as its clock."""
+    """The FlightLog of a CSV whose header names Crazyflie log variables and the clock `timestamp_ms`."""
     table = named_table(text, source, meta["warnings"])
     return FlightLog({"t_s": table["timestamp_ms"] * 1e-3} | to_columns(table, meta), meta)

@@ -1,4 +1,4 @@
-"""True edges, from the steps of the down range. Truth only: never an input of a detector."""
+"""True edges, from steps of the down range. They are ground truth: no detector reads the down range."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,16 @@ from airtouch.logs.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
 
-STEP_M = 0.30  #: change of the down range within two samples that makes an edge
-ROUNDING_M = 1e-6  #: so that a step of exactly 0.30 m, in floats, is none
-SETTLING_S = 0.10  #: the 24 to 40 Hz sensor may need two or three readings to settle
-LEVEL_S = 0.10  #: stretch over which the height before and after an edge is taken
-IN_FLIGHT_S = 0.25  #: motors on for this long on both sides
+STEP_M = 0.30  #: m, least change of the down range within two samples at an edge
+ROUNDING_M = 1e-6  #: m, added to STEP_M, so that a step of exactly 0.30 m is no edge in floating point
+SETTLING_S = 0.10  #: s; the 24 to 40 Hz sensor may need two or three readings to settle after a step
+LEVEL_S = 0.10  #: s before and after an edge over which the heights are averaged
+IN_FLIGHT_S = 0.25  #: s before and after an edge in which the drone must fly
 
 
 @dataclass(frozen=True)
 class Edge:
-    """One crossing of an edge: `entry` where the down range falls, `exit` where it rises."""
+    """A crossing of a platform's edge: kind `entry` where the down range falls, `exit` where it rises."""
 
     sample: int
     kind: str
@@ -26,14 +26,12 @@ class Edge:
 
 
 def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
-    """Edges in order of time.
+    """True edges of a flight in order of time.
 
-    An edge is the first sample at which the down range falls (entry) or rises
-    (exit) by more than 0.30 m within two samples, in flight. Steps within 0.1 s of
-    it are the sensor settling and belong to it; a step from which the range comes
-    back within that time is a glitch and no edge. `step_m` below 0.30
-    serves low platforms. Raises AirTouchError when the log
-    has no `zrange_m` column.
+    An edge is the first sample at which the down range falls (entry) or rises (exit) by more
+    than `step_m` within two samples, in flight. Steps within 0.1 s of it are the sensor settling
+    and belong to it. A step that is undone within 0.1 s is a glitch and no edge. Low platforms
+    need a `step_m` below 0.30. Raises AirTouchError for a log without `zrange_m`.
     """
     height = _held(log["zrange_m"])
     steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log))
@@ -55,7 +53,7 @@ def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
 
 
 def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
-    """Whether the range moved by more than step_m over the last one or two samples."""
+    """True where the range changed by more than step_m over the last one or two samples, (n,) bool."""
     moved = np.zeros(len(height), dtype=bool)
     for lag in (1, 2):
         moved[lag:] |= np.abs(height[lag:] - height[:-lag]) > step_m + ROUNDING_M
@@ -63,7 +61,7 @@ def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
 
 
 def _in_flight(log: FlightLog) -> np.ndarray:
-    """Airborne now and for IN_FLIGHT_S before and after."""
+    """True where the drone is airborne now and for IN_FLIGHT_S before and after, (n,) bool."""
     margin = max(int(round(IN_FLIGHT_S / sample_period(log))), 1)
     n = len(log)
     if n <= 2 * margin:
@@ -74,7 +72,7 @@ def _in_flight(log: FlightLog) -> np.ndarray:
 
 
 def _held(values: np.ndarray) -> np.ndarray:
-    """Invalid readings replaced by the last valid one (the first valid one at the start)."""
+    """The values, (n,), with NaN replaced by the last valid one; at the start by the first valid one."""
     valid = np.isfinite(values)
     if valid.all() or not valid.any():
         return np.where(valid, values, 0.0)

@@ -1,4 +1,4 @@
-"""`read` and `write`: one entry point for every format, told apart by content."""
+"""`read` and `write` flight logs. The format of a file is recognised by its content."""
 
 import os
 import tempfile
@@ -13,15 +13,16 @@ from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.readings import checked
 from airtouch.logs.table import Sheet, names_of, sheet
 
-PIECE_BYTES = 1 << 14  #: read or unpacked at a time
+PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
 
 
 def read(path: str | Path) -> FlightLog:
-    """A flight log from any known file, `.gz` or not, or the folder of a ROS 2 bag; the content decides, not the name.
+    """The flight log in a file of any known format, gzipped or not, or in the folder of a ROS 2 bag.
 
-    Raises AirTouchError with file, place and remedy when it cannot be read.
+    The content decides on the format, not the name. Raises AirTouchError with file, place and remedy
+    for a file that cannot be read.
     """
-    if os.path.isdir(path):  # unlike Path.is_dir it bears a name too long for any file
+    if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
         from airtouch.logs import rosbag
 
         if rosbag.is_bag(path):
@@ -30,33 +31,33 @@ def read(path: str | Path) -> FlightLog:
 
 
 def parse(data: bytes, source: str) -> FlightLog:
-    """A flight log from a file's bytes; `source` names it in messages.
+    """The flight log in a file's bytes. `source` is its name in messages.
 
-    Values and times that cannot be are NaN, with a warning (see `readings.checked`).
+    Impossible values and times become NaN, with a warning (`readings.checked`).
     """
     notes: list[str] = []
     data = unzipped(data, source, notes)
-    with np.errstate(invalid="ignore", over="ignore"):  # what comes of it is found by `checked`
+    with np.errstate(invalid="ignore", over="ignore"):  # `checked` handles the infinities
         log = _by_content(data, source)
     log.meta["warnings"] = notes + log.meta["warnings"]
     return checked(log)
 
 
 def load_bytes(path: str | Path) -> bytes:
-    """A file's bytes, unzipped."""
+    """A file's bytes, unpacked if it is gzipped. Raises AirTouchError as `read` does."""
     return unzipped(_bytes(path), str(path), [])
 
 
 def load_text(path: str | Path) -> bytes:
-    """A text file's bytes, unzipped, line ends LF."""
+    """A text file's bytes, unpacked if it is gzipped, with LF line ends. Raises AirTouchError as `read` does."""
     return _text(load_bytes(path), str(path))
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
-    """Write as the name ends: `.csv`, `.csv.gz` (canonical) or `.parquet`.
+    """Write a flight log as canonical CSV (`.csv`, `.csv.gz`) or Parquet (`.parquet`), by the ending of the name.
 
-    The file appears whole or not at all. Raises AirTouchError for another ending,
-    an existing file without `force`, and a place that cannot be written.
+    The file is written whole or not at all. Raises AirTouchError for another ending, for a file that
+    exists (without `force`) and for a folder that cannot be written to.
     """
     name = Path(path).name
     if name.endswith((".csv", ".csv.gz")):
@@ -71,7 +72,7 @@ def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """The folder that a file is to lie in; AirTouchError where it cannot be made."""
+    """Make the folder of a file. Raises AirTouchError where that fails."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -79,7 +80,10 @@ def make_folder(path: Path) -> None:
 
 
 def check_free(path: Path | None, force: bool) -> None:
-    """Refuse, before the work and not after it, a file that exists and a folder that cannot be made or written to."""
+    """Raise AirTouchError for a file that exists (without `force`) and a folder that cannot be made or written to.
+
+    Call it before the work, so that a long run does not end in a refusal.
+    """
     if path is None:
         return
     if path.is_dir():
@@ -92,7 +96,7 @@ def check_free(path: Path | None, force: bool) -> None:
 
 
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:
-    """Bytes into a file through a temporary one beside it."""
+    """Write bytes to a temporary file beside `path` and rename it. Raises AirTouchError as `write` does."""
     if os.path.exists(path) and not force:
         raise AirTouchError(f"{path}: exists already; use --force to replace it")
     temporary = None
@@ -127,7 +131,7 @@ def _by_content(data: bytes, source: str) -> FlightLog:
 
 
 def _text(data: bytes, source: str) -> bytes:
-    """A text's bytes with line ends LF."""
+    """A text's bytes with LF line ends."""
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise AirTouchError(f"{source}: text in UTF-16; save it as UTF-8 (in PowerShell: -Encoding utf8)")
     if b"\x00" in data:
@@ -136,7 +140,7 @@ def _text(data: bytes, source: str) -> bytes:
 
 
 def _bytes(path: str | Path) -> bytes:
-    """A file's bytes; pipes and devices, whose size nobody knows, are read no further than 1 GiB either."""
+    """A file's bytes. Raises AirTouchError beyond 1 GiB, also for pipes and devices, whose size is not known before."""
     parts: list[bytes] = []
     try:
         with open(path, "rb") as file:
@@ -178,7 +182,7 @@ def _numeric(cell: str) -> bool:
 
 
 def unzipped(data: bytes, source: str, notes: list[str]) -> bytes:
-    """Data as it is, or its gzip members joined; a file that is cut off gives what can be read.
+    """The data, unpacked if it is gzipped. Of a truncated file it is what can be unpacked, with a warning in `notes`.
 
     Raises AirTouchError for damaged data and for more than 1 GiB unpacked.
     """

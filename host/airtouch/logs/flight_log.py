@@ -19,8 +19,8 @@ VELOCITY = tuple(f"v{a}_mps" for a in AXES)
 ATTITUDE = ("roll_rad", "pitch_rad", "yaw_rad")
 RPM = tuple(f"rpm_{i}" for i in range(1, 5))
 
-LARGEST_BYTES = 1 << 30  #: of a log, unpacked; more than this is no flight
-#: Every column a flight log may have, in the order in which it is written.
+LARGEST_BYTES = 1 << 30  #: bytes of an unpacked log; a larger file is refused
+#: The columns of the schema, in the order in which they are written.
 COLUMNS = (
     ("t_s",) + ACC + GYRO + PWM + ("zrange_m",) + RANGES + ("vbat_V",)
     + POSITION + VELOCITY + ATTITUDE + RPM + ACC_WORLD
@@ -29,7 +29,7 @@ COLUMNS = (
 
 @dataclass
 class FlightLog:
-    """A table of float64 columns of one length, and what is known about the flight.
+    """A flight: float64 columns of equal length, (n,), and metadata.
 
     Units are in the column names (SI, PWM 0..65535). Body axes: x forward,
     y left, z up; motors 1 front right, 2 rear right, 3 rear left, 4 front left.
@@ -58,27 +58,27 @@ class FlightLog:
 
     @property
     def source(self) -> str:
-        """The file that it came from, for messages."""
+        """The name of its file, for messages."""
         return str(self.meta.get("source", "flight log"))
 
     def has(self, *names: str) -> bool:
-        """Whether every one of the columns is there."""
+        """True if all of the named columns are there."""
         return all(name in self.columns for name in names)
 
     def require(self, *names: str) -> None:
-        """Raise AirTouchError that names the columns that are missing."""
+        """Raise AirTouchError with the names of the missing columns, if any is missing."""
         missing = [name for name in names if name not in self.columns]
         if missing:
             raise AirTouchError(f"{self.source}: no column {', '.join(missing)} in this log; log it too")
 
     def stack(self, names: Iterable[str]) -> np.ndarray:
-        """The named columns side by side, shape (samples, columns)."""
+        """The named columns as an array (samples, columns)."""
         names = tuple(names)
         self.require(*names)
         return np.column_stack([self.columns[name] for name in names])
 
     def slice(self, start: int, stop: int) -> "FlightLog":
-        """Samples start to stop - 1 as a log of its own."""
+        """The flight log of samples start to stop - 1."""
         return FlightLog({k: v[start:stop] for k, v in self.columns.items()}, dict(self.meta))
 
     def with_columns(self, columns: Mapping[str, np.ndarray], **meta: Any) -> "FlightLog":

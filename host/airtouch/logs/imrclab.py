@@ -9,12 +9,12 @@ from airtouch.logs.table import Sheet
 
 
 def matches(names: list[str]) -> bool:
-    """Whether a header is that of a flight with Crazyflie variables and a gyro or pose."""
+    """True for the header of a flight: Crazyflie log variables with a gyro or a pose."""
     return "timestamp_ms" in names and any("." in name for name in names)
 
 
 def read(text: Sheet, source: str) -> FlightLog:
-    """A FlightLog; pose and velocity are the on-board estimate."""
+    """The FlightLog of an IMRCLab flight. Pose and velocity are the on-board estimate."""
     meta = {"source": source, "format": "crazyflie-csv", "vehicle": "crazyflie-2.1", "condition": "",
             "warnings": []}
     match = re.match(r"brushed_(\w+)\.csv", Path(source).name)

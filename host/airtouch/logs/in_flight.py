@@ -1,18 +1,18 @@
-"""Whether the drone flies."""
+"""The samples at which the drone is in the air."""
 
 import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
 
-AIRBORNE_PWM = 15000.0  #: mean PWM above which the drone is in the air
-AIRBORNE_RANGE_M = 0.10  #: where no PWM is logged: down range that only a flying drone shows
+AIRBORNE_PWM = 15000.0  #: PWM, mean of the motors, above which the drone is in the air
+AIRBORNE_RANGE_M = 0.10  #: m, down range above which the drone is in the air, for logs without PWM
 
 
 def airborne(log: FlightLog) -> np.ndarray:
-    """Whether the drone flies, bool (n,): mean PWM > 15000, in rows that were lost as in the last that was not.
+    """True where the drone is in the air, (n,) bool: mean PWM above 15000. A lost row is as the last one before it.
 
-    Without PWM: from the first to the last sample with a down range (or height)
-    above 0.10 m. Raises AirTouchError when the log has neither.
+    Without PWM: from the first to the last sample with a down range (or height) above 0.10 m.
+    Raises AirTouchError when the log has neither.
     """
     if log.has(*PWM):
         with np.errstate(invalid="ignore", over="ignore"):

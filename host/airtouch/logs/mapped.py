@@ -1,4 +1,4 @@
-"""A CSV of someone else's, read by a small TOML file that says which of its columns is which of ours.
+"""CSV files of other programs, read with the help of a TOML file that maps their columns to the schema's.
 
     vehicle = "mine.toml"
     acc_frame = "body"
@@ -28,7 +28,7 @@ KEYS = ("from", "scale", "offset")
 
 
 def load(path: str | Path) -> dict:
-    """The map of a TOML file. Raises AirTouchError that names a wrong column or key and what is near."""
+    """The column map in a TOML file. Raises AirTouchError with a wrong column or key and the nearest right ones."""
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -48,7 +48,10 @@ def load(path: str | Path) -> dict:
 
 
 def read(path: str | Path, mapping: str | Path) -> FlightLog:
-    """A flight log from a CSV with a header line, by a map. Raises AirTouchError for columns that the CSV lacks."""
+    """The flight log of a CSV with a header line, by a column map (a TOML file).
+
+    Raises AirTouchError for columns that the CSV lacks.
+    """
     table = load(mapping)
     rows = list(csv.reader(io.StringIO(load_text(path).decode("utf-8", "replace"))))
     rows = [r for r in rows if r and not r[0].startswith("#")]

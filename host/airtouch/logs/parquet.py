@@ -14,11 +14,11 @@ from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.table import check_names
 
 _KEY = b"airtouch"
-LARGEST_STRING, MOST_IN_LIST = 16 << 20, 1 << 20  #: in a footer; a log of 256 columns needs far less
+LARGEST_STRING, MOST_IN_LIST = 16 << 20, 1 << 20  #: bytes and items that a footer may have; 256 columns need far less
 
 
 def read(data: bytes, source: str) -> FlightLog:
-    """A FlightLog from the bytes of a Parquet file; nulls become NaN.
+    """The FlightLog in the bytes of a Parquet file. Nulls become NaN.
 
     The sizes in its footer are checked before anything is unpacked. Raises AirTouchError
     for a damaged file, one without a known column, and columns that are not numbers.
@@ -39,7 +39,7 @@ def read(data: bytes, source: str) -> FlightLog:
 
 
 def to_bytes(log: FlightLog) -> bytes:
-    """The file's bytes; values and metadata are read back exactly."""
+    """The bytes of a Parquet file. Values and metadata are read back exactly as they were."""
     arrow, parquet = _pyarrow(log.source)
     table = arrow.table({name: log.columns[name] for name in ordered_names(log)})
     stored = json.dumps(stored_meta(log), default=plain).encode()
@@ -50,7 +50,7 @@ def to_bytes(log: FlightLog) -> bytes:
 
 @contextmanager
 def _damage(arrow: Any, source: str) -> Iterator[None]:
-    """pyarrow's complaints as an AirTouchError."""
+    """Turn pyarrow's exceptions into an AirTouchError."""
     try:
         yield
     except (arrow.ArrowException, OSError, ValueError, TypeError, MemoryError) as error:
@@ -59,7 +59,7 @@ def _damage(arrow: Any, source: str) -> Iterator[None]:
 
 
 def _check(schema: Any, footer: Any, types: Any, source: str) -> None:
-    """Raise AirTouchError for columns that are no numbers, badly named, unknown or too many, and for too many rows."""
+    """Raise AirTouchError for too many rows or columns, and for columns with bad names, unknown names or no numbers."""
     check_names(schema.names, source)
     for field in schema:
         if not any(check(field.type) for check in (types.is_integer, types.is_floating, types.is_boolean,

@@ -1,4 +1,4 @@
-"""The paper's authors' public flights: fetched or taken from a folder, every hash checked."""
+"""The paper's authors' public flights: downloaded or copied from a folder, with every hash checked."""
 
 import csv
 import gzip
@@ -18,7 +18,7 @@ Progress = Callable[[str, str], None]
 
 
 def registry() -> list[dict[str, str]]:
-    """One row a flight: `sha256` of the uncompressed CSV and the columns of manifest.csv."""
+    """One row for each flight: `sha256` of the uncompressed CSV, and the columns of manifest.csv."""
     text = (resources.files("airtouch") / "logs" / "authors_flights.csv").read_text()
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
@@ -26,14 +26,14 @@ def registry() -> list[dict[str, str]]:
 def fetch(
     out: Path, *, source: Path | None = None, base_url: str = BASE_URL, progress: Progress | None = None
 ) -> dict[str, list[str]]:
-    """Put the flights and their manifest.csv into `out`, as `.csv.gz`.
+    """Write the flights as `.csv.gz`, and their manifest.csv, to the folder `out`.
 
-    source: a folder that holds them already (`.csv` or `.csv.gz`), instead of the network.
-    progress: called with (file, state) after each; state is one of the keys returned.
+    source: a folder to copy them from (`.csv` or `.csv.gz`) instead of a download.
+    progress: called with (file, state) after each flight.
 
-    Returns the file names by state: "present" (already there, hash right), "new" and "failed"
-    (not found, or its bytes are not those that were published; it is not written).
-    Raises AirTouchError if `source` is no folder or pooch is not installed.
+    Returns the file names by state: "present" (already there with the right hash), "new" and "failed"
+    (missing at the source, or with a wrong hash; not written).
+    Raises AirTouchError if `source` is no folder, or if pooch is needed and not installed.
     """
     if source is not None and not source.is_dir():
         raise AirTouchError(f"{source}: no such folder; --from takes the folder that holds the CSV files")
@@ -51,7 +51,7 @@ def fetch(
 
 
 def has_file(path: Path, sha256: str) -> bool:
-    """Whether the file is there, can be unpacked and has this hash."""
+    """True if the file is there and its unpacked content has this hash."""
     try:
         return hashlib.sha256(load_bytes(path)).hexdigest() == sha256
     except AirTouchError:
@@ -101,7 +101,7 @@ def _from_network(base_url: str) -> Callable[[str, str], bytes | None]:
 
 
 def _write_manifest(path: Path, present: set[str]) -> None:
-    """manifest.csv of the flights that are there."""
+    """Write the manifest.csv of the flights that are present."""
     rows = [row for row in registry() if row["file"] in present]
     columns = [name for name in registry()[0] if name != "sha256"]
     lines = [",".join(columns)]
@@ -114,7 +114,7 @@ def _quoted(cell: str) -> str:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Write to a temporary file beside it, then rename: never a half-written file."""
+    """Write to a temporary file beside `path`, then rename it."""
     temporary = path.with_name(path.name + ".part")
     temporary.write_bytes(content)
     temporary.replace(path)

@@ -1,4 +1,4 @@
-"""The quality report of one flight: what is wrong with its clock and its channels."""
+"""The quality report of a flight: faults of its clock and of its channels."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -13,32 +13,32 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import Segment, segments
 
-#: group of channels -> the column that tells whether it is there
+#: group of channels -> a column of that group
 GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
           "position": "x_m", "velocity": "vx_mps", "attitude": "roll_rad", "rpm": "rpm_1"}
-SHORT_FLIGHT_S = 5.0  #: less than this in the air is worth a warning
+SHORT_FLIGHT_S = 5.0  #: s in the air; a shorter flight gets a warning
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What `check` found. Sample indices count from 0; stretches are (channel, start, stop)."""
+    """The quality report of a flight. Sample indices count from 0; intervals are (channel, start, stop)."""
 
     source: str
     format: str
     samples: int
     duration_s: float
-    rate_hz: float | None  #: true rate by the log's clock; None where there is none
+    rate_hz: float | None  #: sample rate by the log's clock; None without a usable clock
     gaps: list[Gap]  #: samples that were lost
     clock_repeats: int  #: steps of the clock that are zero
     clock_backwards: int  #: steps of the clock that are negative
     missing: dict[str, int]  #: channel -> samples that are NaN or infinite
-    duplicated: list[tuple[str, str]]  #: pairs of channels that repeat one another
-    stuck: list[tuple[str, int, int]]  #: stretches without any change in flight
-    saturated: dict[str, int]  #: channel -> samples at the end of its scale
+    duplicated: list[tuple[str, str]]  #: pairs of channels that are equal up to scale and offset
+    stuck: list[tuple[str, int, int]]  #: intervals in which a channel does not change in flight
+    saturated: dict[str, int]  #: channel -> samples at full scale
     spikes: dict[str, list[int]]  #: channel -> isolated samples far from both neighbours
     segments: list[Segment]
     edges: list[Edge]
-    warnings: list[str]  #: all of it in words, the reader's own warnings first
+    warnings: list[str]  #: one line for each fault, the reader's warnings first
 
     @property
     def lost(self) -> int:
@@ -64,7 +64,7 @@ def summary(log: FlightLog) -> dict[str, Any]:
 
 
 def check(log: FlightLog) -> Quality:
-    """The quality report of a flight log; it never changes the log and never raises for a poor one."""
+    """The quality report of a flight log. A bad log gives warnings, never an exception. The log is not changed."""
     clock, steps = log["t_s"] if log.has("t_s") else np.empty(0), clock_steps(log)
     period = true_period(clock)
     flying, phases, edges = _flight(log)
@@ -88,18 +88,18 @@ def check(log: FlightLog) -> Quality:
 
 
 def clock_steps(log: FlightLog) -> np.ndarray:
-    """Differences (n - 1,) of the logged times; empty where there are none."""
+    """Differences of the logged times, (n - 1,) s; empty for a log without times."""
     with np.errstate(invalid="ignore", over="ignore"):
         return np.diff(log["t_s"]) if log.has("t_s") else np.empty(0)
 
 
 def nothing_logged(log: FlightLog) -> bool:
-    """Whether every value of every channel but the time is missing."""
+    """True if every value of every channel except the time is missing."""
     return len(log) > 0 and not any(np.isfinite(v).any() for name, v in log.columns.items() if name != "t_s")
 
 
 def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
-    """Airborne samples, phases and edges; a log without motors and height has none of them."""
+    """Airborne samples (n,) bool, phases and edges. A log without motors and height has none of them."""
     try:
         flying = airborne(log)
         return flying, segments(log), true_edges(log) if log.has("zrange_m") else []

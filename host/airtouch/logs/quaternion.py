@@ -7,10 +7,10 @@ import numpy as np
 
 
 def decompress(compressed: np.ndarray) -> np.ndarray:
-    """Bitcraze's compressed quaternion (`stateEstimateZ.quat`) as (n, 4) x, y, z, w.
+    """Quaternions x, y, z, w, (n, 4), from Bitcraze's compressed form (`stateEstimateZ.quat`), (n,).
 
-    Two top bits: index of the largest component, which is positive; then for each
-    other component, in order, a sign bit and nine bits of magnitude times sqrt(2).
+    The two top bits are the index of the largest component, which is positive. For each other
+    component follow, in order, a sign bit and nine bits of magnitude times sqrt(2).
     Values that are no unsigned 32-bit integer give NaN.
     Source: the description in crazyflie-firmware, src/utils/interface/quatcompress.h.
     """
@@ -31,7 +31,7 @@ def decompress(compressed: np.ndarray) -> np.ndarray:
 
 
 def euler(q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Roll, pitch, yaw in radians of quaternions (n, 4), normalised here; NaN where not finite."""
+    """Roll, pitch and yaw, each (n,) rad, of quaternions (n, 4) of any length; NaN where not finite."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         x, y, z, w = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
         roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
@@ -41,7 +41,7 @@ def euler(q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def rotation(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """Body-to-world rotation matrices, shape (n, 3, 3)."""
+    """Rotation matrices from body to world, (n, 3, 3), of angles (n,) in rad."""
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.stack([
         np.stack([cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr], axis=-1),
@@ -51,5 +51,5 @@ def rotation(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray
 
 
 def to_body(world: np.ndarray, roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """World vectors (n, 3) in body axes."""
+    """World vectors (n, 3) in body axes, (n, 3); angles (n,) in rad."""
     return np.einsum("nji,nj->ni", rotation(roll, pitch, yaw), world)

@@ -1,4 +1,4 @@
-"""What a reading and a clock may be. Every log that was read from a file passes here once."""
+"""Limits of values and times. Every log that is read from a file passes `checked` once."""
 
 from typing import Any
 
@@ -12,12 +12,11 @@ LARGEST = float(np.finfo(np.float32).max)  #: the firmware's variables are float
 
 
 def checked(log: FlightLog) -> FlightLog:
-    """The log with values that cannot be as NaN and metadata that cannot be left out, each with a warning.
+    """The log with impossible values as NaN and without impossible metadata, with a warning for each kind.
 
-    After it every value is NaN or within float32, and every time is NaN or within reach of the
-    others: n samples make less than n times 5 s. So what works on a log needs neither time nor
-    memory beyond its size. Raises AirTouchError where the clock is not in seconds, or most of it
-    cannot be.
+    Every value is then NaN or within float32, and n samples span less than n times 5 s. So time and
+    memory of any later step are bounded by the size of the log. Raises AirTouchError for a clock that
+    is not in seconds, or that is mostly impossible.
     """
     meta, warnings = _checked_meta(log.meta)
     columns = {}
@@ -32,7 +31,7 @@ def checked(log: FlightLog) -> FlightLog:
 
 
 def _without(values: np.ndarray, bad: np.ndarray, problem: str, warnings: list[str]) -> np.ndarray:
-    """The values with the bad ones as NaN, and a warning that counts them."""
+    """The values with NaN where `bad`, (n,) both; adds a warning with their number."""
     where = np.flatnonzero(bad)
     if not len(where):
         return values
@@ -42,7 +41,7 @@ def _without(values: np.ndarray, bad: np.ndarray, problem: str, warnings: list[s
 
 
 def _impossible_times(time_s: np.ndarray, source: str) -> np.ndarray:
-    """Times that no stretch of n times 5 s can hold together with the most others, bool (n,)."""
+    """True for times outside the interval of n times 5 s that holds the most times, (n,) bool."""
     with np.errstate(invalid="ignore"):
         wrong = np.abs(time_s) > LATEST_S
     there = ~np.isnan(time_s)
@@ -60,13 +59,13 @@ def _impossible_times(time_s: np.ndarray, source: str) -> np.ndarray:
 
 
 def _step(time_s: np.ndarray) -> float:
-    """Median step forward in seconds, 0 where there is none."""
+    """Median of the clock's forward steps in seconds; 0 without any."""
     steps = np.diff(time_s)
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
 
 
 def _checked_meta(meta: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """Metadata whose known keys hold what their readers expect, and the warnings so far."""
+    """The metadata without known keys of a wrong type or value, and all warnings so far."""
     meta, warnings = dict(meta), list(meta["warnings"])
     period = meta.get("sample_period_s", 0.01)
     if isinstance(period, bool) or not isinstance(period, (int, float)) or not FASTEST_S <= period <= SLOWEST_S:

@@ -6,13 +6,13 @@ from airtouch.extras import need
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import FlightLog
 
-TIMELINE = "time"  #: seconds since the log's first sample
+TIMELINE = "time"  #: name of the timeline; seconds since the log's first sample
 
 
 def recording(log: FlightLog) -> bytes:
-    """The bytes of an .rrd file: one scalar entity a column, under its name, and true edges as text under `edges`.
+    """The bytes of an .rrd file: one scalar entity for each column, and the true edges as text under `edges`.
 
-    Samples that are NaN are left out. Needs the extra 'rerun'; AirTouchError where it is missing.
+    NaN samples are left out. Raises AirTouchError without the extra 'rerun'.
     """
     need("rerun", "writing Rerun recordings")
     import rerun as rr

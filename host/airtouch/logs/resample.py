@@ -1,4 +1,4 @@
-"""Resampling to a steady rate, only ever on request."""
+"""Resampling of a flight to a constant rate. No reader does it by itself."""
 
 import numpy as np
 
@@ -6,25 +6,23 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.clock import FASTEST_S, SLOWEST_S, regular_time, rising, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
-LONGEST_BRIDGE_S = 0.1  #: gaps longer than this become NaN, never values
-CUTOFF = 0.4  #: of the new rate: corner of the low-pass used when going down
-HELD = ("zrange_m", *RANGES, "vbat_V")  #: slow or stepping channels: the last value is held, not filtered
+LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN
+CUTOFF = 0.4  #: corner of the anti-aliasing low-pass as a fraction of the new rate
+HELD = ("zrange_m", *RANGES, "vbat_V")  #: slow or stepping channels, resampled by holding the last value, unfiltered
 ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
-MOST_GROWTH = 100  #: samples, at the old rate or the new one, for each that was logged
-ALWAYS_SAMPLES = 10_000  #: that are few enough for any log
+MOST_GROWTH = 100  #: most samples, at the old or the new rate, for each logged one
+ALWAYS_SAMPLES = 10_000  #: samples that are allowed whatever MOST_GROWTH says
 
 
 def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
-    """The flight at exactly `rate_hz`, `t_s` counting from 0.
+    """The flight resampled to exactly `rate_hz`, with `t_s` from 0.
 
-    Going down, a zero-phase Butterworth low-pass (8th order forth and back, 0.4 of
-    the new rate) keeps higher frequencies from folding in. Between samples values
-    are interpolated linearly; ranges and battery hold their last value. What lies
-    in a gap of more than 0.1 s is NaN. meta["resampled"] says all this.
-    Samples without a time, or with one out of order, are left out; a warning counts them.
-    Raises AirTouchError for a rate that is not in 0.2 to 10000 Hz, a log whose clock does
-    not run, and one that would have more than 100 samples for each that was logged, or more
-    than 1 GiB.
+    To a lower rate a zero-phase Butterworth low-pass (8th order, forward and backward, corner at
+    0.4 of the new rate) prevents aliasing. Values are interpolated linearly; ranges and battery
+    hold their last value. Gaps of more than 0.1 s become NaN. meta["resampled"] describes this.
+    Samples without a time, or out of order, are left out; a warning counts them.
+    Raises AirTouchError for a rate outside 0.2 to 10000 Hz, a clock that stands still, and a
+    result of more than 100 samples for each logged one or more than 1 GiB.
     """
     if not 1 / SLOWEST_S <= rate_hz <= 1 / FASTEST_S:
         raise AirTouchError(f"{log.source}: a rate of {rate_hz:g} Hz is not possible; "
@@ -54,7 +52,7 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
 
 
 def _count(log: FlightLog, span_s: float, period: float, rate_hz: float) -> int:
-    """Samples at the new rate. Raises AirTouchError where these, or those at the old rate, are too many."""
+    """Number of samples at the new rate. Raises AirTouchError if it, or that at the old rate, is too large."""
     finest = span_s * max(rate_hz, 1.0 / period) + 1
     if finest > max(MOST_GROWTH * len(log), ALWAYS_SAMPLES):
         raise AirTouchError(f"{log.source}: {len(log)} samples in {span_s:g} s would become {finest:.0f}; "
@@ -68,7 +66,7 @@ def _count(log: FlightLog, span_s: float, period: float, rate_hz: float) -> int:
 
 def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.ndarray, period: float,
              low_pass_for: float | None) -> dict[str, np.ndarray]:
-    """The channels at the new times. Those whose values are there at the same samples share the work."""
+    """The channels at the new times. Channels that are valid at the same samples are filtered together."""
     low_pass = _low_pass(period, low_pass_for) if low_pass_for else None
     alike: dict[tuple[bool, bytes], list[str]] = {}
     for name, values in columns.items():
@@ -90,7 +88,7 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
 
 def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float, held: bool,
         low_pass: tuple[np.ndarray, int] | None) -> np.ndarray:
-    """Channels (k, n) at the new times, shape (k, m); NaN in gaps that are too long."""
+    """Channels (k, n) at the new times, (k, m); NaN in gaps longer than LONGEST_BRIDGE_S."""
     new = np.full((len(values), len(new_time)), np.nan)
     bridge = max(LONGEST_BRIDGE_S, 1.5 * period)
     bounds = np.r_[0, np.flatnonzero(np.diff(time_s) > bridge) + 1, len(time_s)]
@@ -110,7 +108,7 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
 
 
 def _low_pass(period: float, rate_hz: float) -> tuple[np.ndarray, int]:
-    """The filter in second-order sections, and how many samples it needs before and after."""
+    """The low-pass in second-order sections, and the samples that it needs before and after."""
     from scipy.signal import butter  # slow to import, and seldom needed
 
     return butter(8, CUTOFF * rate_hz, fs=1.0 / period, output="sos"), int(3.0 / (CUTOFF * rate_hz * period)) + 1
@@ -118,7 +116,10 @@ def _low_pass(period: float, rate_hz: float) -> tuple[np.ndarray, int]:
 
 def _smoothed(t: np.ndarray, v: np.ndarray, period: float, sos: np.ndarray,
               padding: int) -> tuple[np.ndarray, np.ndarray]:
-    """Channels (k, n) low-passed on an even grid at the old rate; stretches too short to filter stay as they are."""
+    """Times (m,) of an even grid at the old rate, and channels (k, m) low-passed on it.
+
+    Intervals that are too short for the filter stay unfiltered.
+    """
     from scipy.signal import sosfiltfilt
 
     grid = t[0] + np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1) * period

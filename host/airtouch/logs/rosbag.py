@@ -1,7 +1,7 @@
 """ROS 2 bags (a folder with `metadata.yaml`, sqlite3 or mcap), read by `rosbags` (extra 'ros').
 
-Messages are known by their type, whatever the topic is called; axes are those of REP 103 (x forward, y left, z up), as
-ours. Motors are an array of four numbers on a topic whose name has "motor", "pwm" or "actuator" in it.
+Messages are recognised by their type, not by the name of the topic. Axes are those of REP 103 (x forward, y left,
+z up), as in a FlightLog. Motors are an array of four numbers on a topic with "motor", "pwm" or "actuator" in its name.
 """
 
 from collections import defaultdict
@@ -22,12 +22,12 @@ ARRAYS = ("UInt16MultiArray", "UInt32MultiArray", "Int32MultiArray", "Float32Mul
 
 
 def is_bag(path: str | Path) -> bool:
-    """Whether a folder is a bag."""
+    """True if the path is the folder of a ROS 2 bag."""
     return (Path(path) / METADATA).is_file()
 
 
 def read(path: str | Path) -> FlightLog:
-    """A flight log at 100 Hz. Raises AirTouchError where rosbags is missing or the bag has no IMU."""
+    """The flight log of a bag, at 100 Hz. Raises AirTouchError without the extra 'ros' and for a bag without an IMU."""
     need("ros", f"{path}: reading ROS 2 bags")
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -44,7 +44,7 @@ def read(path: str | Path) -> FlightLog:
                         rows[name].append((time, value))
     except AirTouchError:
         raise
-    except Exception as error:  # whatever a damaged bag makes the library raise
+    except Exception as error:  # a damaged bag makes the library raise any of many
         raise AirTouchError(f"{path}: not a whole ROS 2 bag: {type(error).__name__}: {error}") from None
     streams = {name: tuple(np.array(some).T) for name, some in rows.items()}
     return log_of(streams, {"source": str(path), "format": "rosbag2", "vehicle": "", "acc_frame": "body"})
@@ -55,7 +55,7 @@ def _is_motor(topic: str) -> bool:
 
 
 def _time(message: Any, stamp: int) -> float:
-    """The header's time, that of the recording where there is none."""
+    """Time of a message in s: the header's, or without one that of the recording."""
     header = getattr(message, "header", None)
     said = header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else 0.0
     return said or 1e-9 * stamp
@@ -71,7 +71,7 @@ def _angles(q: Any) -> list[tuple[str, float]]:
 
 
 def _imu(message: Any) -> list[tuple[str, float]]:
-    known = message.orientation_covariance[0] != -1.0  # -1: the IMU gives none
+    known = message.orientation_covariance[0] != -1.0  # -1: the IMU has no orientation
     return [*_xyz(ACC, message.linear_acceleration), *_xyz(GYRO, message.angular_velocity),
             *(_angles(message.orientation) if known else [])]
 

@@ -10,16 +10,16 @@ from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import VELOCITY, FlightLog
 from airtouch.logs.in_flight import airborne
 
-CRUISE_MPS = 0.1  #: horizontal speed above which level flight is a cruise
-LEAST_HEIGHT_M = 0.05  #: motors that run below it never took off
-LEVEL_PART = 0.85  #: part of the median height at which take-off ends and landing starts
-PLATFORM_STEP_M = 0.12  #: step of the down range at a platform, low ones included
+CRUISE_MPS = 0.1  #: m/s, horizontal speed above which level flight is cruise
+LEAST_HEIGHT_M = 0.05  #: m; a drone that stays below it with its motors on has not taken off
+LEVEL_PART = 0.85  #: fraction of the median height at which take-off ends and landing starts
+PLATFORM_STEP_M = 0.12  #: m, least step of the down range at a platform's edge; low platforms included
 KINDS = ("ground", "take-off", "hover", "cruise", "over platform", "landing")
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Samples start to stop - 1 of one phase of a flight."""
+    """A phase of a flight: samples start to stop - 1."""
 
     kind: str  #: one of KINDS
     start: int
@@ -27,14 +27,14 @@ class Segment:
 
 
 def segments(log: FlightLog) -> list[Segment]:
-    """The phases of a flight in order, without holes.
+    """The phases of a flight in order; every sample is in one of them.
 
     Ground: motors below the airborne level, or never higher than 5 cm. Take-off: until
     85 % of the median height in the air; landing: from the last time at that height.
-    Over platform: between an entry and an exit of the down range. The rest is cruise
-    where the speed is above 0.1 m/s, else hover; without velocity all of it counts as
-    cruise when the flight crosses an edge, else as hover. Raises AirTouchError when
-    neither PWM nor any height is logged.
+    Over platform: between an entry and an exit by the down range. The rest is cruise
+    where the speed is above 0.1 m/s, else hover; without velocity it is all cruise if
+    the flight crosses an edge, else all hover. Raises AirTouchError for a log with
+    neither PWM nor height.
     """
     period = sample_period(log)
     flying = _without_short_runs(airborne(log), int(0.5 / period))
@@ -62,7 +62,7 @@ def segments(log: FlightLog) -> list[Segment]:
 
 
 def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray | None:
-    """Height above the ground, the platform's own height added while over it."""
+    """Height above the ground, (n,) m; over a platform the down range plus the platform's height."""
     if log.has("zrange_m"):
         added, total = np.zeros(len(log) + 1), 0.0
         for edge in edges:
@@ -74,7 +74,7 @@ def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray | None:
 
 
 def _ends(kinds: np.ndarray, height: np.ndarray) -> None:
-    """Mark take-off and landing in one flight's kinds, in place."""
+    """Mark take-off and landing in `kinds`, (n,), in place."""
     level = np.flatnonzero(height >= LEVEL_PART * np.nanmedian(height)) if np.isfinite(height).any() else []
     if len(level):
         kinds[:level[0]] = KINDS.index("take-off")
@@ -88,7 +88,7 @@ def _smooth(values: np.ndarray, width: int) -> np.ndarray:
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Start and stop of each stretch of True."""
+    """Start and stop of each run of True in (n,) bool."""
     return [(a, b) for a, b in _constant_runs(mask) if mask[a]]
 
 
@@ -100,7 +100,7 @@ def _constant_runs(values: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _without_short_runs(mask: np.ndarray, shortest: int) -> np.ndarray:
-    """The mask with gaps, then stretches, shorter than `shortest` samples removed (ends of the log stay)."""
+    """The mask without gaps, then without runs, shorter than `shortest` samples; those at the log's ends stay."""
     mask = mask.copy()
     for value in (False, True):
         for start, stop in _constant_runs(mask):

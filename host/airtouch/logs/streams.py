@@ -1,4 +1,4 @@
-"""Signals that came at times of their own, put on one clock of 100 Hz."""
+"""Signals with different sample times, resampled to one clock of 100 Hz."""
 
 from collections.abc import Mapping
 
@@ -8,16 +8,16 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, GYRO, FlightLog
 
 PERIOD_S = 0.01
-HELD_S = 0.25  #: a value older than this is missing
+HELD_S = 0.25  #: s for which a value is held; after that the sample is NaN
 Stream = tuple[np.ndarray, np.ndarray]  #: times (n,) in s and values (n,)
 
 
 def log_of(streams: Mapping[str, Stream], meta: Mapping[str, object]) -> FlightLog:
-    """A flight log at 100 Hz from {column: (times, values)}.
+    """The flight log at 100 Hz of signals {column: (times, values)}.
 
-    Accelerations and rates that came faster than 100 Hz are averaged over each 10 ms, everything else holds its last
-    value for at most HELD_S. The clock begins where accelerations or rates do. Raises AirTouchError where there are
-    none.
+    Accelerations and rates that were sampled faster than 100 Hz are averaged over each 10 ms. Any other signal holds
+    its last value for at most HELD_S. The clock starts with the first acceleration or rate. Raises AirTouchError if
+    there is neither.
     """
     streams = {name: _sorted(*pair) for name, pair in streams.items() if len(pair[0])}
     leading = [streams[name][0] for name in (*GYRO, *ACC) if name in streams]
@@ -42,7 +42,7 @@ def _sorted(times: np.ndarray, values: np.ndarray) -> Stream:
 
 
 def _averaged(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """Mean of the values within half a period around each tick, the held value where there is none."""
+    """Mean of the values within half a period of each tick, (m,); the held value where there are none."""
     place = np.floor((times - clock[0]) / PERIOD_S + 0.5).astype(int)
     inside = (place >= 0) & (place < len(clock)) & np.isfinite(values)
     count = np.bincount(place[inside], minlength=len(clock))
@@ -51,7 +51,7 @@ def _averaged(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.nd
 
 
 def _held(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:
-    """The last value before each tick; NaN where it is older than HELD_S or there is none."""
+    """The last value before each tick, (m,); NaN where it is older than HELD_S or missing."""
     last = np.searchsorted(times, clock + 1e-9, side="right") - 1
     known = (last >= 0) & (clock - times[np.maximum(last, 0)] <= HELD_S)
     return np.where(known, values[np.maximum(last, 0)], np.nan)

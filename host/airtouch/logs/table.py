@@ -1,4 +1,4 @@
-"""Numeric text tables: read in bulk, and when that fails the line that is wrong is found."""
+"""Tables of numbers as text. They are read in bulk; if that fails, the bad line is located for the message."""
 
 import re
 from io import BytesIO
@@ -8,8 +8,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError, shown
 
-MOST_COLUMNS = 256  #: those of the schema and any others
-LONGEST_NAME = 100  #: characters
+MOST_COLUMNS = 256  #: columns that a log may have
+LONGEST_NAME = 100  #: characters of a column's name
 _EMPTY_CELL = re.compile(rb"(?<=,)(?=[,\n])|(?<=\n)(?=,)")
 _BLANK = re.compile(rb"(?<=\n)[^\S\n]+(?=\n|\Z)")
 _HEAD = re.compile(rb"(?:[^\S\n]*+(?:#[^\n]*+)?\n)*+")  # blank lines and comments
@@ -17,9 +17,9 @@ _COMMENT = re.compile(rb"#[^\n]*")
 
 
 class Sheet(NamedTuple):
-    """A text in parts: comment lines, the first line that is none, its end, what follows, and its number.
+    """A text in parts: leading comment lines, the first other line, its line end, the rest, and that line's number.
 
-    Without such a line it and the rest are empty; the end is LF, or nothing where the text is cut off.
+    Without an other line it and the rest are empty. The line end is LF, or empty in a truncated text.
     """
 
     comments: list[bytes]
@@ -30,7 +30,7 @@ class Sheet(NamedTuple):
 
 
 def sheet(text: bytes) -> Sheet:
-    """A text, line ends LF, in parts; blank lines before the first that is no comment are left out."""
+    """The parts of a text with LF line ends. Blank lines before the first line that is no comment are left out."""
     found = _HEAD.match(text)
     head = found.group() if found else b""
     first, end, rest = text[len(head):].partition(b"\n")
@@ -43,12 +43,12 @@ def sheet(text: bytes) -> Sheet:
 
 
 def names_of(header: bytes) -> list[str]:
-    """The column names in a header line; of more than 256 the rest as one."""
+    """The column names in a header line; beyond 256 the rest is one name, which `check_names` refuses."""
     return [name.strip() for name in header.decode("utf-8", "replace").split(",", MOST_COLUMNS)]
 
 
 def check_names(names: list[str], place: str) -> None:
-    """Raise AirTouchError for more than 256 columns and a name that is empty, repeated, long or not printable."""
+    """Raise AirTouchError for more than 256 columns and for a name that is empty, repeated, long or not printable."""
     if len(names) > MOST_COLUMNS:
         raise AirTouchError(f"{place}: more than {MOST_COLUMNS} columns; leave out those that are no readings")
     for i, name in enumerate(names):
@@ -72,12 +72,11 @@ def named_table(text: Sheet, source: str, warnings: list[str]) -> dict[str, np.n
 
 def parse_table(body: bytes, source: str, columns: int, first_line: int,
                 warnings: list[str]) -> np.ndarray:
-    """Comma-separated numbers as a float64 array of shape (rows, columns).
+    """Comma-separated numbers as a float64 array (rows, columns).
 
-    body: the rows, line ends already LF; `first_line` is its first line's number
-    in the file, for messages. Empty cells become NaN, blank lines are skipped. A
-    last line that is cut off is dropped and said so in `warnings`. Raises
-    AirTouchError that names file and line for any other bad cell or row.
+    body: the rows, with LF line ends. first_line: the number of its first line in the file.
+    Empty cells become NaN, blank lines are skipped. A truncated last line is dropped, with a
+    warning. Raises AirTouchError with file and line for any other bad cell or row.
     """
     cut = not body.endswith(b"\n")
     if cut and body.endswith(b","):  # an unfinished row, not an empty cell
@@ -102,7 +101,7 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
 
 
 def _bulk(body: bytes, columns: int) -> np.ndarray | None:
-    """The whole table by NumPy's parser, None where it is not rectangular numbers."""
+    """The whole table (rows, columns) by NumPy's parser; None if it is not a rectangular table of numbers."""
     try:
         table = np.loadtxt(BytesIO(body), delimiter=",", ndmin=2, comments=None)
     except ValueError:
@@ -111,7 +110,7 @@ def _bulk(body: bytes, columns: int) -> np.ndarray | None:
 
 
 def _first_problem(body: bytes, columns: int) -> tuple[int, str, bool]:
-    """Line offset of the first bad row, what is wrong, and whether it is the last row."""
+    """Line offset of the first bad row, the fault, and whether it is the last row."""
     last = len(body.rstrip())
     place = 0
     for i, line in enumerate(BytesIO(body)):

@@ -17,9 +17,9 @@ STAND_COLUMNS = {
 
 
 def read_thrust_stand(path: str | Path) -> dict[str, np.ndarray]:
-    """A run as named columns (n,): `weight_g`, `pwm`, `vbat_V`, `rpm_1` to `rpm_4`, ...
+    """The columns of a thrust-stand run, (n,) each: `weight_g`, `pwm`, `vbat_V`, `rpm_1` to `rpm_4`, ...
 
-    Columns that a file lacks are absent. Raises AirTouchError for another header
+    Columns that the file lacks are absent. Raises AirTouchError for an unknown header
     and for rows that are not numbers.
     """
     source = str(path)

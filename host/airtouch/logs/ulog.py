@@ -1,7 +1,7 @@
 """PX4 ULog files, read by `pyulog` (extra 'ulog').
 
-PX4 counts body axes forward, right, down and the world north, east, down; motors 1 front right, 2 rear left, 3 front
-left, 4 rear right. Here y is left, z up and the motors go round from the front right.
+PX4: body axes forward, right, down; world axes north, east, down; motors 1 front right, 2 rear left, 3 front left,
+4 rear right. A FlightLog: y left, z up; motors 1 front right, 2 rear right, 3 rear left, 4 front left.
 """
 
 import io
@@ -15,17 +15,17 @@ from airtouch.logs.quaternion import euler
 from airtouch.logs.streams import Stream, log_of
 
 MAGIC = b"ULog\x01\x12\x35"
-FLIP = (1.0, -1.0, -1.0)  #: of forward, right, down to forward, left, up
-MOTORS = (0, 3, 1, 2)  #: PX4's number of our motors 1 to 4, from 0
+FLIP = (1.0, -1.0, -1.0)  #: signs from forward, right, down to forward, left, up
+MOTORS = (0, 3, 1, 2)  #: PX4's index, from 0, of a FlightLog's motors 1 to 4
 TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position", "distance_sensor", "battery_status",
           "actuator_motors", "actuator_outputs")
 
 
 def read(data: bytes, source: str) -> FlightLog:
-    """A flight log at 100 Hz. Raises AirTouchError where pyulog is missing or the file has no IMU.
+    """The flight log of a ULog file, at 100 Hz.
 
-    Motors are those of `actuator_motors` (0 to 1) or, where that is missing, of `actuator_outputs` (1000 to 2000 us),
-    both as 0..65535.
+    Motors are those of `actuator_motors` (0 to 1) or, without that topic, of `actuator_outputs` (1000 to 2000 us),
+    scaled to 0..65535. Raises AirTouchError without the extra 'ulog' and for a file without an IMU.
     """
     need("ulog", f"{source}: reading PX4 logs")
     from pyulog import ULog
@@ -33,7 +33,7 @@ def read(data: bytes, source: str) -> FlightLog:
     try:
         # the first instance counts
         topics = {d.name: d.data for d in reversed(ULog(io.BytesIO(data), list(TOPICS)).data_list)}
-    except Exception as error:  # whatever a damaged file makes the library raise
+    except Exception as error:  # a damaged file makes the library raise any of many
         raise AirTouchError(f"{source}: not a whole ULog file: {type(error).__name__}: {error}") from None
     streams: dict[str, Stream] = {}
 

@@ -29,7 +29,7 @@ TYPES = {"b": "i1", "B": "u1", "?": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I
 
 @dataclass(frozen=True)
 class Event:
-    """One kind of record: its variables, and the dtype of a whole record."""
+    """A type of record: its name, its variables, and the dtype of a whole record."""
 
     name: str
     variables: tuple[str, ...]
@@ -37,10 +37,10 @@ class Event:
 
 
 def read(data: bytes, source: str) -> FlightLog:
-    """A FlightLog from the `fixedFrequency` records of a uSD log.
+    """The FlightLog of the `fixedFrequency` records in a uSD log.
 
-    A log that is cut off or whose checksum is wrong gives what can be read, with a
-    warning. Raises AirTouchError when the header is broken or nothing usable is in it.
+    A truncated log, or one with a wrong checksum, gives the records that can be read, with a
+    warning. Raises AirTouchError for a damaged header and for a log without a usable record.
     """
     warnings: list[str] = []
     version, events, start = _header(data, source)
@@ -68,7 +68,7 @@ def read(data: bytes, source: str) -> FlightLog:
 
 
 def _header(data: bytes, source: str) -> tuple[int, dict[int, Event], int]:
-    """Version, event types by id, and the offset of the first record."""
+    """The version, the event types by id, and the offset of the first record."""
     try:
         version, count = struct.unpack_from("<HH", data, 1)
         if version not in (1, 2):
@@ -117,7 +117,7 @@ def _event(name: str, declared: list[str], version: int, source: str) -> Event:
 
 
 def _offsets(data: bytes, place: int, end: int, events: dict[int, Event]) -> tuple[dict[int, array], int]:
-    """Offsets of the whole records of each event, and where reading had to stop."""
+    """Offsets of the whole records of each event type, and the offset at which reading stopped."""
     found = {number: array("q") for number in events}
     sizes = {number: event.dtype.itemsize for number, event in events.items()}
     while place + 2 <= end:
@@ -131,7 +131,7 @@ def _offsets(data: bytes, place: int, end: int, events: dict[int, Event]) -> tup
 
 
 def _main_event(events: dict[int, Event], offsets: dict[int, array], source: str) -> int:
-    """The id of `fixedFrequency`, or of the event with most records in logs that have none."""
+    """The id of `fixedFrequency`; in a log without it that of the event type with the most records."""
     filled = [number for number in events if offsets[number]]
     if not filled:
         raise AirTouchError(f"{source}: the uSD log holds no complete record; was logging started?")

@@ -17,21 +17,21 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.usd import TYPES
 from airtouch.logs.variables import to_columns
 
-TIME = "tick"  #: variable that holds the time
-LONGEST_STEP_MS = 500  #: from row to row; the deck logs at 1 to 1000 Hz, and a median step above it is in microseconds
+TIME = "tick"  #: the variable with the time
+LONGEST_STEP_MS = 500  #: ticks; the deck logs at 1 to 1000 Hz, so with a larger median step ticks are microseconds
 _VARIABLE = re.compile(rb"([\w.]{1,60})\(([" + "".join(TYPES).encode() + rb"])\),")
 
 
 def matches(data: bytes) -> bool:
-    """True for a log that begins with as many variables as its first byte says."""
+    """True for a log that begins with as many variables as its first byte announces."""
     return bool(data) and _variables(data) is not None
 
 
 def read(data: bytes, source: str) -> FlightLog:
-    """A FlightLog from an old uSD log.
+    """The FlightLog of an old uSD log.
 
-    Blocks with a wrong checksum are left out and a cut block gives its whole rows, both with a warning.
-    Raises AirTouchError where nothing usable is in it.
+    Blocks with a wrong checksum are left out; a truncated block gives its whole rows; both with a warning.
+    Raises AirTouchError for a log without a usable row.
     """
     found = _variables(data) if data else None
     if found is None:
@@ -56,12 +56,12 @@ def read(data: bytes, source: str) -> FlightLog:
 
 
 def _seconds(ticks: np.ndarray) -> float:
-    """Seconds a tick."""
+    """Seconds per tick."""
     return 1e-6 if len(ticks) > 1 and np.median(np.diff(ticks)) > LONGEST_STEP_MS else 1e-3
 
 
 def _variables(data: bytes) -> tuple[list[str], list[str], int] | None:
-    """Names, type letters and the offset behind them; None where the data begins otherwise."""
+    """The variables' names, their type letters and the offset behind them; None if the data begins differently."""
     names, letters, place = [], [], 1
     for _ in range(data[0]):
         found = _VARIABLE.match(data, place)
@@ -74,7 +74,7 @@ def _variables(data: bytes) -> tuple[list[str], list[str], int] | None:
 
 
 def _rows(data: bytes, place: int, size: int, warnings: list[str]) -> bytes:
-    """The packed rows of all sound blocks, and the whole rows of a block that is cut off."""
+    """The packed rows of all blocks with a right checksum, and the whole rows of a truncated block."""
     parts, damaged = [], 0
     while place < len(data):
         count = data[place]

@@ -28,7 +28,7 @@ from airtouch.logs.quaternion import decompress, euler, rotation, to_body
 _DEGREE = np.pi / 180.0
 _MOTORS = (1, 2, 3, 4)
 
-#: groups of (variables, columns, factor); the first whose variables are all there is used
+#: (variables, columns, factor); of several for the same columns the first whose variables are all logged is used
 _GROUPS = (
     (tuple(f"acc.{a}" for a in AXES), ACC, GRAVITY),
     (tuple(f"gyro.{a}" for a in AXES), GYRO, _DEGREE),
@@ -51,10 +51,10 @@ _SINGLE = (
 
 
 def to_columns(table: Mapping[str, np.ndarray], meta: dict[str, Any]) -> dict[str, np.ndarray]:
-    """The schema's columns from a table of variables, arrays (n,) float64.
+    """The schema's columns of a table {log variable: (n,) float64}, in SI units.
 
-    Sets meta["acc_frame"] where there is an acceleration; variables that the schema
-    has no column for are left out.
+    Sets meta["acc_frame"] if there is an acceleration. Variables without a column in the
+    schema are left out.
     """
     columns: dict[str, np.ndarray] = {}
     for variables, names, factor in _GROUPS:
@@ -84,9 +84,9 @@ def _attitude(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray]) -
 
 
 def _rates(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-    """Body rates from `stateEstimateZ.rate*` (mrad/s) where no gyro is logged.
+    """Add body rates from `stateEstimateZ.rate*` (mrad/s) if no gyro is logged.
 
-    Releases differ in the sign of the pitch rate; it is the sign that fits the logged attitude.
+    Firmware releases differ in the sign of the pitch rate; the sign that fits the logged attitude is used.
     """
     names = [f"stateEstimateZ.rate{a}" for a in ("Roll", "Pitch", "Yaw")]
     if GYRO[0] in columns or not all(name in table for name in names):
@@ -100,7 +100,7 @@ def _rates(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta
 
 
 def _pitch_rate(columns: dict[str, np.ndarray]) -> np.ndarray | None:
-    """Rotation about the body's y axis from each row to the next, rad, shape (n-1,); 0 where it is unknown."""
+    """Rotation about the body's y axis between rows, (n-1,) rad; 0 where unknown. None without attitude."""
     if not all(name in columns for name in ATTITUDE):
         return None
     r = rotation(*(columns[name] for name in ATTITUDE))
@@ -110,7 +110,7 @@ def _pitch_rate(columns: dict[str, np.ndarray]) -> np.ndarray | None:
 
 def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray],
                   meta: dict[str, Any]) -> None:
-    """World accelerations where the estimate is logged, and body ones from them where no IMU is."""
+    """Add world accelerations if the estimate is logged, and body accelerations from them if no IMU is logged."""
     world = None
     if all(f"stateEstimate.a{a}" in table for a in AXES):
         world = np.column_stack([table[f"stateEstimate.a{a}"] for a in AXES]) * GRAVITY + (0, 0, GRAVITY)

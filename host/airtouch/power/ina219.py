@@ -1,4 +1,4 @@
-"""Logs of an INA219: time, bus voltage and current as CSV, and mean power with its interval."""
+"""CSV logs of an INA219 power meter (time, bus voltage, current), and mean power with its interval."""
 
 import csv
 import math
@@ -17,15 +17,15 @@ QUANTITIES = {"time": ("time", "t", "millis", "timestamp"),
 MEASURED = ("time", "volts", "amperes")
 USUAL = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
 WITHOUT_HEADER = {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3), "stage": (3, 1.0)}
-MOST_BAD = 0.05  #: share of lines that may be unreadable (a serial line loses characters)
-MOST_V, MOST_A = 26.0, 3.2  #: the INA219's range
-GAP = 20.0  #: periods without a line that are no part of the energy
-BLOCK_S = 1.0  #: over which noise is taken as one piece
+MOST_BAD = 0.05  #: fraction of unreadable lines up to which a log is read; serial ports lose characters
+MOST_V, MOST_A = 26.0, 3.2  #: V and A, the INA219's range
+GAP = 20.0  #: sample periods; no energy is counted over a longer gap
+BLOCK_S = 1.0  #: s, block length of the interval, longer than the correlation of the noise
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A log: time (s), volts and amperes, each (n,), stage of each line, and what was wrong with it."""
+    """A power log: time (s), volts and amperes, each (n,), the stage of each line, and warnings."""
 
     time_s: np.ndarray
     volts: np.ndarray
@@ -46,10 +46,10 @@ class Power:
 
 
 def parse(text: str, source: str) -> Trace:
-    """A log from its text. Raises AirTouchError with file, line and remedy.
+    """The power log in a text. Raises AirTouchError with file, line and remedy.
 
-    Comments, empty lines, repeated headers, a last line that is cut off and a few damaged ones are passed
-    over and counted. Separators are , ; or tab; with ; and tab a comma may stand for the decimal point.
+    Comments, empty lines, repeated headers, a truncated last line and at most MOST_BAD damaged lines are
+    skipped and counted. Separators are , ; or tab. With ; or tab the decimal point may be a comma.
     """
     lines = [(i, line.strip()) for i, line in enumerate(text.lstrip("\ufeff").splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line and not line.startswith("#")]
