@@ -1,4 +1,4 @@
-"""What the app on the drone says of itself: the LOG group `airtouch`, as one block."""
+"""The state of the app on the drone: the LOG group `airtouch`, as one log block."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -25,8 +25,7 @@ HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GA
 
 @dataclass(frozen=True)
 class AppState:
-    """One packet of the app: P(over a platform), edges so far, the last one's kind and age (s), what is
-    wrong."""
+    """The app's state in one packet: P(over a platform), number of edges, kind and age (s) of the last, and faults."""
 
     probability: float
     edges: int
@@ -38,13 +37,13 @@ class AppState:
 
 
 def block(known: Collection[str]) -> Block | None:
-    """The app's block as far as this firmware has it; None without the app."""
-    found = available(WANTED, known)
-    return found if any(name == f"{GROUP}.prob" for name in found.names) else None
+    """The app's log block, with the variables that this firmware has; None without the app."""
+    block = available(WANTED, known)
+    return block if any(name == f"{GROUP}.prob" for name in block.names) else None
 
 
 def state(values: Mapping[str, float]) -> AppState:
-    """A packet in words."""
+    """The state in a packet {log variable: value}. A missing probability is NaN; other missing variables count as 0."""
     def value(name: str, missing: float = 0.0) -> float:
         return float(values.get(f"{GROUP}.{name}", missing))
 

@@ -1,8 +1,8 @@
-"""Which command to send when: legs against the drone's clock, answers, silence and requests to stop.
+"""The commands of a mission and when to send them: a state machine without threads and without a radio.
 
-A state machine without threads and without a radio. The firmware answers every command of the high-level
-commander; one that is not answered is sent again. While the link is silent the firmware finishes
-its leg and hovers there, so a stop means: land as soon as a command gets through.
+The firmware answers every command of the high-level commander; a command without an answer is sent again.
+While the link is silent the firmware finishes its leg and hovers. A stop therefore lands the drone as soon
+as a command gets through.
 """
 
 import math
@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 from airtouch.crazyflie.mission import LANDING_MPS, Leg
 
-RESEND_S = 0.3  #: without an answer the command goes out again
-TRIES = 8  #: then, if the drone is heard all the same, it counts as taken
-SETTLE_S = 1.0  #: after a landing, until the motors are told to stop
+RESEND_S = 0.3  #: s without an answer, after which a command is sent again
+TRIES = 8  #: times that a command is sent; after that it counts as accepted if log packets still arrive
+SETTLE_S = 1.0  #: s from the end of a landing to the stop of the motors
 BUSY = 16  #: the firmware's EBUSY: the supervisor does not let it fly
-CODES = {"take-off": 7, "land": 8, "go": 12, "stop": 3}  #: as answered; go is 4 before protocol 8
+CODES = {"take-off": 7, "land": 8, "go": 12, "stop": 3}  #: command numbers in the answers; go is 4 before protocol 8
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where and how the drone stood before take-off, in its own estimate."""
+    """Position and heading of the drone before take-off, by its own estimate."""
 
     x_m: float = 0.0
     y_m: float = 0.0
@@ -42,9 +42,10 @@ class Origin:
 
 @dataclass
 class Autopilot:
-    """Flies legs. Call `step` often; it says what to send. `phase` is mission, landing or done.
+    """Flies the legs of a mission. Call `step` often; it returns the commands to send.
 
-    refused: why the drone would not do what it was told, once it says so. reason: why it landed early.
+    phase: mission, landing or done. refused: why the drone refused a command, else None.
+    reason: why it landed early, else None.
     """
 
     legs: Sequence[Leg]
@@ -63,19 +64,22 @@ class Autopilot:
 
     @property
     def leg(self) -> Leg | None:
-        """The leg being flown."""
+        """The current leg."""
         return self.legs[self.index] if 0 <= self.index < len(self.legs) else None
 
     @property
     def waiting(self) -> bool:
-        """Whether the last command was not answered yet."""
+        """True if the last command has not been answered yet."""
         return not self._answered
 
     def answer(self, kind: str, code: int) -> None:
-        """What the drone said to a command of this kind; 0 is yes. Late answers to others are passed over."""
+        """Handle the drone's answer to a command: its kind and an error code, 0 for accepted.
+
+    Late answers to earlier commands are ignored.
+    """
         if self._command is None or kind != self._command.kind or self._answered:
             return
-        repeated = self._tries > 1  # the first may have been taken and its answer lost
+        repeated = self._tries > 1  # the first may have been accepted and its answer lost
         if code == 0 or self.phase == "landing" or (repeated and code != BUSY):
             self._answered = True
             return
@@ -87,7 +91,7 @@ class Autopilot:
         self.land(self.refused)
 
     def land(self, reason: str | None) -> None:
-        """Stop the mission and come down; without a drone in the air just end."""
+        """Stop the mission and land. On the ground the mission just ends."""
         if self.phase != "mission":
             return
         self.reason = reason
@@ -98,7 +102,7 @@ class Autopilot:
         self._until_s = -math.inf
 
     def step(self, now_s: float, wall_s: float, silence_s: float = 0.0) -> list[Command]:
-        """Commands to send now. now_s: drone's clock, wall_s: host's; silence_s: since a packet came."""
+        """The commands to send now. now_s: drone's clock; wall_s: host's; silence_s: since the last packet."""
         if self.phase == "done":
             return []
         if self._command is not None and not self._answered:
@@ -121,7 +125,7 @@ class Autopilot:
         return self._send(self._of(leg), now_s, wall_s)
 
     def _come_down(self, now_s: float, wall_s: float) -> list[Command]:
-        if self._command is not None:  # it was sent, answered, and its time is over
+        if self._command is not None:  # answered, and its duration is over
             self.phase, self.in_air = "done", False
             return [Command("stop")]
         height = max((leg.z_m for leg in self.legs[:self.index + 1]), default=0.0)

@@ -1,4 +1,4 @@
-"""The log blocks that are asked of the drone, and their rows as columns of the flight log.
+"""The log blocks to request from the drone, and their rows as columns of a flight log.
 
 A packet holds 26 bytes of values. Everything that the detectors use fits into one block of 24
 bytes at 100 Hz; a second, slow one carries position, attitude and the Multi-ranger.
@@ -12,15 +12,15 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.variables import to_columns
 
-MOST_BYTES = 26  #: of values in one log packet (LOG_MAX_LEN in the firmware)
+MOST_BYTES = 26  #: bytes of values in one log packet (LOG_MAX_LEN in the firmware)
 SIZES = {"uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "FP16": 2, "uint32_t": 4, "int32_t": 4,
          "float": 4}
-DECIMALS = 6  #: of logged values, in their SI units; FP16 is far coarser
+DECIMALS = 6  #: decimals of logged values in SI units; FP16 is far coarser
 
 
 @dataclass(frozen=True)
 class Block:
-    """A log block: its name, period and (variable, type it is sent as)."""
+    """A log block: name, period in ms, and (variable, type in the packet) of each value."""
 
     name: str
     period_ms: int
@@ -48,11 +48,11 @@ STATE = Block("state", 50, _each("stateEstimateZ", "x y z vx vy vz", "int16_t")
               + (("stateEstimateZ.quat", "uint32_t"),) + _each("range", "front back left right", "uint16_t")
               + (("supervisor.info", "uint16_t"),))
 MULTIRANGER = frozenset(("range.front", "range.back", "range.left", "range.right"))
-HELD_S = 0.25  #: a value of the slow block holds for so long, then it is missing
+HELD_S = 0.25  #: s for which a value of the slow block is held; after that the sample is NaN
 
 
 def check(block: Block, known: Collection[str]) -> None:
-    """Raise AirTouchError that names the variables which the firmware lacks, or says that it is too large."""
+    """Raise AirTouchError if the firmware lacks a variable of the block or the block is too large for a packet."""
     missing = [name for name in block.names if name not in known]
     if missing:
         raise AirTouchError(f"the firmware has no log variable {', '.join(missing)}; "
@@ -63,18 +63,18 @@ def check(block: Block, known: Collection[str]) -> None:
 
 
 def available(block: Block, known: Collection[str], without: Collection[str] = ()) -> Block:
-    """The block with the variables that the firmware has, less `without`."""
+    """The block with only the variables that the firmware has and that are not in `without`."""
     kept = (v for v in block.variables if v[0] in known and v[0] not in without)
     return replace(block, variables=tuple(kept))
 
 
 def motion_columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
-    """SI columns (n,) of rows of MOTION: body acceleration and rates, PWM, down range, battery."""
+    """SI columns, (n,) each, of packets of MOTION: body accelerations and rates, PWM, down range, battery."""
     return _columns(MOTION.names, rows)
 
 
 def state_columns(block: Block, rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
-    """SI columns (n,) of rows of STATE or what was available of it."""
+    """SI columns, (n,) each, of packets of STATE or of the part of it that `available` gave."""
     return _columns([name for name in block.names if name != "supervisor.info"], rows)
 
 
@@ -89,7 +89,7 @@ def _columns(names: Sequence[str], rows: Sequence[Mapping[str, float]]) -> dict[
 
 def hold(times_s: np.ndarray, slow_times_s: np.ndarray,
          slow: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Slow columns at the fast block's times: the last value not older than HELD_S, else NaN."""
+    """Columns of the slow block at the times of the fast one, (n,) each: the last value, NaN if older than HELD_S."""
     order = np.argsort(slow_times_s, kind="stable")
     sorted_times = np.asarray(slow_times_s)[order]
     last = np.searchsorted(sorted_times, np.asarray(times_s) + 1e-9, side="right") - 1

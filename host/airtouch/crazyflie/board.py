@@ -1,4 +1,4 @@
-"""What a live view knows, and how it looks: the same for a drone and for a recorded flight."""
+"""The live view of a flight, its data and its layout: the same for a drone and for a recorded flight."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -8,9 +8,9 @@ import numpy as np
 
 from airtouch.crazyflie.sparkline import sparkline, text_map
 
-SECONDS = 10.0  #: of signals that are shown
+SECONDS = 10.0  #: s of signals shown
 WIDTH = 50
-#: label -> (how it is made of the columns, least and greatest value shown, unit)
+#: label -> (function of the columns, lower and upper end of the scale, unit)
 SIGNALS = {
     "P(over)": (None, 0.0, 1.0, ""),
     "acc z": (lambda c: c.get("acc_z_mps2", c.get("acc_world_z_mps2")), 8.8, 10.8, "m/s²"),
@@ -22,7 +22,7 @@ SIGNALS = {
 
 @dataclass(frozen=True)
 class Felt:
-    """An edge that was felt: kind, when it was said (s from the start), where, and how sure."""
+    """A detected edge: kind, time of its report (s from the start), position (m), and probability."""
 
     kind: str
     at_s: float
@@ -33,7 +33,7 @@ class Felt:
 
 @dataclass
 class Link:
-    """The state of the link: rate (Hz), share lost, lateness and round trip (s), silence (s)."""
+    """State of the link: rate (Hz), fraction of lost samples, lateness, round trip and silence (s)."""
 
     rate_hz: float = float("nan")
     lost: float = 0.0
@@ -56,7 +56,10 @@ class Link:
 
 @dataclass
 class Board:
-    """Signals of the last seconds, track, edges, link. lag_s is taken back to place edges on the track."""
+    """Data of the live view: signals of the last SECONDS, track, edges, link.
+
+    lag_s: delay from a crossing to its report; an edge is placed on the track that much earlier.
+    """
 
     title: str
     detector: str
@@ -71,7 +74,7 @@ class Board:
     _track: list[tuple[float, float, float]] = field(default_factory=list)
 
     def add(self, times_s: np.ndarray, columns: Mapping[str, np.ndarray], probability: np.ndarray) -> None:
-        """New rows: seconds from the start, SI columns, P(over a platform) or NaN; each (n,)."""
+        """Append rows: seconds from the start, SI columns, and P(over a platform) or NaN; each (n,)."""
         if not len(times_s):
             return
         self.now_s = float(times_s[-1])
@@ -83,7 +86,7 @@ class Board:
             self._track += zip(times_s[::5], columns["x_m"][::5], columns["y_m"][::5], strict=True)
 
     def feel(self, kind: str, at_s: float, probability: float) -> Felt:
-        """Note an edge that was said at a time; it lay where the drone was one lag earlier."""
+        """Add an edge reported at `at_s`. Its position is that of the drone one lag earlier."""
         known = [p for p in self._track if np.isfinite(p[1])]
         times = np.array([p[0] for p in known])
         i = int(np.searchsorted(times, at_s - self.lag_s)) if known else 0
@@ -93,7 +96,7 @@ class Board:
         return felt
 
     def line(self) -> str:
-        """One line for where there is no terminal."""
+        """The view as one line, for output that is no terminal."""
         value = self.latest.get
         parts = [f"{self.now_s:7.1f} s", f"P {self._last('P(over)'):.2f}",
                  f"down {value('zrange_m', np.nan):.2f} m", f"{len(self.felt)} edges"]
@@ -102,7 +105,7 @@ class Board:
         return "  ".join(parts + ([self.status] if self.status else []))
 
     def render(self):
-        """The whole view for rich."""
+        """The whole view as a renderable of rich."""
         from rich.columns import Columns
         from rich.panel import Panel
         from rich.table import Table
@@ -129,6 +132,6 @@ class Board:
 
 
 def edge_line(felt: Felt) -> str:
-    """An edge in words."""
+    """A detected edge as one line of text."""
     place = f", x {felt.x_m:+.2f} m, y {felt.y_m:+.2f} m" if np.isfinite(felt.x_m) else ""
     return f"{felt.kind} felt at {felt.at_s:.2f} s{place} (P {felt.probability:.2f})"

@@ -1,9 +1,9 @@
-"""cflib's Crazyflie, made safe against its own threads.
+"""cflib's Crazyflie without the races of its threads.
 
-A receiver, a parameter reader and a timer for each unanswered packet use `link` and the table of unanswered
-packets. In cflib `link` turns None and an entry disappears between their look and their use of it. They then
-end with an AttributeError or a KeyError, in `send_packet` with the sender's lock held, so that nothing can be
-sent any more. Importing this module needs cflib.
+A receiver, a parameter reader and a timer for each unanswered packet share `link` and the table of unanswered
+packets. In cflib `link` can become None, and an entry can disappear, between a thread's test and its use. The
+thread then dies of an AttributeError or a KeyError. In `send_packet` it dies with the sender's lock held, and
+nothing can be sent after that. Importing this module needs cflib.
 """
 
 import time
@@ -12,11 +12,11 @@ from typing import Any
 import cflib.crazyflie
 from cflib.utils.callbacks import Caller
 
-POLL_S = 0.1  #: between two looks of a receiver whose link is closed
+POLL_S = 0.1  #: s between two polls of a closed link
 
 
 class NoLink:
-    """A link that is closed: it takes every packet, gives none, and is false."""
+    """A closed link: it drops every packet, receives none, and is false."""
 
     needs_resending = False
 
@@ -24,20 +24,20 @@ class NoLink:
         return False
 
     def send_packet(self, packet: Any) -> None:
-        """Drop it."""
+        """Drop the packet."""
 
     def receive_packet(self, wait: float = 0) -> None:
-        """None, after at most POLL_S."""
+        """None, after POLL_S at most."""
         time.sleep(min(max(wait, 0.0), POLL_S))
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: there is no open link."""
 
 
 class Unanswered(dict):
-    """Pattern of an answer -> timer that sends the packet again; other threads may remove what one looks at.
+    """Expected answer -> timer that sends the packet again. Safe when several threads add and remove entries.
 
-    A packet with the same pattern takes the older one's place, and its timer ends.
+    A packet with the same expected answer replaces the older one and stops its timer.
     """
 
     class Answered:
@@ -47,7 +47,7 @@ class Unanswered(dict):
             return False
 
         def cancel(self) -> None:
-            """Nothing is to be cancelled."""
+            """Do nothing: the packet has been answered."""
 
     def __missing__(self, pattern: Any) -> Answered:
         return self.Answered()
@@ -61,7 +61,7 @@ class Unanswered(dict):
 
 
 class Crazyflie(cflib.crazyflie.Crazyflie):
-    """See cflib. `link` is false, never None, where there is none; `resent` is called with repeated packets."""
+    """cflib's Crazyflie. Without a link `link` is NoLink, never None. `resent` is called with each repeated packet."""
 
     def __init__(self, *arguments: Any, **settings: Any) -> None:
         self.resent = Caller()
@@ -70,7 +70,7 @@ class Crazyflie(cflib.crazyflie.Crazyflie):
 
     @property
     def link(self) -> Any:
-        """The driver, or NoLink."""
+        """The link's driver; NoLink without a link."""
         return self._link
 
     @link.setter
@@ -82,13 +82,13 @@ class Crazyflie(cflib.crazyflie.Crazyflie):
         return self._unanswered
 
     @_answer_patterns.setter
-    def _answer_patterns(self, _: dict) -> None:  # cflib empties it when it starts and when it closes
+    def _answer_patterns(self, _: dict) -> None:  # cflib assigns an empty dict when it opens and closes
         old, self._unanswered = self._unanswered, Unanswered()
         for timer in list(old.values()):
             timer.cancel()
 
     def send_packet(self, pk: Any, expected_reply: tuple = (), resend: bool = False, timeout: float = 0.2) -> None:
-        """See cflib; a repeated packet is told to `resent` before it is sent. Without a link it is dropped."""
+        """As cflib's. `resent` is called before a packet is repeated. Without a link the packet is dropped."""
         if resend:
             self.resent.call(pk)
         if self.link:

@@ -1,4 +1,4 @@
-"""What must be right before take-off, each fault in one line with its remedy."""
+"""Checks before take-off. Each fault is one line with its remedy."""
 
 import struct
 from collections.abc import Mapping
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from airtouch.errors import AirTouchError
 
-LEAST_V = 3.7  #: on the ground; a LiPo cell below it has a third of its charge
-LOWEST_V = 3.1  #: in flight: land
+LEAST_V = 3.7  #: V on the ground to take off; at 3.7 V a LiPo cell has a third of its charge
+LOWEST_V = 3.1  #: V in flight; below it the drone lands
 CONFLICTS = {"is tumbled": 5, "is locked": 6, "has crashed": 7}
 #: integer types of parameters: least and greatest value
 INTEGERS = {f"{sign}int{bits}_t": (0, 2**bits - 1) if sign else (-(2**(bits - 1)), 2**(bits - 1) - 1)
@@ -16,7 +16,7 @@ INTEGERS = {f"{sign}int{bits}_t": (0, 2**bits - 1) if sign else (-(2**(bits - 1)
 
 @dataclass(frozen=True)
 class Condition:
-    """What the drone says of itself: battery (V), decks by parameter, supervisor bits, down range (m)."""
+    """State that the drone reports: battery (V), decks by parameter, supervisor bits, down range (m)."""
 
     vbat_v: float
     decks: Mapping[str, bool]
@@ -24,12 +24,12 @@ class Condition:
     zrange_m: float | None = None
 
     def has(self, *decks: str) -> bool:
-        """Whether one of the decks is there."""
+        """True if one of the decks is attached."""
         return any(self.decks.get(deck, False) for deck in decks)
 
 
 def problems(seen: Condition, least_v: float = LEAST_V) -> list[str]:
-    """Why it must not take off: one line each, the remedy in it; empty when it may."""
+    """Faults that forbid take-off, one line each with its remedy; empty if there are none."""
     found = []
     if not seen.vbat_v >= least_v:
         found.append(f"battery at {seen.vbat_v:.2f} V, less than {least_v:.2f} V; charge it "
@@ -47,7 +47,7 @@ def problems(seen: Condition, least_v: float = LEAST_V) -> list[str]:
 
 
 def notes(seen: Condition) -> list[str]:
-    """What is good to know and no reason to stay on the ground."""
+    """Remarks that do not forbid take-off, one line each."""
     found = []
     if not seen.has("bcMultiranger"):
         found.append("no Multi-ranger: landmarks are not logged; the down range alone tells the true edges")
@@ -55,7 +55,7 @@ def notes(seen: Condition) -> list[str]:
 
 
 def parse_setting(text: str) -> tuple[str, str]:
-    """"group.name=value" as its two parts."""
+    """(name, value) of the text "group.name=value". Raises AirTouchError for another form."""
     name, equals, value = text.partition("=")
     if not equals or name.count(".") != 1 or not value:
         raise AirTouchError(f"--param {text}: write it as group.name=value")
@@ -63,7 +63,7 @@ def parse_setting(text: str) -> tuple[str, str]:
 
 
 def representable(name: str, text: str, ctype: str) -> float:
-    """The value as the parameter's type holds it. Raises AirTouchError where it cannot."""
+    """The value as a parameter of type `ctype` stores it. Raises AirTouchError if the type cannot."""
     if ctype in INTEGERS:
         low, high = INTEGERS[ctype]
         try:

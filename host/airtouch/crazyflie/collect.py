@@ -30,20 +30,20 @@ from airtouch.logs.flight_log import FlightLog
 
 DECKS = ("bcFlow2", "bcFlow", "bcMultiranger", "bcAI", "bcZRanger2", "bcLighthouse4", "bcLoco")
 FIRST_DATA_S = 3.0
-PARAMETERS_S = 30.0  #: cflib fetches them all, one after the other
-LINEAR_PROTOCOL = 8  #: of the radio; from here on go-to can be linear
-CAN_BE_ARMED, ARMED, FLYING = 1, 2, 16  #: bits of the supervisor
-LANDED_S = 15.0  #: that a drone gets to land after a killed flight
+PARAMETERS_S = 30.0  #: s to wait for a parameter; cflib fetches them all, one after the other
+LINEAR_PROTOCOL = 8  #: lowest protocol version in which go-to can fly at constant speed
+CAN_BE_ARMED, ARMED, FLYING = 1, 2, 16  #: bits of the supervisor's state
+LANDED_S = 15.0  #: s to wait for a drone that is still landing after a killed flight
 START_OVER = "sitl.startOver"  #: parameter that only a virtual drone has
 ARMING_S = 1.0
-RESET_S = 1.0  #: that the estimator gets to settle
+RESET_S = 1.0  #: s for the estimator to settle after a reset
 MANIFEST_COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
-CLEAN_LOSS = 0.01  #: share of lost samples up to which a flight counts as clean
+CLEAN_LOSS = 0.01  #: fraction of lost samples up to which a flight counts as clean
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What `collect` was asked for."""
+    """The settings of one run of `collect`."""
 
     uri: str
     out: Path
@@ -58,23 +58,23 @@ class Plan:
 
 @dataclass
 class Outcome:
-    """One flight on the disk: its file, how it ended, and the log itself."""
+    """A recorded flight: its file, how it ended, and its log."""
 
     path: Path
     ended: str
     log: FlightLog
     silences: list[float] = field(default_factory=list)
-    use: str = "messy"  #: as in the manifest
+    use: str = "messy"  #: its `use` in the manifest
 
     @property
     def planned(self) -> bool:
-        """Whether the mission was flown to its end."""
+        """True if the mission was flown to its end."""
         return self.ended == "as planned"
 
 
 @dataclass
 class Readiness:
-    """A drone that may fly: what it is, which slow block it logs, and where it stands."""
+    """A drone that passed the checks: its condition, its slow log block and its firmware's revision."""
 
     condition: checks.Condition
     slow: blocks.Block | None
@@ -82,7 +82,10 @@ class Readiness:
 
 
 def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
-    """Make the folder, see that there is room, and finish what a killed run left. AirTouchError otherwise."""
+    """Make the folder for flights, check its free space, and recover the flights of a killed run.
+
+    Raises AirTouchError for a folder that cannot be made or written to, or that is too full.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
         free = shutil.disk_usage(out).free
@@ -93,18 +96,17 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
     if free < LEAST_FREE_BYTES:
         raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, "
                             f"{LEAST_FREE_BYTES / 2**20:.0f} are needed")
-    found, unreadable = recover(out)
-    for path in found:
+    recovered, unreadable = recover(out)
+    for path in recovered:
         say(f"{path}: recovered from a flight whose process was killed")
     for line in unreadable:
         say(f"{line}: an unfinished flight that cannot be recovered; repair it or remove it")
 
 
 def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readiness:
-    """Check log variables, block size, decks; start the log blocks; set parameters. A virtual drone is put to its
-    start.
+    """Check log variables, block size, battery and decks; set parameters; start the log blocks. Nothing moves yet.
 
-    Raises AirTouchError with one line a fault. Nothing has moved yet.
+    A virtual drone is put back to its start. Raises AirTouchError with one line for each fault.
     """
     known = drone.variables
     blocks.check(blocks.MOTION, known)
@@ -121,11 +123,11 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
         drone.start(slow)
     intake = listen(drone, slow, FIRST_DATA_S)
     condition = checks.Condition(intake.latest["vbat_V"], decks, intake.supervisor, intake.latest["zrange_m"])
-    found = checks.problems(condition, plan.least_v)
-    if found:
-        for line in found[:-1]:
+    faults = checks.problems(condition, plan.least_v)
+    if faults:
+        for line in faults[:-1]:
             say(f"not ready: {line}")
-        raise AirTouchError(f"not ready: {found[-1]}")
+        raise AirTouchError(f"not ready: {faults[-1]}")
     for line in checks.notes(condition):
         say(line)
     if drone.protocol < LINEAR_PROTOCOL:
@@ -134,7 +136,7 @@ def make_ready(drone: Drone, plan: Plan, say: Callable[[str], None]) -> Readines
 
 
 def has_deck(drone: Drone, deck: str) -> bool | None:
-    """Whether a deck is attached; None where the firmware knows no such deck."""
+    """True if a deck is attached; None if the firmware does not know it. Raises AirTouchError without an answer."""
     if not drone.has_parameter(f"deck.{deck}"):
         return None
     value = drone.parameter(f"deck.{deck}", PARAMETERS_S)
@@ -144,7 +146,10 @@ def has_deck(drone: Drone, deck: str) -> bool | None:
 
 
 def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake:
-    """Packets until both blocks came, or for so long. Raises AirTouchError when the fast one did not."""
+    """Receive packets until both log blocks have arrived, for `patience_s` at most.
+
+    Raises AirTouchError if the fast block does not arrive.
+    """
     drain(drone.samples)
     intake, until = Intake(slow), time.monotonic() + patience_s
     while time.monotonic() < until:
@@ -159,7 +164,7 @@ def listen(drone: Drone, slow: blocks.Block | None, patience_s: float) -> Intake
 
 
 def firmware(drone: Drone) -> str:
-    """The firmware's revision, as far as it says."""
+    """The firmware's revision, with + if it was modified; "unknown" if the drone does not tell it."""
     first, second = (drone.parameter(f"firmware.revision{i}", 2.0) for i in (0, 1))
     if first is None or second is None:
         return "unknown"
@@ -168,13 +173,13 @@ def firmware(drone: Drone) -> str:
 
 
 def start_over(drone: Drone) -> None:
-    """Put a virtual drone back to its start; another one stands where it stands."""
+    """Put a virtual drone back to its start. A real drone is left alone."""
     if drone.has_parameter(START_OVER):
         drone.set_parameter(START_OVER, "1")
 
 
 def standing_still(drone: Drone, slow: blocks.Block | None) -> Intake:
-    """What the drone says once it does not fly any more. AirTouchError where it goes on for LANDED_S."""
+    """Packets of the drone once it has landed. Raises AirTouchError if it still flies after LANDED_S."""
     until = time.monotonic() + LANDED_S
     while True:
         seen = listen(drone, slow, FIRST_DATA_S)
@@ -186,7 +191,7 @@ def standing_still(drone: Drone, slow: blocks.Block | None) -> Intake:
 
 
 def reset_estimator(drone: Drone) -> None:
-    """Let the position estimate start at this place, where the firmware can."""
+    """Reset the position estimate to zero at this place, if the firmware has the parameter for it."""
     if drone.has_parameter("kalman.resetEstimation"):
         drone.set_parameter("kalman.resetEstimation", "1")
         time.sleep(0.1)
@@ -195,22 +200,25 @@ def reset_estimator(drone: Drone) -> None:
 
 
 def origin_of(latest: dict[str, float]) -> Origin:
-    """Where the drone thinks that it stands; zero where it does not say."""
+    """Position and heading of the standing drone by its own estimate; 0 for values that it does not log."""
     values = [latest.get(name, math.nan) for name in ("x_m", "y_m", "z_m", "yaw_rad")]
     return Origin(*(v if math.isfinite(v) else 0.0 for v in values))
 
 
 def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int, *, stop: Event,
         say: Callable[[str], None], show: Callable[[Flight], None] = lambda _: None) -> Outcome:
-    """One flight, from the ground to the file. Raises AirTouchError where it could not be written."""
+    """Fly a mission once and record it.
+
+    Raises AirTouchError if the drone is not ready or refuses a command, and if the file cannot be written.
+    """
     start_over(drone)
     standing_still(drone, ready.slow)
     reset_estimator(drone)
     standing = listen(drone, ready.slow, FIRST_DATA_S)
     now = replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor)
-    found = checks.problems(now, plan.least_v)
-    if found:
-        raise AirTouchError(f"not ready: {found[0]}")
+    faults = checks.problems(now, plan.least_v)
+    if faults:
+        raise AirTouchError(f"not ready: {faults[0]}")
     if standing.supervisor is not None and standing.supervisor & (CAN_BE_ARMED | ARMED) == CAN_BE_ARMED:
         drone.arm()
         time.sleep(ARMING_S)
@@ -240,7 +248,7 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
 
 
 def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int) -> dict[str, Any]:
-    """What is known of a flight before it is flown."""
+    """The metadata of a flight that are known before take-off."""
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     held = {"period_s": blocks.STATE.period_ms / 1000.0, "longest_s": blocks.HELD_S} if ready.slow else {}
     return {
@@ -254,10 +262,10 @@ def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number
 
 
 def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
-    """Add a flight to the manifest.csv of its folder, which `evaluate` reads; returns its use there.
+    """Add a flight to the manifest.csv of its folder, which `evaluate` reads. Returns its `use` there.
 
-    "clean" when it went as planned and crossed an edge, "free-air" when it crossed none, "messy" otherwise. What the
-    row says of the mission comes from the log's metadata.
+    "clean": ended as planned, with few lost samples, and crossed an edge. "free-air": the same without an edge.
+    "messy": any other. The mission's values come from the log's metadata.
     """
     path, meta = file.parent / "manifest.csv", log.meta
     rows = []
@@ -284,13 +292,13 @@ def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
 
 
 def crossed_an_edge(log: FlightLog) -> bool:
-    """Whether the down range shows an edge; True where nothing tells."""
+    """True if the down range shows an edge, or if there is no down range."""
     return not log.has("zrange_m") or bool(true_edges(log))
 
 
 def recover(folder: Path) -> tuple[list[Path], list[str]]:
-    """`recorder.recover`, and a row of the manifest for each flight that was finished."""
-    found, unreadable = recorder.recover(folder)
-    for path in found:
+    """As `recorder.recover`, and add each recovered flight to the manifest."""
+    recovered, unreadable = recorder.recover(folder)
+    for path in recovered:
         list_flight(path, logs.read(path), planned=False)
-    return found, unreadable
+    return recovered, unreadable

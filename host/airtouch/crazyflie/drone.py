@@ -17,15 +17,15 @@ from airtouch.crazyflie.log_blocks import LogBlocks, Sample
 from airtouch.errors import AirTouchError
 
 CONNECT_S = 20.0
-TAKEN_S = 0.1  #: that an app gets to put a parameter right
+TAKEN_S = 0.1  #: s for the drone to correct a parameter that is out of range
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
 
 
 class Drone:
-    """A connected drone. `samples` and `answers` fill up from cflib's thread; all else is called from ours.
+    """A connected drone. cflib's threads fill `samples` and `answers`; call the methods from one thread.
 
-    Raises AirTouchError for a URI that nobody answers at.
+    Raises AirTouchError if nobody answers at the URI.
     """
 
     def __init__(self, uri: str, cache: Path | None = None, patience_s: float = CONNECT_S) -> None:
@@ -49,13 +49,13 @@ class Drone:
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
         self._log.attach(cf)
-        cf.link_statistics.stop()  # its thread would wait for itself where the link breaks under it
+        cf.link_statistics.stop()  # its thread would join itself when the link breaks
         cf.add_header_callback(self._on_echo, LINKCTRL, ECHO_CHANNEL)
 
     def reopen(self, patience_s: float) -> None:
-        """Connect anew after the link died, with the same log blocks.
+        """Connect again after the link was lost, with the same log blocks.
 
-        Raises AirTouchError if it stays dead.
+        Raises AirTouchError if nobody answers for `patience_s`.
         """
         disconnect(self._cf)
         self._listen(connect(self.uri, self.cache, patience_s, self._console.put))
@@ -66,7 +66,7 @@ class Drone:
         """Close the link. The drone must be on the ground."""
         disconnect(self._cf)
 
-    # what it is and has
+    # variables and parameters
 
     @property
     def variables(self) -> set[str]:
@@ -74,11 +74,11 @@ class Drone:
         return {f"{group}.{name}" for group, names in self._cf.log.toc.toc.items() for name in names}
 
     def has_parameter(self, name: str) -> bool:
-        """Whether the firmware knows the parameter."""
+        """True if the firmware has the parameter."""
         return self._cf.param.toc.get_element(*name.split(".", 1)) is not None
 
     def parameter(self, name: str, patience_s: float = 10.0) -> float | None:
-        """A parameter's value, None where the firmware has none of that name or it never came."""
+        """A parameter's value; None if the firmware does not have it, or it does not arrive for `patience_s`."""
         if not self.has_parameter(name):
             return None
         group, short = name.split(".", 1)
@@ -91,54 +91,51 @@ class Drone:
         return None
 
     def set_parameter(self, name: str, text: str, patience_s: float = 10.0) -> None:
-        """Set a parameter and see that the drone took it. Raises AirTouchError where it did not or cannot."""
+        """Set a parameter and read it back. Raises AirTouchError if the drone does not have it or keep the value."""
         element = self._cf.param.toc.get_element(*name.split(".", 1))
         if element is None:
             raise AirTouchError(f"{name}: this firmware has no such parameter")
         if element.get_readable_access() == "RO":
             raise AirTouchError(f"{name}: this parameter is read-only")
-        wanted = representable(name, text, element.ctype)
+        value = representable(name, text, element.ctype)
         if self.parameter(name, patience_s) is None:
             raise AirTouchError(f"{name}: the drone does not tell its value; is the link good?")
-        told: list[float] = []
+        updates: list[float] = []
 
-        def seen(_: str, value: str) -> None:
-            told.append(float(value))
+        def update(_: str, text: str) -> None:
+            updates.append(float(text))
 
         group, short = name.split(".", 1)
-        self._cf.param.add_update_callback(group, short, seen)
+        self._cf.param.add_update_callback(group, short, update)
         deadline = time.monotonic() + patience_s
         try:
             while not self._cf.param.is_updated and time.monotonic() < deadline:
                 time.sleep(0.02)
-            _next(told, deadline, lambda: self._cf.param.set_value(name, wanted))
-            time.sleep(TAKEN_S)  # what it says it was given is not what it keeps
-            kept = _next(told, deadline, lambda: self._cf.param.request_param_update(name))
+            _next(updates, deadline, lambda: self._cf.param.set_value(name, value))
+            time.sleep(TAKEN_S)  # the first answer repeats the request; the app may still change the value
+            stored = _next(updates, deadline, lambda: self._cf.param.request_param_update(name))
         finally:
-            self._cf.param.remove_update_callback(group, short, seen)
-        if kept is None:
+            self._cf.param.remove_update_callback(group, short, update)
+        if stored is None:
             raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
-        if abs(kept - wanted) > 1e-6 * max(abs(wanted), 1.0):
-            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {kept:g}")
+        if abs(stored - value) > 1e-6 * max(abs(value), 1.0):
+            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {stored:g}")
 
     @property
     def protocol(self) -> int:
-        """Version of its radio protocol."""
+        """Version of the drone's CRTP protocol."""
         return int(self._cf.platform.get_protocol_version())
 
     # log blocks
 
     def start(self, block: Block) -> None:
-        """Have a block logged into `samples`.
-
-        Raises AirTouchError that says what the drone has against it.
-        """
+        """Start a log block; its packets go to `samples`. Raises AirTouchError with the reason of a refusal."""
         self._log.start(block)
         if block not in self.blocks:
             self.blocks.append(block)
 
     def revive(self) -> None:
-        """Ask for the log blocks again, in the background: with the link down the firmware forgets them."""
+        """Request the log blocks again, in a thread: the firmware deletes them when the link is down."""
         if self._reviving is None or not self._reviving.is_alive():
             self._reviving = threading.Thread(target=self._revive, name="airtouch-revive", daemon=True)
             self._reviving.start()
@@ -151,12 +148,12 @@ class Drone:
     # commands
 
     def ping(self) -> None:
-        """Ask for an echo; `round_trip_s` is what the last one took."""
+        """Request an echo. `round_trip_s` is the time that the last echo took."""
         if not self.lost.is_set():
             self._cf.link_statistics.latency.ping()
 
     def said(self) -> list[str]:
-        """Whole lines that its console printed since the last call."""
+        """The complete lines of its console since the last call."""
         *lines, self._text = (self._text + "".join(drain(self._console))).split("\n")
         return [line.strip() for line in lines if line.strip()]
 
@@ -165,10 +162,7 @@ class Drone:
             self.round_trip_s = time.time() - struct.unpack("<Bd", packet.data)[1]
 
     def send(self, commands: Iterable[Command]) -> None:
-        """Send commands to the high-level commander; answers come in `answers`.
-
-        Nothing is sent on a dead link.
-        """
+        """Send commands to the high-level commander; the answers go to `answers`. Without a link nothing is sent."""
         if self.lost.is_set():
             return
         high = self._cf.high_level_commander
@@ -183,7 +177,7 @@ class Drone:
                 high.stop()
 
     def arm(self) -> None:
-        """Ask to be armed, as brushless drones need; others are armed by themselves."""
+        """Request arming. Brushless drones need it; others arm themselves."""
         self._cf.supervisor.send_arming_request(True)
 
     def _on_answer(self, packet: Any) -> None:
@@ -191,20 +185,20 @@ class Drone:
             self.answers.put((KINDS[packet.data[0]], packet.data[3]))
 
 
-def _next(told: list[float], deadline: float, ask: Callable[[], None]) -> float | None:
-    """The first value that is told after `ask`, None where none comes until the deadline."""
-    count = len(told)
-    ask()
-    while len(told) == count and time.monotonic() < deadline:
+def _next(updates: list[float], deadline: float, request: Callable[[], None]) -> float | None:
+    """The first value that another thread appends to `updates` after `request`; None after the deadline."""
+    count = len(updates)
+    request()
+    while len(updates) == count and time.monotonic() < deadline:
         time.sleep(0.02)
-    return told[count] if len(told) > count else None
+    return updates[count] if len(updates) > count else None
 
 
 def drain(source: "queue.SimpleQueue[Any]") -> list[Any]:
-    """Everything that is in a queue now."""
-    found = []
+    """All items that are in a queue now."""
+    items = []
     while True:
         try:
-            found.append(source.get_nowait())
+            items.append(source.get_nowait())
         except queue.Empty:
-            return found
+            return items

@@ -1,7 +1,7 @@
-"""Firmware images: looked at before they are flashed, so that a wrong file never reaches the drone.
+"""Firmware images. Each is checked before it is flashed, so that a wrong file never reaches the drone.
 
-What an image must be is written in the firmware's linker scripts (tools/make/F405/linker), in
-`vector_table` order, and in the AI-deck's bootloader (aideck-gap8-bootloader, src/bl.c, check-app-image.py).
+Sources of the checks: the firmware's linker scripts (tools/make/F405/linker), in `vector_table` order, and the
+AI-deck's bootloader (aideck-gap8-bootloader, src/bl.c, check-app-image.py).
 """
 
 import struct
@@ -16,9 +16,9 @@ from airtouch.errors import AirTouchError
 TARGETS = {"stm32": "stm32-fw", "gap8": "deck-bcAI:gap8-fw"}  #: our name -> cfloader's
 STM32_FLASH = range(0x0800_4000, 0x0810_0000)  #: the bootloader lies before it
 STM32_STACK = (range(0x2000_0004, 0x2002_0001), range(0x1000_0004, 0x1001_0001))  #: RAM, CCM; Bitcraze's is odd
-STM32_LEAST = 16_384  #: bytes; less is no firmware
-STM32_VECTORS = 16  #: of the Cortex-M4 itself, the stack pointer first
-GAP8_L2 = range(0x1C00_0000, 0x1C06_0000)  #: up to where the bootloader lies while it loads
+STM32_LEAST = 16_384  #: bytes; a smaller file is no firmware
+STM32_VECTORS = 16  #: vectors of the Cortex-M4 itself, the stack pointer first
+GAP8_L2 = range(0x1C00_0000, 0x1C06_0000)  #: L2 memory below the bootloader
 GAP8_FC_L1 = range(0x1B00_0000, 0x1B00_2000)
 GAP8_MOST_SEGMENTS = 16
 GAP8_MOST = 0x0080_0000 - 0x0004_0000  #: bytes of flash behind the bootloader
@@ -35,9 +35,9 @@ class Image:
 
 
 def inspect(path: Path, target: str | None = None) -> Image:
-    """The image at `path`, checked. target: what it must be; found out where None.
+    """The image at `path`, after all checks. target: "stm32" or "gap8"; None recognises it by content.
 
-    Raises AirTouchError that says what is wrong with it.
+    Raises AirTouchError with the check that fails.
     """
     try:
         data = path.read_bytes()
@@ -52,13 +52,13 @@ def inspect(path: Path, target: str | None = None) -> Image:
 
 
 def command(image: Image, uri: str | None) -> list[str]:
-    """cfloader's command line; without a URI the drone is switched on by hand (cold boot)."""
+    """cfloader's command line. Without a URI it waits for a drone that is switched on by hand (cold boot)."""
     warm = ["-w", uri] if uri else ["-c"]
     return [sys.executable, "-m", "cfloader", "flash", str(image.path), TARGETS[image.target], *warm]
 
 
 def flash(image: Image, uri: str | None) -> None:
-    """Run cfloader. Raises AirTouchError where it is missing or fails."""
+    """Flash the image with cfloader. Raises AirTouchError if cfloader is missing or fails."""
     if find_spec("cfloader") is None:
         raise AirTouchError("cfloader is not installed: pip install airtouch[flash]")
     if image.target == "gap8" and not uri:
@@ -72,7 +72,7 @@ def flash(image: Image, uri: str | None) -> None:
 
 
 def _guess(path: Path, data: bytes) -> str:
-    """By what the first bytes can be, not by the name."""
+    """The target of an image, recognised by its first bytes, not by its name."""
     for target, entry in (("stm32", _stm32_entry), ("gap8", _gap8_entry)):
         try:
             entry(path, data)

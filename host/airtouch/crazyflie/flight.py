@@ -1,4 +1,4 @@
-"""One flight: packets in, rows to the file, commands out, and what makes it land early."""
+"""One flight: receive packets, write rows to the file, send commands, and land early when something is wrong."""
 
 import contextlib
 import queue
@@ -19,26 +19,26 @@ from airtouch.crazyflie.recorder import Recorder
 from airtouch.crazyflie.ticks import Restarted
 from airtouch.errors import AirTouchError
 
-TURN_S = 0.02  #: of the loop
+TURN_S = 0.02  #: s, period of the loop
 PING_S = 0.5
-LINK_TIMEOUT_S = 3.0  #: of silence, then it lands as soon as it is heard again
-FORGOTTEN_S = 1.0  #: of silence, then the firmware has forgotten the log blocks
-GIVE_UP_S = 60.0  #: without an answer to the land command
-DOWN_S = 3.0  #: of a landing after an error
-AFTER_S = 0.5  #: of log after the motors stopped
+LINK_TIMEOUT_S = 3.0  #: s of silence, after which the drone lands as soon as the link is back
+FORGOTTEN_S = 1.0  #: s of silence, after which the firmware has deleted the log blocks
+GIVE_UP_S = 60.0  #: s without an answer to the land command, after which the flight gives up
+DOWN_S = 3.0  #: s, duration of a landing after an error
+AFTER_S = 0.5  #: s of log after the motors have stopped
 BATTERY_SAMPLES = 100
 
 
 class Craft(Protocol):
-    """What a flight needs of a drone; `drone.Drone` is one."""
+    """The interface of a drone that a flight needs. `drone.Drone` has it."""
 
     @property
     def samples(self) -> "queue.SimpleQueue[Sample]":
-        """Samples as they come."""
+        """Received log packets."""
 
     @property
     def answers(self) -> "queue.SimpleQueue[tuple[str, int]]":
-        """Kind of command and code of what the drone answered."""
+        """The drone's answers: kind of command and error code, 0 for accepted."""
 
     @property
     def lost(self) -> Event:
@@ -48,20 +48,20 @@ class Craft(Protocol):
         """Send commands."""
 
     def ping(self) -> None:
-        """Ask for an echo."""
+        """Request an echo."""
 
     def reopen(self, patience_s: float) -> None:
-        """Connect anew; AirTouchError if that fails."""
+        """Connect again. Raises AirTouchError if that fails."""
 
     def revive(self) -> None:
-        """Ask for the log again; the drone may have forgotten it."""
+        """Request the log blocks again; the drone may have deleted them."""
 
 
 @dataclass
 class Flight:
-    """Runs one flight to its end. `run` returns how it ended; never leaves a drone in the air on purpose.
+    """One flight. `run` flies it and returns how it ended. On any error it lands the drone first.
 
-    stop: set by whoever wants it to land (Ctrl-C). show: called every turn with the flight.
+    stop: set it to land (Ctrl-C). show: called with the flight in every turn of the loop.
     """
 
     craft: Craft
@@ -80,7 +80,7 @@ class Flight:
     _silent_since: float | None = None
 
     def run(self) -> str:
-        """Fly. Returns how it ended: "as planned", or why it landed early."""
+        """Fly to the end. Returns "as planned", or the reason of an early landing."""
         began, last_ping, landing_since = self.clock(), 0.0, None
         try:
             while self.pilot.phase != "done":
@@ -115,7 +115,7 @@ class Flight:
             raise
 
     def _tell(self, text: str) -> None:
-        """Say it where there is still someone to hear it; a closed terminal is no reason to fall."""
+        """Print a line. A closed terminal must not end the flight."""
         with contextlib.suppress(OSError):
             self.say(text)
 
@@ -124,7 +124,7 @@ class Flight:
         return reason or "as planned"
 
     def _receive(self) -> bool:
-        """Take what came; False when the drone's clock started anew."""
+        """Handle the received packets. False if the drone restarted."""
         try:
             times, columns = self.intake.take(drain(self.craft.samples))
         except Restarted:
@@ -146,11 +146,11 @@ class Flight:
         return silence
 
     def _now(self, silence: float) -> float:
-        """The drone's clock, running on while nothing comes."""
+        """The drone's clock in s, extrapolated during silence."""
         return (self.intake.newest_ms or 0) / 1000.0 + max(silence, 0.0)
 
     def _reason(self, silence: float) -> str | None:
-        """Why it must land now, if it must."""
+        """The reason to land now; None without one."""
         if self.stop.is_set():
             return "stopped by the user"
         if self.recorder.error:
@@ -176,7 +176,7 @@ class Flight:
             raise
 
     def _tail(self) -> None:
-        """Half a second more of log, and "stop" once more in case it was lost."""
+        """Log for AFTER_S more, and send "stop" again in case it was lost."""
         until = self.clock() + AFTER_S
         while self.clock() < until:
             self._receive()
@@ -185,7 +185,7 @@ class Flight:
         self._receive()
 
     def _bring_down(self) -> None:
-        """Something went wrong here: land first, complain later."""
+        """Land after an error in this program, before the error is reported."""
         if not self.pilot.in_air:
             self.landed = True
             return
@@ -200,5 +200,5 @@ class Flight:
                     self.sleep(command.seconds + 1.0)
                     self.craft.send([Command("stop")])
                     return
-            except Exception:  # whatever it is: the guard process lands when this one gives up
+            except Exception:  # the guard process lands the drone when this one ends
                 return

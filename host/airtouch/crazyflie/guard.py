@@ -1,8 +1,8 @@
-"""A process of its own that lands the drone when the one that flies it dies without having landed.
+"""A second process that lands the drone if the flying process dies before it has landed.
 
-The high-level commander would hover until the battery is empty. `python -m airtouch.crazyflie.guard URI
-HEIGHT SECONDS` waits on its standard input, whose end means that the flying process is gone: land commands go
-out until one is answered. After a landing the flying process ends it.
+Without it the high-level commander would hover until the battery is empty. `python -m airtouch.crazyflie.guard
+URI HEIGHT SECONDS` waits for the end of its standard input, which means that the flying process is gone. Then it
+sends land commands until one is answered. After a normal landing the flying process ends the guard.
 """
 
 import contextlib
@@ -15,27 +15,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-PATIENCE_S = 60.0  #: for a drone that is out of reach or a radio that is still busy
+PATIENCE_S = 60.0  #: s to wait for a drone out of reach or a radio that is still busy
 RESEND_S = 0.2
 HEADER = 0x8C  #: CRTP port 8, channel 0
 LAND = 8
 
 
 def land_packet(height_m: float, seconds: float) -> bytes:
-    """COMMAND_LAND_2 of the high-level commander: to this height, heading kept."""
+    """The packet COMMAND_LAND_2 of the high-level commander: land to this height (m) in this time, same heading."""
     return struct.pack("<BBff?f", LAND, 0, height_m, 0.0, True, seconds)
 
 
 @dataclass
 class Guard:
-    """Set `landed` once nothing flies any more; without it the guard lands."""
+    """State of the guard. Set `landed` after the landing; otherwise the guard lands the drone."""
 
     landed: bool = False
 
 
 @contextlib.contextmanager
 def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
-    """While the body runs, another process stands by to land."""
+    """Run a guard process during the body of a `with` statement."""
     command = [sys.executable, "-m", "airtouch.crazyflie.guard", uri, str(height_m), str(seconds)]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True)
     guard = Guard()
@@ -51,7 +51,7 @@ def guarding(uri: str, height_m: float, seconds: float) -> Iterator[Guard]:
 
 
 def land(uri: str, height_m: float, seconds: float, patience_s: float = PATIENCE_S) -> bool:
-    """Send land until the drone answers; whether it did."""
+    """Send land commands until the drone answers. False if it does not for `patience_s`."""
     from cflib.crtp.crtpstack import CRTPPacket
 
     from airtouch.crazyflie.link import cflib_or_error
@@ -68,7 +68,7 @@ def land(uri: str, height_m: float, seconds: float, patience_s: float = PATIENCE
                 link.send_packet(packet)
                 if _answered(link):
                     return True
-        except Exception:  # the radio may still belong to the dying process: any driver error, try again
+        except Exception:  # any error of the driver: the dying process may still hold the radio
             link = None
         time.sleep(RESEND_S)
     return False
@@ -84,7 +84,7 @@ def _answered(link: Any) -> bool:
 
 
 def main() -> None:
-    """Wait for the end of the input; what landing needs is loaded before."""
+    """Wait for the end of standard input, then land. The modules for landing are imported before."""
     from airtouch.crazyflie.link import cflib_or_error
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

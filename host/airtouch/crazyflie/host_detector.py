@@ -1,4 +1,4 @@
-"""The `best` detector on the host, fed as samples come: from a drone without the app, or from a file."""
+"""The `best` detector on the host, sample by sample: for a drone without the app, or for a file."""
 
 from collections.abc import Mapping
 
@@ -12,17 +12,17 @@ from airtouch.detector.trace import Detection, Trace
 from airtouch.kernels.stream_session import StreamSession
 from airtouch.logs.flight_log import FlightLog
 
-MOST_FILLED = 100  #: samples of a gap that are given to the detector as missing
+MOST_FILLED = 100  #: samples of a gap that are fed to the detector as NaN; the rest of a longer gap is skipped
 
 
 class HostDetector:
-    """The C that flies, sample by sample.
+    """`best` in the C code of the drone, sample by sample.
 
-    `next` takes rows, `trace` gives what `best.run` gives of all of them.
+    `next` takes rows and returns their results. `trace` returns the trace of all rows, equal to that of `best.run`.
     """
 
     def __init__(self, model: BestModel | None = None, missing: tuple[str, ...] = ()) -> None:
-        """missing: the sensors, one at most, that no row will have (`detector.sensors.missing`)."""
+        """missing: the sensors, one at most, that the rows lack (`detector.shared.sensors.missing`)."""
         self.model = (model or best.load(None)).serving(missing)
         self.lag_s = best.lag_s(self.model)
         self._missing = missing
@@ -36,7 +36,7 @@ class HostDetector:
         self.taken = 0  #: rows so far
 
     def next(self, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[Detection]]:
-        """(P(over a platform) (n,), the edges reported at these rows).
+        """P(over a platform), (n,), and the edges reported at these rows.
 
         Raises AirTouchError for missing columns.
         """
@@ -62,17 +62,17 @@ class HostDetector:
         return np.where(events.airborne, over, 0.0), found
 
     def trace(self, log: FlightLog) -> Trace:
-        """The trace of every row so far; `log` holds the same rows."""
+        """The trace of all rows so far. `log` holds the same rows."""
         return best.trace_of(log, self.model, np.concatenate(self._logits), np.concatenate(self._edge),
                              np.concatenate(self._airborne))
 
 
 def with_gaps(times_ms: np.ndarray, columns: Mapping[str, np.ndarray], before_ms: int | None,
               period_ms: int = 10) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Rows with the lost ones between them as NaN, so that the detector's clock stays true.
+    """Times (m,) in ms and columns (m,) with a NaN row for each lost one, so that rows stay evenly spaced.
 
-    before_ms: time of the row before, None at the start. At most MOST_FILLED rows for one gap; rows that
-    are not later than the one before them are left out.
+    before_ms: time of the row before, None at the start. A gap is filled with MOST_FILLED rows at most. Rows that
+    are not later than the row before them are left out.
     """
     before = times_ms[0] - period_ms if before_ms is None else before_ms
     newest = np.maximum.accumulate(np.r_[before, times_ms])[:-1]

@@ -1,4 +1,4 @@
-"""From log packets to rows: time stamps unwrapped, slow values held beside fast ones, losses counted."""
+"""Log packets as rows: with unwrapped time stamps, held values of the slow block, and a count of lost samples."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -11,15 +11,15 @@ from airtouch.crazyflie.blocks import Block
 from airtouch.crazyflie.log_blocks import Sample
 from airtouch.crazyflie.ticks import Ticks
 
-REMEMBERED_S = 1.0  #: of slow packets
+REMEMBERED_S = 1.0  #: s for which packets of the slow block are stored
 
 
 @dataclass
 class Intake:
-    """Takes packets as they come and gives the columns of the new rows.
+    """Converts packets to rows with `take`.
 
-    received, first_ms, newest_ms: of the fast block. last_arrival_s: host's clock.
-    Raises ticks.Restarted when the drone's clock starts anew.
+    received: packets of the fast block; first_ms, newest_ms: their first and newest time, drone's clock.
+    last_arrival_s: of any packet, host's clock. latest: the newest values by column.
     """
 
     slow: Block | None
@@ -35,32 +35,35 @@ class Intake:
 
     @property
     def names(self) -> list[str]:
-        """The columns that `take` gives, and t_s."""
+        """t_s and the columns that `take` returns."""
         zeros = dict.fromkeys(blocks.MOTION.names, 0)
-        found = ["t_s", *blocks.motion_columns([zeros])]
+        names = ["t_s", *blocks.motion_columns([zeros])]
         if self.slow:
-            found += blocks.state_columns(self.slow, [dict.fromkeys(self.slow.names, 0)])
-        return found
+            names += blocks.state_columns(self.slow, [dict.fromkeys(self.slow.names, 0)])
+        return names
 
     @property
     def complete(self) -> bool:
-        """Whether both blocks have been heard, the fast one for a fifth of a second."""
+        """True if both blocks have arrived, the fast one for a fifth of a second."""
         return self.received > 20 and (self.slow is None or bool(self._past))
 
     @property
     def lost(self) -> int:
-        """Samples that should have come by now and did not (those under way count as lost)."""
+        """Samples that should have arrived by now and did not; delayed ones count as lost."""
         if self.first_ms is None or self.newest_ms is None:
             return 0
         return max(round((self.newest_ms - self.first_ms) / blocks.MOTION.period_ms) + 1 - self.received, 0)
 
     @property
     def lateness_s(self) -> float:
-        """How much later than the quickest of the last 500 the last packet came, seconds."""
+        """Delay of the last packet over the least of the last 500, in s; NaN before the first."""
         return self._delays[-1] - min(self._delays) if self._delays else float("nan")
 
     def take(self, samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """(clock (n,) in ms, SI columns (n,)) of the rows of the fast block among these packets."""
+        """The rows of the fast block in these packets: drone's clock, (n,) in ms, and SI columns, (n,) each.
+
+        Raises ticks.Restarted if the drone's clock started again from zero.
+        """
         fast: list[tuple[int, dict]] = []
         for sample in samples:
             at = self.ticks.unwrap(sample.stamp)

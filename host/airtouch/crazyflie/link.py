@@ -11,15 +11,12 @@ from typing import Any
 
 from airtouch.errors import AirTouchError
 
-#: without a packet: before the first ones, for which cflib never asks twice, and later
+#: s without a packet after which an attempt has failed: before the first packets, which cflib requests once, and later
 FIRST_S, NEXT_S, FIRST_PACKETS = 1.5, 4.0, 3
 
 
 def cflib_or_error() -> Any:
-    """The cflib package; AirTouchError with the remedy where it is not installed.
-
-    Its own messages are silenced.
-    """
+    """The cflib package, with its log messages off. Raises AirTouchError with the remedy if it is not installed."""
     try:
         import cflib.crazyflie
         import cflib.crtp
@@ -35,7 +32,7 @@ def cflib_or_error() -> Any:
 
 
 def _usable(cache: Path | None) -> str | None:
-    """The folder as cflib wants it, None where it cannot be made."""
+    """The cache folder as text for cflib; None if it cannot be made."""
     try:
         if cache:
             cache.mkdir(parents=True, exist_ok=True)
@@ -45,15 +42,15 @@ def _usable(cache: Path | None) -> str | None:
 
 
 def default_cache() -> Path:
-    """Where the tables of known drones are kept, so that the next connection is quick."""
+    """The folder of the cached tables of contents, which make the next connection to a drone fast."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airtouch" / "drones"
 
 
 def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str], None]) -> Any:
-    """A connected cflib Crazyflie. One whose packets keep coming may take longer than `patience_s`.
+    """A connected cflib Crazyflie. A drone that keeps sending packets may take longer than `patience_s`.
 
-    told: gets pieces of what its console prints, from the first on.
-    Raises AirTouchError where nobody answers.
+    told: called with pieces of the console's text, from the first on.
+    Raises AirTouchError if nobody answers.
     """
     cflib_or_error()
     from airtouch.crazyflie.cflib_crazyflie import Crazyflie
@@ -69,7 +66,7 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
         cf.console.receivedChar.add_callback(told)
         cf.open_link(uri)
         if cf.link and uri.startswith("udp"):
-            cf.link.needs_resending = True  # UDP loses packets, and cflib takes it for a line that does not
+            cf.link.needs_resending = True  # UDP loses packets; cflib assumes that it does not
         while not done.wait(0.05):
             if time.monotonic() - heard_s[-1] > (FIRST_S if len(heard_s) < FIRST_PACKETS else NEXT_S):
                 break
@@ -84,7 +81,7 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
 
 
 def disconnect(cf: Any) -> None:
-    """Close without the zero set-point that cflib sends: it would stop the motors of a flying drone."""
+    """Close the link without cflib's zero set-point, which would stop the motors of a flying drone."""
     link, cf.link = cf.link, None
     link.close()
     cf.close_link()

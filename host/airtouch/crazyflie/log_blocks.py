@@ -1,9 +1,9 @@
-"""Asking the drone for log blocks, and what it answers.
+"""Requests for log blocks, and the drone's answers to them.
 
-An answer names the block by its number. Every attempt has a number of its own, and an answer decides only
-about the attempt that it names: answers may be late, and the next block is then under way. cflib repeats what
-is not answered within 0.2 s, so the drone may be asked twice for the same thing. Its second answer, "the
-number is taken" or "larger than a packet", then says nothing.
+An answer names the block by its number. Every attempt uses a new number, and an answer decides only about the
+attempt that it names, because a late answer may arrive when the next block has been requested. cflib repeats a
+request without an answer after 0.2 s, so the drone may get it twice. Its second answer, "the number is taken" or
+"larger than a packet", is then ignored.
 """
 
 import errno
@@ -15,12 +15,12 @@ from typing import Any
 from airtouch.crazyflie.blocks import Block
 from airtouch.errors import AirTouchError
 
-BLOCK_S = 1.5  #: that a log block gets until its first packet
-BLOCK_ATTEMPTS = 6  #: a lost "create" makes the "append" after it fail
+BLOCK_S = 1.5  #: s to wait for the first packet of a log block
+BLOCK_ATTEMPTS = 6  #: attempts to start a block; a lost "create" makes the "append" after it fail
 LOG_PORT, SETTINGS_CHANNEL, DATA_CHANNEL = 5, 1, 2
 DELETE_BLOCK, CREATE_BLOCK, LOG_HEADER = 2, 6, 4  #: bytes before the values: number, 24-bit clock
 INCOMPLETE = 256  #: no error of the firmware: an "append" that came before its "create" is lost
-FORGET_S = 0.3  #: between two requests to delete the same block
+FORGET_S = 0.3  #: s between two requests to delete the same block
 LOG_COMMANDS = {0: "create", 1: "append to", 3: "start", 6: "create", 7: "append to"}
 LOG_ERRORS = {errno.ENOENT: "a variable or the block is unknown to it", errno.E2BIG: "it is larger than a packet",
               errno.ENOEXEC: "it does not know the command",
@@ -30,7 +30,7 @@ LOG_ERRORS = {errno.ENOENT: "a variable or the block is unknown to it", errno.E2
 
 @dataclass(frozen=True)
 class Sample:
-    """One log packet: its block, the drone's 24-bit clock (ms), arrival (host, s) and values."""
+    """A log packet: name of its block, drone's 24-bit clock (ms), arrival (host's clock, s) and values."""
 
     block: str
     stamp: int
@@ -40,21 +40,21 @@ class Sample:
 
 @dataclass(eq=False)
 class Attempt:
-    """A block that was asked for under one number.
+    """A request for a block under one number.
 
-    said: (command, error) of each refusal, None for the first whole packet.
+    said: (command, error) of each refusal, None for the first packet of data.
     repeated: commands that were sent again.
     """
 
     block: Block
-    config: Any  #: cflib's view of it
+    config: Any  #: cflib's LogConfig
     said: "queue.SimpleQueue[tuple[int, int] | None]" = field(default_factory=queue.SimpleQueue)
     repeated: set[int] = field(default_factory=set)
     whole: bool = False
 
 
 class LogBlocks:
-    """The log blocks of one drone. `samples` fills up from cflib's thread with the packets of those asked for."""
+    """The log blocks of one drone. cflib's thread puts the packets of the requested blocks into `samples`."""
 
     def __init__(self, samples: "queue.SimpleQueue[Sample]") -> None:
         self._samples = samples
@@ -63,7 +63,7 @@ class LogBlocks:
         self._cf: Any = None
 
     def attach(self, cf: Any) -> None:
-        """Use this link from now on; it knows no blocks and counts their numbers anew."""
+        """Use this connection from now on. It has no blocks, and their numbers start again."""
         self._cf = cf
         self._newest, self._deleted_s = {}, {}
         cf.add_header_callback(self._on_answer, LOG_PORT, SETTINGS_CHANNEL)
@@ -71,9 +71,9 @@ class LogBlocks:
         cf.resent.add_callback(self._on_repeat)
 
     def start(self, block: Block) -> None:
-        """Have the block logged. Returns when its first packet has come.
+        """Start a log block. Returns when its first packet has arrived.
 
-        Raises AirTouchError that says what the drone has against it.
+        Raises AirTouchError with the drone's reason if it refuses.
         """
         reason = f"log block {block.name}: the drone sends none of it; is the link good?"
         for _ in range(BLOCK_ATTEMPTS):
@@ -91,7 +91,7 @@ class LogBlocks:
         raise AirTouchError(reason)
 
     def _ask(self, block: Block) -> Attempt:
-        """Ask for the block under a new number; the one under its older number is given up."""
+        """Request the block under a new number, and give up the attempt under its old one."""
         from cflib.crazyflie.log import LogConfig
 
         config = LogConfig(block.name, block.period_ms)
@@ -119,7 +119,7 @@ class LogBlocks:
         return attempt
 
     def _give_up(self, attempt: Attempt | None) -> None:
-        """Take it out of cflib's list, which holds 16 blocks and 128 variables, given up or not."""
+        """Remove an attempt from cflib's list, which holds 16 blocks and 128 variables."""
         if attempt is not None and attempt.config in self._cf.log.log_blocks:
             self._cf.log.log_blocks.remove(attempt.config)
 
@@ -127,7 +127,7 @@ class LogBlocks:
         return {attempt.config.id: attempt for attempt in list(self._newest.values())}
 
     def _on_data(self, packet: Any) -> None:
-        """Sees to blocks that are none of ours any more, or only half of one."""
+        """Refuse a packet that lacks some of its block's variables, and delete a block that was given up."""
         number, size = packet.data[0], len(packet.data) - LOG_HEADER
         attempt = self._attempts().get(number)
         if attempt is not None:

@@ -1,7 +1,7 @@
-"""Missions: a scenario file's [mission] as the legs that a high-level commander flies.
+"""Missions: the [mission] of a scenario file as legs for the high-level commander.
 
-The file that the simulator flies is the file that the drone flies: way-points, speeds and
-times come from the simulator's own set-points.
+The simulator and the drone fly the same file: way-points, speeds and times come from the simulator's
+set-points.
 """
 
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ from airtouch.simulation import scenario
 from airtouch.simulation import setpoint as c
 from airtouch.simulation.mission import RATE_HZ
 
-SHORTEST_S = 0.05  #: a stop shorter than this is a corner, no hover
+SHORTEST_S = 0.05  #: s; a shorter stop is a corner, no hover
 LANDING_MPS = 0.3
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One thing to do: kind wait, take-off, go, hover or land; where it ends (m, rad) and how long it takes.
+    """A leg: kind (wait, take-off, go, hover or land), its end (m, rad) and its duration (s).
 
-    Positions are relative to the place and heading at take-off: x forward, y left, z up.
+    Positions are relative to the position and heading at take-off: x forward, y left, z up.
     """
 
     kind: str
@@ -36,16 +36,16 @@ class Leg:
 
 @dataclass(frozen=True)
 class Mission:
-    """What is flown: legs, their values, and the scenario that they come from."""
+    """A mission: its legs, the values drawn for it, and its scenario."""
 
     name: str
     legs: tuple[Leg, ...]
     values: dict
-    speed_mps: float | None  #: of the longest level leg, which is what scores need
+    speed_mps: float | None  #: speed of the longest level leg; scores use it
 
     @property
     def seconds(self) -> float:
-        """From the start of the log to the motors' stop."""
+        """Duration from the start of the log to the stop of the motors."""
         return sum(leg.seconds for leg in self.legs)
 
     @property
@@ -55,7 +55,7 @@ class Mission:
         return min(x), max(x), min(y), max(y), max(z)
 
     def describe(self) -> str:
-        """One line: what is flown and how much room it takes."""
+        """One line with the legs and the room that they need."""
         x0, x1, y0, y1, z1 = self.room_m
         speed = f", {self.speed_mps:g} m/s" if self.speed_mps else ""
         return (f"{self.name}: {self.seconds:.0f} s{speed}; x {x0:.1f} to {x1:.1f} m ahead, "
@@ -63,14 +63,14 @@ class Mission:
 
 
 def names() -> list[str]:
-    """The missions that come with the package."""
+    """Names of the missions in the package."""
     return sorted(f.name[:-5] for f in shipped_folder().iterdir() if f.name.endswith(".toml"))
 
 
 def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
-    """A mission by name (ready ones and scenarios) or .toml file; its values are drawn by seed and flight.
+    """A mission by the name of a built-in mission or scenario, or by .toml file; seed and flight draw its values.
 
-    Raises AirTouchError in one line for what cannot be read or flown.
+    Raises AirTouchError, in one line, for a file that cannot be read and a mission that cannot be flown.
     """
     scene = scene_of(name_or_path)
     plan = scenario.draw_flight(scene, seed, flight)
@@ -82,7 +82,10 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
 
 
 def scene_of(name_or_path: str | Path) -> scenario.Scenario:
-    """The world and mission of that name (ready ones and scenarios) or .toml file. AirTouchError names what is near."""
+    """The scenario of a built-in mission, a built-in scenario or a .toml file.
+
+    Raises AirTouchError, with similar names, if there is none.
+    """
     if str(name_or_path) in names():
         text = (shipped_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
         return scenario.parse(text, str(name_or_path))
@@ -94,9 +97,9 @@ def scene_of(name_or_path: str | Path) -> scenario.Scenario:
 
 
 def legs_of(setpoints: np.ndarray) -> list[Leg]:
-    """The legs of set-points (rows, 8) at 100 Hz: one for each stretch of constant motion.
+    """The legs of set-points (rows, 8) at 100 Hz: one for each interval of constant motion.
 
-    A flight that does not end with a landing gets one.
+    A landing is added to a flight without one.
     """
     rows = np.asarray(setpoints, dtype=np.float64)
     places, motors = rows[:, c.X:c.Z + 1], rows[:, c.MOTORS] > 0.0
@@ -132,12 +135,12 @@ def _leg(kind: str, end: Sequence[float], seconds: float) -> Leg:
 
 
 def landing(last: Leg) -> Leg:
-    """The landing below the end of a leg."""
+    """A landing straight down from the end of a leg."""
     return replace(last, kind="land", z_m=0.0, seconds=max(2.0, last.z_m / LANDING_MPS))
 
 
 def _at_start(places: np.ndarray, yaw: float) -> np.ndarray:
-    """World positions seen from the start, nose along x."""
+    """World positions (n, 3) relative to the start, with x along the heading there."""
     moved = places - places[0]
     cos, sin = np.cos(yaw), np.sin(yaw)
     return np.column_stack([cos * moved[:, 0] + sin * moved[:, 1], cos * moved[:, 1] - sin * moved[:, 0],

@@ -1,4 +1,4 @@
-"""`monitor`: a drone's packets onto the board, edges from its app or from the detector on the host."""
+"""`monitor`: the live view of a drone, with edges from its app or from the detector on the host."""
 
 import time
 from collections import deque
@@ -20,14 +20,14 @@ from airtouch.errors import AirTouchError
 
 TURN_S = 0.05
 PING_S = 0.5
-RATE_S = 2.0  #: over which the rate is counted
+RATE_S = 2.0  #: s over which the packet rate is averaged
 REOPEN_S = 5.0
 
 
 def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostDetector | None]:
-    """Start the blocks. Returns (slow block, host's detector or None where the app on the drone is shown).
+    """Start the log blocks. Returns the slow block and the host's detector; None for the detector of the drone's app.
 
-    Raises AirTouchError for what the drone lacks.
+    Raises AirTouchError with the log variables that the drone lacks.
     """
     known = drone.variables
     blocks.check(blocks.MOTION, known)
@@ -41,7 +41,7 @@ def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostD
 
 @dataclass
 class Monitor:
-    """Takes packets, keeps the board. felt: called with every edge."""
+    """Updates a board from packets. felt: called with every edge."""
 
     board: Board
     intake: Intake
@@ -53,7 +53,7 @@ class Monitor:
     _arrivals: deque = field(default_factory=deque)
 
     def take(self, samples: list[Sample]) -> None:
-        """New packets. Raises Restarted when the drone's clock started anew."""
+        """Handle new packets. Raises Restarted if the drone's clock started again from zero."""
         for sample in samples:
             if sample.block == app_log.WANTED.name:
                 self._take_app(sample)
@@ -67,14 +67,14 @@ class Monitor:
         self._before_ms = int(clock[-1])
         self._arrivals += [(time.monotonic(), len(times))]
         seconds = (clock - self.intake.first_ms) / 1000.0
-        found = []
+        edges = []
         if self.detector:
-            probability, found = self.detector.next(filled)
+            probability, edges = self.detector.next(filled)
             begin = self.detector.taken - len(clock)
         else:
             probability = np.full(len(clock), self.app.probability if self.app else np.nan)
         self.board.add(seconds, filled, probability)
-        for edge in found:
+        for edge in edges:
             self.felt(self.board.feel(edge.kind, float(seconds[edge.sample - begin]), edge.probability))
 
     def _take_app(self, sample: Sample) -> None:
@@ -89,11 +89,11 @@ class Monitor:
         self.board.status = "; ".join([*load, *self.app.faults])
 
     def restart(self) -> None:
-        """The drone's clock starts anew; the detector goes on."""
+        """Start again with the drone's new clock; the detector keeps its state."""
         self.intake, self._before_ms, self._edges = Intake(self.intake.slow), None, None
 
     def refresh(self, round_trip_s: float) -> None:
-        """Bring the link's figures up to date."""
+        """Update the state of the link on the board."""
         now = time.monotonic()
         while self._arrivals and now - self._arrivals[0][0] > RATE_S:
             self._arrivals.popleft()
@@ -107,7 +107,7 @@ class Monitor:
 
 def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
           show: Callable[[Board], None], say: Callable[[str], None]) -> None:
-    """Until the duration is over or `stop` is set; a broken link is opened again for as long."""
+    """Update and show the board for `duration_s`, or until `stop` is set. A lost link is opened again."""
     until = time.monotonic() + duration_s if duration_s else float("inf")
     pinged = 0.0
     while time.monotonic() < until and not stop.is_set():

@@ -1,7 +1,7 @@
-"""Writing a flight while it is flown: every row reaches the file at once, the whole log at the end.
+"""Recording of a flight. Each row is written to `NAME.part` at once, and the whole log to `NAME` at the end.
 
-The unfinished file `NAME.part` is a canonical CSV that `airtouch logs` reads, cut off or not. Rows are in
-the order of arrival there; the finished file is sorted. A full disk ends the writing, not the flight.
+`NAME.part` is a canonical CSV that `airtouch logs` reads, also when it is truncated. Its rows are in order of
+arrival; those of the finished file are sorted. A full disk ends the writing, not the flight.
 """
 
 import fcntl
@@ -23,12 +23,12 @@ LEAST_FREE_BYTES = 50 * 2**20
 
 
 def flight_path(folder: Path, name: str, number: int) -> Path:
-    """The file of one flight."""
+    """The file of a flight."""
     return folder / f"{name}_{number:04d}{SUFFIX}"
 
 
 def next_number(folder: Path, name: str) -> int:
-    """The first number that no finished or unfinished flight in the folder has."""
+    """The number after the highest of all flights of this name in the folder, finished or not; at least 1."""
     taken = [0]
     for path in folder.glob(f"{name}_*"):
         number = path.name.removeprefix(f"{name}_").removesuffix(PART).removesuffix(SUFFIX)
@@ -37,9 +37,9 @@ def next_number(folder: Path, name: str) -> int:
 
 
 class Recorder:
-    """One flight's file. Raises AirTouchError where it cannot be opened.
+    """The file of one flight. Raises AirTouchError if it cannot be opened.
 
-    error: why writing stopped, None as long as it works; rows are then kept in memory only.
+    error: why writing stopped, else None. Rows stay in memory in any case.
     """
 
     def __init__(self, path: Path, names: list[str], meta: Mapping[str, Any], force: bool = False) -> None:
@@ -71,7 +71,7 @@ class Recorder:
             self._write("".join(",".join(f"{v:.10g}" for v in row) + "\n" for row in table))
 
     def log(self, **meta: Any) -> FlightLog:
-        """Everything received so far, in order, with its gaps counted in the metadata."""
+        """All rows so far, sorted by time, with the gaps in the metadata."""
         times = np.concatenate([np.empty(0, np.int64), *self._times])
         table = np.concatenate([np.empty((0, len(self.names))), *self._rows])
         kept = in_order(times)
@@ -83,9 +83,9 @@ class Recorder:
                          {"source": str(self.path), "format": "canonical", **self.meta, **counted, **meta})
 
     def finish(self, **meta: Any) -> FlightLog:
-        """Write the whole log under its own name and remove the unfinished file; without rows only remove it.
+        """Write the whole log and remove the unfinished file. Without rows only remove it.
 
-        Raises AirTouchError where it cannot be written; the unfinished file then stays.
+        Raises AirTouchError if the log cannot be written; the unfinished file then stays.
         """
         log = self.log(**meta)
         if len(log):
@@ -110,16 +110,16 @@ class Recorder:
             try:
                 os.ftruncate(self._file, whole)
             except (OSError, UnboundLocalError):
-                pass  # the reader drops a last line that is cut off
+                pass  # the reader drops a truncated last line
 
     def _close(self) -> None:
         os.close(self._file)
 
 
 def recover(folder: Path) -> tuple[list[Path], list[str]]:
-    """Finish what killed flights left in a folder: sorted, gaps counted. Returns (files, complaints).
+    """Finish the unfinished files that killed runs left in a folder. Returns the files, and a line for each failure.
 
-    Files that another process still writes are passed over; what cannot be read stays as it is.
+    Files that another process still writes are skipped. Files that cannot be read stay as they are.
     """
     finished, unreadable = [], []
     for part in sorted(folder.glob(f"*{SUFFIX}{PART}")):

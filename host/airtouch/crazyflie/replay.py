@@ -1,4 +1,4 @@
-"""`replay`: a recorded flight through the detector and the board that a live one goes through."""
+"""`replay`: a recorded flight through the detector and the board of a live one."""
 
 import time
 from collections.abc import Callable
@@ -15,11 +15,14 @@ from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.logs import airborne
 from airtouch.logs.flight_log import FlightLog
 
-CHUNK = 5  #: rows a turn, 50 ms
+CHUNK = 5  #: rows per turn of the loop, 50 ms
 
 
 def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
-    """x_m, y_m of a log that has none: constant speed straight ahead while in the air; nothing without it."""
+    """Columns x_m and y_m, (n,), for a log without them: straight ahead at constant speed while in the air.
+
+    Empty if the log has them, or without a speed.
+    """
     if log.has("x_m", "y_m") or speed_mps is None:
         return {}
     along = np.cumsum(airborne(log)) * SAMPLE_PERIOD_S * speed_mps
@@ -29,9 +32,9 @@ def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
 def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 0.0,
         speed_mps: float | None = None, stop: Event, show: Callable[[Board], None] = lambda _: None,
         felt: Callable[[Felt], None] = lambda _: None) -> int:
-    """Feed the log in steps of 50 ms, at `speed` times real time, 0 for as fast as it goes.
+    """Feed a log to the detector and the board in steps of 50 ms. Returns the number of rows.
 
-    Returns the rows fed.
+    speed: multiple of real time, 0 for as fast as possible. speed_mps: flight speed for logs without a position.
     """
     columns = {**log.columns, **position(log, speed_mps)}
     began = time.monotonic()
@@ -53,5 +56,5 @@ def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 
 
 
 def result(file: FlightFile, log: FlightLog, detector: HostDetector) -> evaluate.Result:
-    """What `evaluate` says of the flight, from what the detector said step by step."""
+    """The flight's result as `evaluate` gives it, from the detector's output so far."""
     return evaluate.result_of(file, log, detector.trace(log), best, detector.model)

@@ -1,4 +1,4 @@
-"""Signals and maps as text: block characters for a terminal that has nothing else."""
+"""Signals and maps as text, drawn with block characters in a terminal."""
 
 from collections.abc import Sequence
 
@@ -10,9 +10,9 @@ EMPTY = " "
 
 def sparkline(values: Sequence[float], width: int, low: float | None = None,
               high: float | None = None) -> str:
-    """The last values as `width` block characters, each the mean of its share; spaces where none is finite.
+    """Values (n,) as `width` block characters, each the mean of n / width values; a space if none is finite.
 
-    low, high: the scale's ends; those of the values if left out. A constant signal lies at the bottom.
+    low, high: ends of the scale; the least and greatest value if left out. A constant signal is at the bottom.
     """
     v = np.asarray(values, dtype=np.float64)
     if width < 1 or not len(v):
@@ -34,9 +34,9 @@ def sparkline(values: Sequence[float], width: int, low: float | None = None,
 
 def text_map(track: np.ndarray, edges: Sequence[tuple[float, float, str]], width: int = 40,
              height: int = 12) -> list[str]:
-    """The plane from above, x to the right, y up: track ".", entries "[", exits "]", others "|", drone "o".
+    """A map from above as lines of text, x to the right, y up.
 
-    track: (n, 2), m. edges: (x, y, kind). One character is as wide as it is high, counting two columns a row.
+    Track ".", entries "[", exits "]", other edges "|", drone "o". track: (n, 2), m. edges: (x, y, kind). A character is taken to be twice as high as wide.
     """
     known = track[np.isfinite(track).all(axis=1)] if len(track) else np.empty((0, 2))
     places = np.vstack([known, np.array([(x, y) for x, y, _ in edges]).reshape(-1, 2)])

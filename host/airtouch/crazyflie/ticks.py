@@ -1,4 +1,4 @@
-"""The drone's clock: 24-bit milliseconds in every log packet, and the packets that never came."""
+"""The drone's clock, 24-bit milliseconds in every log packet, and the gaps that it shows."""
 
 from dataclasses import dataclass
 
@@ -6,22 +6,22 @@ import numpy as np
 
 from airtouch.logs.clock import Gap
 
-WRAP_MS = 1 << 24  #: the counter starts again after 4 h 39 min
-LATEST_MS = 2000  #: a packet may come so late; a clock further back is another one
+WRAP_MS = 1 << 24  #: ms after which the counter wraps, 4 h 39 min
+LATEST_MS = 2000  #: ms that a packet may be late; a larger step back means that the drone restarted
 
 
 class Restarted(Exception):
-    """The drone's clock started anew: it was switched off or reset itself."""
+    """The drone's clock started again from zero: it was switched off, or it reset itself."""
 
 
 @dataclass
 class Ticks:
-    """Time stamps without their wraps, in the order of arrival."""
+    """Unwraps the time stamps of packets in order of arrival."""
 
     newest_ms: int | None = None
 
     def unwrap(self, stamp: int) -> int:
-        """Milliseconds on a scale that never wraps. Raises Restarted where the clock ran back."""
+        """The time of a 24-bit stamp in ms, without wraps. Raises Restarted if it is over LATEST_MS in the past."""
         if self.newest_ms is None:
             self.newest_ms = stamp
             return stamp
@@ -34,12 +34,12 @@ class Ticks:
 
 
 def gaps(times_ms: np.ndarray, period_ms: int = 10) -> list[Gap]:
-    """Samples that are missing between those of a sorted clock, (n,) milliseconds."""
+    """Gaps in a sorted clock, (n,) ms, of samples at this period."""
     steps = np.diff(np.asarray(times_ms, dtype=np.int64))
     missing = (steps + period_ms // 2) // period_ms - 1
     return [Gap(int(i) + 1, int(missing[i]), float(steps[i]) / 1000.0) for i in np.flatnonzero(missing > 0)]
 
 
 def in_order(times_ms: np.ndarray) -> np.ndarray:
-    """Indices that sort the clock and leave out samples that came twice."""
+    """Indices that sort a clock, (n,) ms, without duplicates."""
     return np.unique(np.asarray(times_ms), return_index=True)[1]

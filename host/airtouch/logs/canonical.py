@@ -12,7 +12,7 @@ from airtouch.errors import AirTouchError, shown
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.logs.table import Sheet, named_table
 
-DEEPEST = 50  #: levels of nesting that a metadata value may have; Python's JSON parser overflows the stack at 1000
+DEEPEST = 50  #: levels of nesting that a metadata value may have; Python's JSON parser recurses and fails at about 1000
 LONGEST_WARNING = 400  #: characters; a stored warning is cut to it, so that a damaged file cannot fill the screen
 _KEY = re.compile(r"[A-Za-z_][\w .-]*")
 

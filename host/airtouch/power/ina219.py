@@ -118,10 +118,10 @@ def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, 
 
 
 def power(trace: Trace, where: np.ndarray | None = None) -> Power:
-    """Mean power over the lines where `where` is true, by trapezoids between lines that follow each other.
+    """Mean power over the lines where `where`, (n,) bool, is true, by the trapezoidal rule.
 
-    Stretches without lines (more than 20 periods), and the step back of a clock that was reset, are left out.
-    The interval is that of means over blocks of one second.
+    Gaps of more than 20 sample periods, and the backward step of a clock that was reset, are left out.
+    The 95 % interval is that of means over blocks of one second.
     """
     watts = trace.volts * trace.amperes
     steps = np.diff(trace.time_s)
@@ -143,21 +143,20 @@ def power(trace: Trace, where: np.ndarray | None = None) -> Power:
 
 
 def by_stage(trace: Trace, known: Sequence[str]) -> dict[str, Power]:
-    """Power of each stage that a log names in its own column: those of `known` in their order, then others by
-    name."""
+    """Power of each stage in a log's stage column: first the stages in `known`, in that order, then others by name."""
     names = np.array([canonical(name, known) for name in trace.stage])
     order = list(dict.fromkeys([*(s for s in known if s in names), *sorted(set(names) - {""})]))
     return {name: power(trace, names == name) for name in order}
 
 
 def canonical(name: str, known: Sequence[str]) -> str:
-    """The known name of a stage, however it is written; any other as it is."""
+    """The name in `known` that equals `name` but for case and punctuation; without one `name` itself."""
     plain = {re.sub(r"[^a-z0-9]", "", s.lower()): s for s in known}
     return plain.get(re.sub(r"[^a-z0-9]", "", name.lower()), name)
 
 
 def added(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
-    """Stage -> (mW that it adds to the one before, half width of the 95 % interval); the first is whole."""
+    """Stage -> (mW added to the stage before it, half width of the 95 % interval). The first stage counts in full."""
     result, before = {}, None
     for name, found in stages.items():
         half = found.half_mw if before is None else math.hypot(found.half_mw, before.half_mw)

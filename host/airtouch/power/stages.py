@@ -1,4 +1,4 @@
-"""The paper's Table 1: what each stage needs, measured by an INA219 or estimated from counted instructions.
+"""The paper's Table 1: power of each stage, measured by an INA219 or estimated from counted instructions.
 
 Sources and limits of the estimate: host/docs/power.md.
 """
@@ -19,12 +19,12 @@ NAMES = {"baseline": "Basic drone module power", "FC-FE": "Fluctuation Component
          "CCS-FF": "Cascaded Cross-Spectrum Feature Fusion", "filter": "Double Phase Physical Filter",
          "network": "Physical Knowledge-aided Network"}
 STEP_HZ = 100.0
-#: folder of the counted instructions, in a checkout alone
+#: folder of the instruction counts; only in a checkout
 BUDGETS = Path(__file__).resolve().parents[3] / "tests" / "emulation"
 
 
 def table(stages: dict[str, Power]) -> str:
-    """Table 1: what each stage adds, its energy a step, and the paper's figure."""
+    """Table 1 as text: power added by each stage with its interval, energy per step, and the paper's figure."""
     lines = [f"{'':44} {'measured, mW':>22} {'a step, uJ':>11} {'paper, mW':>10} {'n, s':>14}"]
     for name, (mw, half) in added(stages).items():
         interval = f"{mw:8.1f} [{mw - half:.1f}, {mw + half:.1f}]" if math.isfinite(half) else f"{mw:8.1f}"
@@ -39,30 +39,27 @@ def table(stages: dict[str, Power]) -> str:
     return "\n".join(lines)
 
 
-# Without a meter.
+# The estimate, without a power meter.
 
-#: mA that a busy STM32F405 at 168 MHz draws over a sleeping one. crazyflie-firmware,
-#: src/modules/src/system.c,
-#: vApplicationIdleHook: sleeping "currently saves about 20mA"; that is an average over a processor that also
-#: works, so the full difference is larger: twice that where it works half of the time.
+#: mA, extra current of a busy STM32F405 at 168 MHz over a sleeping one: low and high. Source of the low value:
+#: crazyflie-firmware, src/modules/src/system.c, vApplicationIdleHook: sleeping "currently saves about 20mA". That is
+#: an average over a processor that also works; the high value assumes that it works half of the time.
 STM32_MA = (20.0, 40.0)
 STM32_HZ = 168e6
-STM32_CPI = (1.0, 2.0)  #: cycles an instruction; assumed: flash waits, loads and divisions make more than one
-BATTERY_V = 3.7  #: behind a linear regulator the battery gives the same current
-#: joules an instruction of one of the GAP8's eight cores, its whole board included: PULP-DroNet needs 64 mW
-#: with
-#: the cluster at 100 MHz, 1.0 V (Palossi et al., IEEE IoT Journal 2019); as if all cores were
-#: always busy, so at least that
+STM32_CPI = (1.0, 2.0)  #: cycles per instruction, low and high; assumed: flash waits, loads and divisions take several
+BATTERY_V = 3.7  #: V; the regulator is linear, so the battery's current equals the processor's
+#: J per instruction of one of the GAP8's eight cores, including its board: PULP-DroNet needs 64 mW with the cluster
+#: at 100 MHz and 1.0 V (Palossi et al., IEEE IoT Journal 2019). A lower bound: it assumes that all cores are busy.
 GAP8_J = 64e-3 / (8 * 100e6)
 GAP8_CORES = 8
-#: stage -> kernels of the budget that run in every step
+#: stage -> kernels in the budget file that run in every step
 KERNELS = {"FC-FE": ("band_power",), "CCS-FF": ("cross_spectrum",),
            "filter": ("disturbance_force", "fr_cfar")}
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a stage needs at 100 steps a second: low and high mW, and of how many instructions a step."""
+    """Estimated power of a stage at 100 steps a second, low and high in mW, and its instructions per step."""
 
     low_mw: float
     high_mw: float
@@ -70,17 +67,14 @@ class Estimate:
 
 
 def stm32_mw(instructions: float) -> tuple[float, float]:
-    """Low and high mW at the battery of so many instructions a step, 100 steps a second."""
+    """Power at the battery, low and high in mW, of this many instructions per step at 100 steps a second."""
     low, high = (1e3 * instructions * STEP_HZ * cpi / STM32_HZ * 1e-3 * ma * BATTERY_V
                  for cpi, ma in zip(STM32_CPI, STM32_MA, strict=True))
     return low, high
 
 
 def instructions(budget: dict, kernel: str) -> float:
-    """Mean instructions a step of a kernel on the Cortex-M4.
-
-    Raises AirTouchError where the budget lacks it.
-    """
+    """Mean instructions per step of a kernel on the Cortex-M4. Raises AirTouchError if the budget lacks it."""
     try:
         return float(budget["cortex-m4"][kernel]["instructions_mean"])
     except (KeyError, TypeError, ValueError):
@@ -89,8 +83,11 @@ def instructions(budget: dict, kernel: str) -> float:
 
 
 def gap8_mw(network: dict) -> Estimate:
-    """A network on the GAP8: high is plain C, low the eight cores with their own instructions where they were
-    counted."""
+    """Estimate of a network on the GAP8: high is plain C on one core.
+
+    Low is eight cores with the GAP8's own instructions, if those were counted; otherwise it equals high.
+    Raises AirTouchError if the budget lacks the counts.
+    """
     try:
         count = float(network["step_instructions"] if "step_instructions" in network
                       else network["window_instructions"])
@@ -103,9 +100,12 @@ def gap8_mw(network: dict) -> Estimate:
 
 
 def estimate(budget: dict, gap8: dict) -> dict[str, Estimate]:
-    """Stages of the table from counts: kernels on the STM32, networks on the GAP8."""
-    found = {stage: sum(instructions(budget, k) for k in kernels) for stage, kernels in KERNELS.items()}
-    result = {stage: Estimate(*stm32_mw(count), count) for stage, count in found.items()}
+    """Stage -> estimate from instruction counts: kernels on the STM32, networks on the GAP8.
+
+    budget, gap8: budget files as `counts` reads them.
+    """
+    sums = {stage: sum(instructions(budget, k) for k in kernels) for stage, kernels in KERNELS.items()}
+    result = {stage: Estimate(*stm32_mw(count), count) for stage, count in sums.items()}
     result |= {f"network, {name} on the GAP8": gap8_mw(network) for name, network in gap8.items()}
     # the network and its decoder run on every STRIDE-th sample, and the budget counts those
     count = sum(instructions(budget, k) for k in ("stream_int8", "edge_decoder")) / STRIDE
@@ -114,11 +114,11 @@ def estimate(budget: dict, gap8: dict) -> dict[str, Estimate]:
     return result
 
 
-def estimate_table(found: dict[str, Estimate]) -> str:
-    """The estimate as text that says what it is."""
+def estimate_table(estimates: dict[str, Estimate]) -> str:
+    """The estimate as text, with its assumptions and marked as an estimate."""
     lines = [f"{'ESTIMATE, nothing was measured':44} {'mW':>14} {'instructions a step':>20} "
              f"{'paper, measured, mW':>20}"]
-    for name, e in found.items():
+    for name, e in estimates.items():
         shown = f"{e.low_mw:.2f} to {e.high_mw:.2f}" if e.high_mw > e.low_mw else f"{e.low_mw:.2f}"
         paper = PAPER_MW.get(name.split(",")[0])
         lines.append(f"{NAMES.get(name, name):44} {shown:>14} {e.instructions:>20.0f} "
@@ -130,7 +130,7 @@ def estimate_table(found: dict[str, Estimate]) -> str:
 
 
 def counts(path: Path) -> dict:
-    """A budget file. Raises AirTouchError for one that cannot be read."""
+    """The content of a budget file (TOML). Raises AirTouchError if it cannot be read."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
