@@ -36,7 +36,8 @@ def text_map(track: np.ndarray, edges: Sequence[tuple[float, float, str]], width
              height: int = 12) -> list[str]:
     """A map from above as lines of text, x to the right, y up.
 
-    Track ".", entries "[", exits "]", other edges "|", drone "o". track: (n, 2), m. edges: (x, y, kind). A character is taken to be twice as high as wide.
+    Track ".", entries "[", exits "]", other edges "|", drone "o".
+    track: (n, 2), m. edges: (x, y, kind). A character is taken to be twice as high as wide.
     """
     known = track[np.isfinite(track).all(axis=1)] if len(track) else np.empty((0, 2))
     places = np.vstack([known, np.array([(x, y) for x, y, _ in edges]).reshape(-1, 2)])

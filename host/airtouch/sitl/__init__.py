@@ -1,4 +1,4 @@
-"""A virtual Crazyflie: CRTP over UDP in front of the simulator and the app's C core.
+"""A virtual Crazyflie: a CRTP server on UDP that runs the simulator and the app's C code.
 
     with airtouch.sitl.serve("paper-9cm", port=0) as virtual:
         scf = SyncCrazyflie(virtual.uri)

@@ -1,6 +1,6 @@
-"""The AirTouch app on board: the C core of the STM32 app, that of the GAP8 app, and the wire between them.
+"""The AirTouch app on board: the C core of the STM32 app, the C core of the GAP8 app, and the link between them.
 
-The names and types of the LOG and PARAM group are those of firmware/app/src/airtouch_app.c.
+LOG and PARAM groups have the names and types of firmware/app/src/airtouch_app.c.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from airtouch.vehicle import Vehicle
 
 GROUP = "airtouch"
 HEARTBEAT_S = 0.5
-BOOT_S = 1.5  #: the GAP8, after it lost power
+BOOT_S = 1.5  #: s that the GAP8 needs to boot
 #: log variable -> (type, field of appLog_t, element)
 LOGS: dict[str, tuple[str, str, int]] = {
     "fAcc": ("float", "feature", 0), "fGyro": ("float", "feature", 1), "fMotor": ("float", "feature", 2),
@@ -39,52 +39,53 @@ PARAMS = {
 
 
 class App:
-    """`step` takes one sample of 100 Hz; `read` gives a log variable after it."""
+    """The app. `step` takes one sample at 100 Hz; `read` returns a log variable."""
 
     def __init__(self, have_gap8: bool, vehicle: Vehicle | None = None) -> None:
-        """vehicle: what the app is built for; AppCore's if left out."""
+        """vehicle: the one that the app is built for; AppCore's default if left out."""
         self._core = AppCore(have_gap8=have_gap8, vehicle=vehicle)
         self._gap8 = Gap8Core() if have_gap8 else None
         self._booted_s = self._beat_s = 0.0
         self.gap8_silent = False
-        self.sent = 0  #: packets to the GAP8 so far; none unless the parameter `detector` asks for it
+        self.sent = 0  #: packets to the GAP8 so far; 0 if the parameter `detector` does not use it
 
     def parameters(self) -> list[Parameter]:
-        """The PARAM group with the values in force."""
+        """The PARAM group with its present values."""
         values = self._core.params()
         return [Parameter(f"{GROUP}.{name}", PARAM_TYPES[field], values[field])
                 for name, field in PARAMS.items()]
 
     def set(self, name: str, value: float) -> float:
-        """Change a parameter; the value in force, which is another one where it was out of range."""
+        """Set a parameter. Returns its value, which differs from `value` if that was out of range."""
         self._core.set_params(**{PARAMS[name]: value})
         return self._core.params()[PARAMS[name]]
 
     def values(self) -> dict[str, float]:
-        """All parameters in force: a change of one may put another right."""
+        """The present values of all parameters; setting one may change another."""
         in_force = self._core.params()
         return {f"{GROUP}.{name}": in_force[field] for name, field in PARAMS.items()}
 
     def read(self, name: str) -> float:
-        """The log variable of that name."""
+        """The value of a log variable."""
         _, field, element = LOGS[name]
         value = getattr(self._core.log, field)
         return value if element < 0 else value[element]
 
     def reset_gap8(self, now_s: float) -> None:
-        """The GAP8 loses power and starts anew."""
+        """Power-cycle the GAP8."""
         if self._gap8:
             self._gap8.reset()
             self._booted_s = self._beat_s = now_s + BOOT_S
 
     def step(self, now_s: float, acc_world: Sequence[float], gyro: Sequence[float], pwm: Sequence[float],
              vbat_v: float, attitude: Sequence[float]) -> str:
-        """One sample: m/s^2 with gravity, rad/s, PWM, quaternion x, y, z, w.
+        """Process one sample: world acceleration (3,) in m/s^2 with gravity, gyro (3,) in rad/s, PWM (4,), V, and
+        attitude as a quaternion x, y, z, w.
 
-        Returns the kind of the edge that is reported now, "none" mostly.
+        Returns the kind of the edge reported at this sample; "none" without one.
         """
         edge = self._core.step(acc_world, gyro, pwm, vbat_v=vbat_v, attitude=attitude)
-        gap8 = None if self.gap8_silent or now_s < self._booted_s else self._gap8  # None: it does not answer
+        gap8 = None if self.gap8_silent or now_s < self._booted_s else self._gap8  # None: no answer
         for sent in self._core.packets():
             self.sent += 1
             reply = gap8.take(sent) if gap8 else b""

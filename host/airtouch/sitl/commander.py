@@ -1,8 +1,8 @@
-"""Whose set-points count: high-level planner, low-level packets, and the watchdog.
+"""Selection of the set-point: high-level planner, low-level packets, or watchdog.
 
-As crazyflie-firmware 2026.08 (commander.c, crtp_commander_generic.c, crtp_commander_rpyt.c, supervisor.c).
-A set-point here is one row of the simulator (simulation.setpoint): mode, place, velocity,
-yaw and motors. Packets that give rates (yaw rate, climb) are integrated row by row.
+As in crazyflie-firmware 2026.08 (commander.c, crtp_commander_generic.c, crtp_commander_rpyt.c, supervisor.c).
+A set-point is a row of the simulator (simulation.setpoint): mode, position, velocity, yaw and motors. Rates in
+packets (yaw rate, climb rate) are integrated row by row.
 """
 
 import math
@@ -14,8 +14,8 @@ from airtouch.simulation import setpoint as c
 from airtouch.sitl.planner import Planner
 
 PERIOD_S = 0.01
-LEVEL_OUT_S, SHUT_DOWN_S = 0.5, 2.0  #: without a new set-point
-MOST_CLIMB_M = 0.5  #: height set-points of climb rates stay this near to the drone
+LEVEL_OUT_S, SHUT_DOWN_S = 0.5, 2.0  #: s without a new set-point until the drone levels out, and until its motors stop
+MOST_CLIMB_M = 0.5  #: m, largest distance of the integrated height set-point from the drone
 MOST_TILT_DEG = 30.0
 LEAST_THRUST, MOST_THRUST = 1000, 60000
 (STOP, OLD_VELOCITY, OLD_Z_DISTANCE, CPPM, ALT_HOLD, OLD_HOVER, FULL_STATE, POSITION, VELOCITY, Z_DISTANCE,
@@ -24,11 +24,11 @@ FOUR = struct.Struct("<ffff")
 
 
 class Commander:
-    """`setpoint(t, ...)` gives the row to fly at t, one call a row of 10 ms."""
+    """The commander. `setpoint(t, ...)` returns the row to fly at t; call it once for each row of 10 ms."""
 
     def __init__(self) -> None:
         self.planner = Planner()
-        self.low_level = False  #: set-point packets are in charge
+        self.low_level = False  #: True while set-point packets have priority over the high-level commander
         self.levelled = self.timed_out = False
         self.alt_hold = self.pos_hold = False
         self._kind, self._values, self._since = STOP, (0.0,) * 4, 0.0
@@ -36,17 +36,17 @@ class Commander:
         self._thrust_locked = True
 
     def reset(self) -> None:
-        """Motors off; as after start."""
+        """Motors off; the state after start."""
         self.planner.stop()
         self.low_level = self.levelled = self.timed_out = False
         self._thrust_locked = True
 
     def relax(self) -> None:
-        """Low-level set-points have ended: the high-level commander may take over."""
+        """End low-level control: the high-level commander may take over."""
         self.low_level = False
 
     def take_rpyt(self, data: bytes, t: float, estimate: np.ndarray) -> None:
-        """A packet of the old commander port: roll, pitch, yaw rate, thrust."""
+        """Handle a packet of the old commander port: roll, pitch, yaw rate, thrust."""
         if len(data) < 14:
             return
         roll, pitch, yaw, thrust = struct.unpack_from("<fffH", data)
@@ -64,7 +64,7 @@ class Commander:
             self._low_level(MANUAL, (roll, pitch, -yaw, float(push)), t, estimate)
 
     def take_generic(self, data: bytes, t: float, estimate: np.ndarray) -> None:
-        """A packet of the generic commander port; what the simulator cannot fly is ignored."""
+        """Handle a packet of the generic commander port. Kinds that the simulator cannot fly are ignored."""
         kind = data[0] if data else None
         if kind == STOP:
             self._low_level(STOP, (0.0,) * 4, t, estimate)
@@ -77,7 +77,7 @@ class Commander:
         elif kind in (OLD_VELOCITY, OLD_Z_DISTANCE, OLD_HOVER, ALT_HOLD, POSITION, VELOCITY, Z_DISTANCE,
                       HOVER) and len(data) >= 17:
             values = FOUR.unpack_from(data, 1)
-            if kind in (OLD_VELOCITY, OLD_Z_DISTANCE, OLD_HOVER):  # their yaw rate has the other sign
+            if kind in (OLD_VELOCITY, OLD_Z_DISTANCE, OLD_HOVER):  # these have the opposite sign of the yaw rate
                 at = 3 if kind == OLD_VELOCITY else 2
                 values = tuple(-v if i == at else v for i, v in enumerate(values))
                 kind = {OLD_VELOCITY: VELOCITY, OLD_Z_DISTANCE: Z_DISTANCE, OLD_HOVER: HOVER}[kind]
@@ -142,7 +142,7 @@ class Commander:
         else:
             row[c.MODE] = c.TILT_THRUST if kind == MANUAL else c.TILT
             row[c.VX] = min(max(a, -MOST_TILT_DEG), MOST_TILT_DEG)
-            row[c.VY] = min(max(-b, -MOST_TILT_DEG), MOST_TILT_DEG)  # the firmware's pitch is nose up
+            row[c.VY] = min(max(-b, -MOST_TILT_DEG), MOST_TILT_DEG)  # the firmware's pitch is positive nose up
             if kind == MANUAL:
                 row[c.Z] = min(max(e, 0.0), 65535.0)
                 row[c.MOTORS] = float(e > 0.0)

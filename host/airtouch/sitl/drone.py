@@ -15,17 +15,17 @@ from airtouch.sitl.planner import DISABLED, FLYING, LANDING
 from airtouch.vehicle import Vehicle
 
 TICK_MS = 10
-IS_FLYING_S = 2.0  #: after the motors' last turn the firmware still calls it flying
-LOW_V, LOW_AFTER_S = 3.2, 5.0  #: the firmware's low-battery state
-NEARLY_EMPTY = 0.05  #: of the battery's charge
-BATTERY, LOW_POWER = 0, 3  #: pm.state
+IS_FLYING_S = 2.0  #: s after the motors have stopped in which the firmware still reports "flying"
+LOW_V, LOW_AFTER_S = 3.2, 5.0  #: V, and s below it, after which the firmware reports a low battery
+NEARLY_EMPTY = 0.05  #: fraction of the battery's charge after the fault `low-battery`
+BATTERY, LOW_POWER = 0, 3  #: values of pm.state
 PRE_FLIGHT, CRASHED, LOCKED = "ready", "crashed", "locked"
 
 
 class Drone:
-    """`step` flies 10 ms; everything that log variables show is an attribute.
+    """The drone. `step` flies 10 ms. The state behind the log variables is in its attributes.
 
-    row (33,): the simulator's row; estimate (9,): roll, pitch, yaw, velocity, position.
+    row (33,): the simulator's row. estimate (9,): roll, pitch, yaw, velocity, position.
     """
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
@@ -40,7 +40,7 @@ class Drone:
         self.row = self._table[0]
         self.setpoint = self._setpoint[0]
         self.state, self.emergency = PRE_FLIGHT, False
-        self.messages: list[str] = []  #: for the console
+        self.messages: list[str] = []  #: lines for the console
         self.took_off_s: float | None = None
         self._thrust_s, self._low_s, self._drained = -math.inf, 0.0, False
         self._begin(self._start)
@@ -48,48 +48,48 @@ class Drone:
 
     @property
     def now_s(self) -> float:
-        """Time since start."""
+        """Seconds since start."""
         return self.ticks * PERIOD_S
 
     @property
     def now_ms(self) -> int:
-        """The clock of log packets."""
+        """The clock of log packets, ms."""
         return self.ticks * TICK_MS
 
     @property
     def estimate(self) -> np.ndarray:
-        """roll, pitch, yaw (rad), velocity (m/s), position (m over the floor)."""
+        """The estimate, (9,): roll, pitch, yaw (rad), velocity (m/s), position (m, height over the floor)."""
         firmware = self._stepper.state[0]["firmware"]
         return np.concatenate([firmware["angles"], firmware["estimate"]["velocity"], firmware["kalman"]["x"]])
 
     @property
     def is_flying(self) -> bool:
-        """As the firmware says: the motors turn, or did so until shortly."""
+        """True while the firmware reports "flying": the motors turn, or stopped less than IS_FLYING_S ago."""
         return self.now_s - self._thrust_s < IS_FLYING_S
 
     @property
     def motors_on(self) -> bool:
-        """Whether they turn now."""
+        """True if the motors turn now."""
         return self.setpoint[setpoint.MOTORS] > 0.5
 
     @property
     def height_over_floor(self) -> float:
-        """True height of the down range sensor, m."""
+        """True height of the down range sensor over the floor, m."""
         return float(self.row[log_row.POSITION + 2])
 
     @property
     def low_battery(self) -> bool:
-        """The firmware's state "low power"."""
+        """True in the firmware's state "low power"."""
         return self._low_s > LOW_AFTER_S
 
     def quaternion(self) -> tuple[float, float, float, float]:
-        """The estimated attitude: x, y, z, w."""
+        """The estimated attitude as a quaternion x, y, z, w."""
         (sr, cr), (sp, cp), (sy, cy) = ((math.sin(a / 2), math.cos(a / 2)) for a in self.estimate[:3])
         return (sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
                 cr * cp * cy + sr * sp * sy)
 
     def info(self) -> int:
-        """supervisor.info."""
+        """The value of supervisor.info."""
         planner, ready = self.commander.planner, self.state == PRE_FLIGHT and not self.emergency
         bits = [ready, ready, True, ready, self.is_flying and ready, self.state == CRASHED,
                 self.state == LOCKED, self.state == CRASHED, planner.state in (FLYING, LANDING),
@@ -97,24 +97,26 @@ class Drone:
         return sum(bool(bit) << i for i, bit in enumerate(bits))
 
     def stop(self) -> None:
-        """Emergency stop: motors off until it is started anew."""
+        """Emergency stop: motors off until `restart`."""
         self.emergency = True
 
     def recover(self) -> bool:
-        """Put upright after a crash, where it lies. Whether it may fly again."""
+        """Put the drone upright after a crash, at the same place. True if it can fly again."""
         if self.state == CRASHED:
             self.commander.reset()
             self.state = PRE_FLIGHT
         return self.state == PRE_FLIGHT
 
     def restart(self) -> None:
-        """As when its button is pressed: set-points, locks and crashes are forgotten."""
+        """Restart, as by the drone's button: clears set-points, locks and crashes."""
         self.commander.reset()
         self.state, self.emergency = PRE_FLIGHT, False
 
     def start_over(self) -> None:
-        """Put back to where the scenario's mission starts, on the ground, with the battery as at first, or as it was
-        drained."""
+        """Put the drone on the ground at the start of the scenario's mission.
+
+        The battery is as at first; after `drain` it stays nearly empty.
+        """
         self.restart()
         self._stepper.begin(self._start)
         self._setpoint[0] = self._start
@@ -124,14 +126,14 @@ class Drone:
             self.drain()
 
     def drain(self) -> None:
-        """From now on the battery is nearly empty."""
+        """Make the battery nearly empty."""
         self._drained = True
         self._stepper.plant[0]["battery_strength"] = 1.0
         battery = self._stepper.state[0]["battery"]
         battery["charge"] = min(NEARLY_EMPTY, battery["charge"])
 
     def step(self) -> str:
-        """Fly 10 ms. Returns the kind of the edge that the app reports, "none" mostly."""
+        """Fly 10 ms. Returns the kind of the edge that the app reports; "none" without one."""
         self._setpoint[0] = self.commander.setpoint(self.now_s, self.estimate)
         if self.commander.timed_out and self.state == PRE_FLIGHT and self.is_flying:
             self.state = LOCKED
@@ -164,7 +166,7 @@ class Drone:
             battery["charge"] = charge
 
     def _end(self, ending: int) -> None:
-        """What the simulator cannot fly on: the drone lies where it came down."""
+        """End a flight that the simulator cannot continue; the drone lies where it came down."""
         place = self._start.copy()
         if ending in (loop.STRUCK, loop.UPSET) and np.isfinite(self.row).all():
             place[setpoint.X], place[setpoint.Y] = self.row[log_row.POSITION:log_row.POSITION + 2]

@@ -1,16 +1,16 @@
-"""Faults to order: what goes wrong, when, and for how long.
+"""Injected faults of the virtual drone.
 
-    loss=0.3         this share is lost, both ways, of what nobody waits for: log data, console,
-                     set-points, pings (over a radio, acknowledgements bring the rest through)
-    loss=0.3,all     of every packet
-    late=50ms        packets are up to so late, in order, both ways
+    loss=0.3         fraction lost, both ways, of packets without an answer: log data, console, set-points,
+                     pings (over a radio the other packets are acknowledged and sent again)
+    loss=0.3,all     fraction lost of all packets
+    late=50ms        packets are delayed by up to this, in order, both ways
     disconnect=T,5s  no packet passes for 5 s
     gap8-reset=T     the GAP8 restarts
     gap8-silent=T    the GAP8 never answers again
     low-battery=T    the battery is nearly empty
 
-T is in seconds after take-off (`3` or `3s`), or `start` for at once. The GAP8 is used, and missed, where the parameter
-`airtouch.detector` is 2, 3 or 4.
+T is in seconds after take-off (`3` or `3s`), or `start`. Only with the parameter `airtouch.detector` at 2, 3 or 4
+does the app use the GAP8.
 """
 
 import heapq
@@ -30,12 +30,12 @@ KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms",
          "gap8-silent": "when, as gap8-silent=3",
          "low-battery": "when, as low-battery=3"}
 ALL = "all"
-LINE = ("loss", "late")  #: kinds that a line has
+LINE = ("loss", "late")  #: kinds of faults of the link
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One of KINDS. at_s: after take-off, minus infinity for the start. amount: share or seconds."""
+    """A fault of one of KINDS. at_s: s after take-off, minus infinity for the start. amount: fraction or seconds."""
 
     kind: str
     at_s: float = -math.inf
@@ -44,7 +44,7 @@ class Fault:
 
 
 def parse(text: str) -> Fault:
-    """A fault as it is written on the command line. Raises AirTouchError that names the right form."""
+    """The fault in a text as on the command line. Raises AirTouchError with the right form."""
     kind, _, value = text.partition("=")
     if kind not in KINDS:
         raise AirTouchError(f"no fault {kind!r}; known: {', '.join(KINDS)}")
@@ -66,7 +66,7 @@ def parse(text: str) -> Fault:
 
 
 def seconds(text: str) -> float:
-    """`3`, `3s` or `50ms` in seconds, not negative; ValueError for anything else."""
+    """Seconds in a text such as `3`, `3s` or `50ms`. Raises ValueError for another form and for negative values."""
     scale = 1e-3 if text.endswith("ms") else 1.0
     value = scale * float(text.removesuffix("ms").removesuffix("s"))
     if not 0.0 <= value < 1e6:
@@ -75,16 +75,16 @@ def seconds(text: str) -> float:
 
 
 def is_stream(packet: Packet) -> bool:
-    """Whether nobody waits for it."""
+    """True for a packet that is not answered or acknowledged."""
     return (packet.port in (crtp.CONSOLE, crtp.COMMANDER, crtp.GENERIC, crtp.LOCALIZATION)
             or packet.port == crtp.LOG and packet.channel == 2
             or packet.port == crtp.LINK and packet.channel == 0)
 
 
 class Line:
-    """One direction of the link: packets go in with `put` and come out of `ready`, or not.
+    """One direction of the link. `put` sends a packet; `ready` returns those that have arrived.
 
-    Times are the drone's, in seconds.
+    Times are those of the drone, in s.
     """
 
     def __init__(self, faults: Iterable[Fault], rng: np.random.Generator) -> None:
@@ -98,7 +98,7 @@ class Line:
         self.lost = 0
 
     def add(self, fault: Fault) -> None:
-        """From now on it has this fault too; those that are not a line's are ignored."""
+        """Add a fault. Faults that do not concern the link are ignored."""
         if fault.kind == "loss":
             self._loss.append(fault)
         elif fault.kind == "late":
@@ -116,7 +116,7 @@ class Line:
         heapq.heappush(self._waiting, (due, next(self._count), packet, peer))
 
     def ready(self, now_s: float) -> list[tuple[Packet, Peer]]:
-        """What has arrived by now, in order."""
+        """The packets that have arrived by now, in order."""
         out = []
         while self._waiting and self._waiting[0][0] <= now_s:
             _, _, packet, peer = heapq.heappop(self._waiting)
@@ -124,6 +124,6 @@ class Line:
         return out
 
     def clear(self) -> None:
-        """Everything that is under way is lost."""
+        """Lose all packets that are on their way."""
         self.lost += len(self._waiting)
         self._waiting.clear()

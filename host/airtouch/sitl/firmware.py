@@ -1,4 +1,4 @@
-"""The firmware's side of the link: each packet to its service, and what is sent unasked."""
+"""The firmware's side of the link: passes each packet to its service, and sends log and console packets."""
 
 import struct
 
@@ -16,11 +16,11 @@ VERSION, DEVICE = b"2026.08 virtual", b"CF21"
 GREETING = b"Bitcraze Crazyflie"
 BITFIELD, ARM, RECOVER, EMERGENCY, WATCHDOG = 0x0C, 1, 2, 3, 4
 RESPONSE = 0x80
-WATCHDOG_S = 1.0  #: the emergency-stop watchdog, once it has been fed
+WATCHDOG_S = 1.0  #: s, timeout of the emergency-stop watchdog once a client has started it
 
 
 class Firmware:
-    """`take` answers packets, `tick` flies 10 ms and gives what the drone sends of itself."""
+    """The firmware. `take` answers a packet. `tick` flies 10 ms and returns log and console packets."""
 
     def __init__(self, drone: Drone, ai_deck: bool = True) -> None:
         self.drone = drone
@@ -28,7 +28,7 @@ class Firmware:
         items = variables.log_items(table)
         self.log = LogService(items, variables.reader(table, items, drone))
         self.param = ParamService(variables.parameters(drone, ai_deck), self._changed)
-        self.printed: list[str] = []  #: on the console in the last tick
+        self.printed: list[str] = []  #: console lines of the last tick
         self._fed_s: float | None = None
 
     def say(self, text: str) -> None:
@@ -36,7 +36,7 @@ class Firmware:
         self.drone.messages.append(text)
 
     def tick(self) -> list[Packet]:
-        """Fly 10 ms: console and log packets."""
+        """Fly 10 ms. Returns the console and log packets of this time."""
         if self._fed_s is not None and self.drone.now_s - self._fed_s > WATCHDOG_S:
             self._fed_s = None
             self.drone.stop()
@@ -48,7 +48,7 @@ class Firmware:
         return console + self.log.due(self.drone.now_ms)
 
     def take(self, packet: Packet) -> list[Packet]:
-        """Answers to any packet; unknown ports and what is too short are ignored."""
+        """The answers to a packet. Packets to unknown ports, and too short ones, are ignored."""
         port, channel, data = packet
         drone = self.drone
         if port == crtp.LOG:
@@ -116,7 +116,7 @@ class Firmware:
             self._fed_s = self.drone.now_s
 
     def _request(self, command: int) -> bytes:
-        """Arming is automatic here, so it succeeds where the drone can fly."""
+        """The answer to a supervisor command. The virtual drone arms itself, so arming succeeds if it can fly."""
         ready = self.drone.recover() if command == RECOVER else bool(self.drone.info() & 1)
         return bytes([ready, ready])
 

@@ -1,4 +1,4 @@
-"""Log blocks: created, appended to, started, stopped and deleted as the firmware does (log.c)."""
+"""Log blocks: create, append, start, stop and delete, as in the firmware (log.c)."""
 
 import errno
 import math
@@ -17,12 +17,12 @@ CODES = {"uint8_t": 1, "uint16_t": 2, "uint32_t": 3, "int8_t": 4, "int16_t": 5, 
          "FP16": 8}
 FORMATS = {1: "B", 2: "H", 3: "I", 4: "b", 5: "h", 6: "i", 7: "f", 8: "e"}
 LENGTHS = {code: struct.calcsize("<" + letter) for code, letter in FORMATS.items()}
-TICK_MS = 10  #: the simulator's row
+TICK_MS = 10  #: ms per row of the simulator
 
 
 @dataclass
 class Block:
-    """A block: (variable's number, type it is sent as), its period in ms (0: stopped) and when it is due."""
+    """A block: (number of the variable, type in the packet) of each value, period in ms (0: stopped), next due time."""
 
     variables: list[tuple[int, int]] = field(default_factory=list)
     period_ms: int = 0
@@ -35,7 +35,7 @@ class Block:
 
 
 class LogService:
-    """read(number) gives the present value of a variable, as the type in its TOC entry holds it."""
+    """The log port. read(number): the present value of a variable, as its type in the TOC stores it."""
 
     def __init__(self, items: Sequence[Item], read: Callable[[int], float]) -> None:
         self.toc = Toc(items, 0x0F, bytes([MOST_BLOCKS, MOST_VARIABLES]))
@@ -44,11 +44,11 @@ class LogService:
         self.blocks: dict[int, Block] = {}
 
     def reset(self) -> None:
-        """Forget every block."""
+        """Delete all blocks."""
         self.blocks.clear()
 
     def take(self, packet: Packet, now_ms: int) -> list[Packet]:
-        """Answers to a packet on the log port."""
+        """The answers to a packet on the log port."""
         if packet.channel == TOC_CHANNEL:
             answer = self.toc.answer(packet.data)
             return [Packet(LOG, TOC_CHANNEL, answer)] if answer else []
@@ -83,7 +83,7 @@ class LogService:
             self.blocks[number].period_ms = period
             self.blocks[number].due_ms = now_ms + period
             if period == 0 and command != STOP:
-                self.blocks[number].due_ms = -1  # the firmware sends it once
+                self.blocks[number].due_ms = -1  # the firmware sends such a block once
         return 0
 
     def _append(self, number: int, settings: bytes) -> int:
@@ -94,14 +94,14 @@ class LogService:
                 return errno.E2BIG
             if sum(len(b.variables) for b in self.blocks.values()) >= MOST_VARIABLES:
                 return errno.ENOMEM
-            if variable >= len(self._stored) or kind not in LENGTHS:  # raw memory is not there either
+            if variable >= len(self._stored) or kind not in LENGTHS:  # there is no raw memory to log either
                 return errno.ENOENT
             block.variables.append((variable, kind))
             at += 3
         return 0
 
     def due(self, now_ms: int) -> list[Packet]:
-        """The packets of the blocks whose time has come."""
+        """The packets of the blocks that are due."""
         packets = []
         for number, block in self.blocks.items():
             if block.due_ms < 0:
@@ -121,7 +121,7 @@ class LogService:
 
 
 def encode(value: float, sent: int) -> bytes:
-    """A value as the firmware sends it in type `sent`: integers wrap, FP16 overflows to infinity."""
+    """The bytes of a value in type `sent`, as in the firmware: integers wrap, FP16 overflows to infinity."""
     if sent in (7, 8):
         if sent == 8 and math.isfinite(value) and abs(value) > 65504.0:
             value = math.copysign(math.inf, value)
@@ -131,7 +131,7 @@ def encode(value: float, sent: int) -> bytes:
 
 
 def hold(value: float, kind: int) -> float:
-    """The value as a variable of that type holds it: whole and within bounds for integers."""
+    """The value as a variable of type `kind` stores it: integers are truncated and limited to their range."""
     if kind in (7, 8):
         return value
     if not math.isfinite(value):

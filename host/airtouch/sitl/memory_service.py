@@ -1,4 +1,4 @@
-"""The memory port: no memories, and the firmware's errors for those that are asked for (crtp_mem.c)."""
+"""The memory port. There are no memories; requests for one get the firmware's error (crtp_mem.c)."""
 
 import errno
 
@@ -9,7 +9,7 @@ GET_COUNT, GET_INFO = 1, 2
 
 
 def take(packet: Packet) -> list[Packet]:
-    """Answers to a packet on the memory port."""
+    """The answers to a packet on the memory port."""
     data = packet.data
     if packet.channel == INFO_CHANNEL:
         if data[:1] == bytes([GET_COUNT]):

@@ -1,4 +1,4 @@
-"""Parameters: read, written, written by name, defaults, extended types, persistent store (param_logic.c)."""
+"""Parameters: read, write, write by name, defaults, extended types and persistent storage (param_logic.c)."""
 
 import errno
 import struct
@@ -14,7 +14,7 @@ TOC_CHANNEL, READ_CHANNEL, WRITE_CHANNEL, MISC_CHANNEL = 0, 1, 2, 3
 CODES = {"int8_t": 0, "int16_t": 1, "int32_t": 2, "float": 6, "uint8_t": 8, "uint16_t": 9, "uint32_t": 10}
 FORMATS = {0: "<b", 1: "<h", 2: "<i", 6: "<f", 8: "<B", 9: "<H", 10: "<I"}
 EXTENDED, CORE, READ_ONLY = 0x10, 0x20, 0x40
-PERSISTENT = 1  #: of the extended type
+PERSISTENT = 1  #: bit of the extended type
 KIND = 0x0F
 
 
@@ -22,7 +22,7 @@ KIND = 0x0F
 class Parameter:
     """A parameter as the firmware declares it."""
 
-    name: str  #: group.name
+    name: str  #: "group.name"
     ctype: str
     default: float
     read_only: bool = False
@@ -30,16 +30,16 @@ class Parameter:
     core: bool = False
 
     def item(self) -> Item:
-        """Its TOC entry."""
+        """Its entry in the table of contents."""
         group, name = self.name.split(".")
         flags = READ_ONLY * self.read_only | EXTENDED * self.persistent | CORE * self.core
         return Item(group, name, CODES[self.ctype] | flags)
 
 
 class ParamService:
-    """changed(name, value) is called after a write and gives the values that are others now.
+    """The parameter port. changed(name, value) is called after a write; it returns all values that changed.
 
-    The answer to a write repeats what was written, as in the firmware; reading gives what is in force.
+    The answer to a write repeats the written value, as in the firmware. A read returns the value in use.
     """
 
     def __init__(self, parameters: Sequence[Parameter],
@@ -51,7 +51,7 @@ class ParamService:
         self._stored: dict[str, float] = {}
 
     def take(self, packet: Packet) -> list[Packet]:
-        """Answers to a packet on the parameter port."""
+        """The answers to a packet on the parameter port."""
         data = packet.data
         if packet.channel == TOC_CHANNEL:
             answer = self.toc.answer(data)
@@ -67,7 +67,7 @@ class ParamService:
             return [Packet(PARAM, READ_CHANNEL, data[:2] + b"\0" + self._bytes(number))]
         parameter = self._parameters[number]
         if parameter.read_only or len(data) - 2 < self._length(number):
-            return []  # as the firmware: no answer
+            return []  # no answer, as in the firmware
         self._write(number, data[2:])
         return [Packet(PARAM, WRITE_CHANNEL, data)]
 

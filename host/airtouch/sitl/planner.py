@@ -1,8 +1,8 @@
-"""The high-level commander: take-off, go-to, spiral, land along polynomials of 7th order.
+"""The high-level commander: take-off, go-to, spiral and land along polynomials of 7th order.
 
-As crazyflie-firmware 2026.08 (planner.c, pptraj.c, crtp_commander_high_level.c): position,
-velocity and acceleration match at both ends, the jerk is zero there. Positions in m over
-the floor, yaw in rad, times in s of the drone's clock.
+As in crazyflie-firmware 2026.08 (planner.c, pptraj.c, crtp_commander_high_level.c): position,
+velocity and acceleration are continuous at both ends, and the jerk is zero there. Positions in
+m over the floor, yaw in rad, times in s of the drone's clock.
 """
 
 import errno
@@ -26,7 +26,7 @@ _ENDS = np.linalg.inv([[1.0, 1.0, 1.0, 1.0], [4.0, 5.0, 6.0, 7.0], [12.0, 20.0, 
 
 @dataclass(frozen=True)
 class Goal:
-    """Where to be: position and velocity (3,), yaw and its rate."""
+    """A set-point: position (3,) in m, velocity (3,) in m/s, yaw in rad, yaw rate in rad/s."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -37,7 +37,10 @@ class Goal:
 
 def polynomial(seconds: float, start: tuple[float, float, float],
                end: tuple[float, float, float]) -> np.ndarray:
-    """Coefficients (8,) in s = t / seconds from one (value, rate, second rate) to another, jerk 0 at both."""
+    """Coefficients (8,) of a polynomial in t / seconds, with zero jerk at both ends.
+
+    start, end: value, first and second derivative there.
+    """
     scale = np.array([1.0, seconds, seconds * seconds])
     p, v, a = np.asarray(start) * scale
     q, w, b = np.asarray(end) * scale
@@ -47,12 +50,12 @@ def polynomial(seconds: float, start: tuple[float, float, float],
 
 
 def turn(yaw: float, to: float) -> float:
-    """`to` as the angle nearest to `yaw`."""
+    """The angle `to` plus the multiple of 2 pi that brings it nearest to `yaw`, rad."""
     return yaw + (to - yaw + math.pi) % (2.0 * math.pi) - math.pi
 
 
 class Planner:
-    """State is `state`; `goal(t)` is where the drone should be, None while idle or disabled."""
+    """The planner. `goal(t)` is the set-point at t; None while it is idle or disabled."""
 
     def __init__(self) -> None:
         self.state, self.group = IDLE, 0
@@ -61,23 +64,23 @@ class Planner:
         self._last = Goal(np.zeros(3), np.zeros(3), np.zeros(3), 0.0, 0.0)
 
     def tell(self, position: np.ndarray, velocity: np.ndarray, yaw: float) -> None:
-        """The present state, from which the next plan starts where none is flown."""
+        """Set the drone's present state, from which the next trajectory starts if none is being flown."""
         self._last = Goal(np.array(position), np.array(velocity), np.zeros(3), yaw, 0.0)
 
     def stop(self) -> None:
-        """Motors off, where the high-level commander is in charge."""
+        """Stop the motors, if the high-level commander has control."""
         self.state = IDLE
 
     def disable(self) -> None:
-        """Make no set-points until the next command."""
+        """Return no set-points until the next command."""
         self.state = DISABLED
 
     def finished(self, t: float) -> bool:
-        """Whether the last trajectory has come to its end."""
+        """True if the last trajectory has ended at time t."""
         return t >= self._begun + self._seconds
 
     def goal(self, t: float) -> Goal | None:
-        """Where to be at t; a landing that has ended leaves the planner idle."""
+        """The set-point at t; None while idle or disabled. At the end of a landing the planner becomes idle."""
         if self.state not in (FLYING, LANDING):
             return None
         if self.state == LANDING and self.finished(t):
@@ -96,7 +99,7 @@ class Planner:
         return Goal(value[:3], rate[:3], second[:3], float(value[3]), float(rate[3]))
 
     def command(self, data: bytes, t: float) -> int:
-        """A packet of the high-level commander at time t: 0 or the firmware's error code."""
+        """Handle a packet of the high-level commander at time t. Returns 0 or the firmware's error code."""
         layout = FORMATS.get(data[0]) if data else None
         if layout is None or len(data) < 1 + struct.calcsize(layout):
             return errno.ENOEXEC
@@ -165,7 +168,7 @@ class Planner:
 
     def _spiral(self, t: float, sideways: int, clockwise: int, angle: float, r0: float, r1: float,
                 ascent: float, seconds: float) -> int:
-        """An arc about a centre beside (or ahead of) the drone, from radius r0 to r1."""
+        """Plan an arc about a centre beside (or ahead of) the drone, from radius r0 to r1, in m."""
         seconds = max(seconds, LEAST_DURATION_S)
         angle, r0, r1 = min(max(angle, -2 * math.pi), 2 * math.pi), max(r0, 0.0), max(r1, 0.0)
         here, sense = self._last, 1.0 if clockwise else -1.0

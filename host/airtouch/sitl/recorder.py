@@ -1,4 +1,4 @@
-"""The simulator's rows of a session as one flight log."""
+"""Recording of a session's rows as one flight log."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ DECIMALS = 6
 
 
 class Recorder:
-    """`add` each row (33,), `write` at the end. AirTouchError at once for a file that is there already."""
+    """The recording: `add` each row (33,), `write` at the end. Raises AirTouchError for a file that exists."""
 
     def __init__(self, path: Path, scenario: str, vehicle: str, seed: int, flight: int, force: bool) -> None:
         if path.exists() and not force:
@@ -25,11 +25,11 @@ class Recorder:
                       "scenario": scenario, "seed": seed, "flight": flight, "warnings": []}
 
     def add(self, row: np.ndarray) -> None:
-        """One row of 10 ms."""
+        """Append a row (33,) of 10 ms."""
         self._rows.append(row.copy())
 
     def write(self) -> None:
-        """Write the file, whole or not at all; nothing where nothing was flown."""
+        """Write the file, whole or not at all. Without rows no file is written."""
         if not self._rows:
             return
         table = np.round(np.array(self._rows), DECIMALS)

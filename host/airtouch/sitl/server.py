@@ -1,6 +1,6 @@
-"""The virtual Crazyflie on a UDP port: real time (or faster), faults, one client at a time.
+"""The virtual Crazyflie on a UDP port, in real time or faster, with injected faults and one client at a time.
 
-Who sends to the log port last gets the log data, as who holds the radio does.
+The client that sent to the log port last gets the log data.
 """
 
 import contextlib
@@ -27,20 +27,20 @@ from airtouch.sitl.firmware import Firmware
 from airtouch.sitl.recorder import Recorder
 from airtouch.vehicle import Vehicle
 
-HOST, PORT = "127.0.0.1", 19850  #: where cflib looks for virtual drones
+HOST, PORT = "127.0.0.1", 19850  #: address at which cflib searches for virtual drones
 GREETING = f"SYS: virtual Crazyflie, AirTouch {__version__}"
-MOST_BEHIND_S = 0.5  #: a machine that is slower than this loses time, not samples
-MOST_AT_ONCE = 200  #: datagrams that are read before the next row is flown
-LINK_TIMEOUT_S = 1.0  #: the firmware forgets its log blocks when the link is down for so long
+MOST_BEHIND_S = 0.5  #: s behind real time, beyond which the drone's clock is delayed; no sample is skipped
+MOST_AT_ONCE = 200  #: datagrams read between two rows
+LINK_TIMEOUT_S = 1.0  #: s without a link after which the firmware deletes its log blocks
 
 
 class Server:
-    """`run` serves until `stop`. `uri` is what clients connect to.
+    """The virtual Crazyflie. `run` serves until `stop`; clients connect to `uri`.
 
-    scenario, vehicle: names, files or objects; effects, without: as `airtouch simulate`. The drone
-    starts where the scenario's mission does. speed: drone seconds a second. faults: texts or
-    `Fault`s. record: flight-log file that is written at the end.
-    Raises AirTouchError for what cannot be flown and for a port that is taken.
+    scenario, vehicle: names, files or objects. effects, without: as in `airtouch simulate`. The drone
+    stands at the start of the scenario's mission. speed: multiple of real time. faults: texts or
+    `Fault`s. record: file of the flight log, written at the end.
+    Raises AirTouchError for settings that cannot be flown, a port in use and a `record` that exists.
     """
 
     def __init__(self, scenario: scenarios.Scenario | str | Path = "paper-9cm", *, port: int = PORT,
@@ -68,10 +68,10 @@ class Server:
         self._socket = _bind(host, port)
         self.port = self._socket.getsockname()[1]
         self.uri = f"udp://{host}:{self.port}"
-        self.slept_s = 0.0  #: drone time that was left out because the machine was too slow
+        self.slept_s = 0.0  #: s by which the drone's clock was delayed because the computer was too slow
 
     def order(self, fault: Fault | str) -> None:
-        """One more fault, while it runs."""
+        """Add a fault while the server runs."""
         fault = fault if isinstance(fault, Fault) else parse(fault)
         self.faults.append(fault)
         if fault.kind in LINE:
@@ -81,15 +81,15 @@ class Server:
             self._todo.append(fault)
 
     def stop(self) -> None:
-        """End `run`, from any thread."""
+        """End `run`. May be called from any thread."""
         self._stop.set()
 
     def close(self) -> None:
-        """Free the port; `run` does so at its end."""
+        """Close the port. `run` does so at its end."""
         self._socket.close()
 
     def run(self, told: Callable[[str], None] = lambda _: None) -> None:
-        """Serve until `stop`; told(text) gets the console's lines."""
+        """Serve until `stop`. told: called with each line of the drone's console."""
         start = time.monotonic() - self.drone.now_s / self.speed
         try:
             while not self._stop.is_set():
@@ -149,20 +149,20 @@ class Server:
                 drone.drain()
 
     def _receive(self) -> None:
-        """Everything that has come in goes onto the line."""
-        for _ in range(MOST_AT_ONCE):  # a flood must not stop the flight
+        """Put all received datagrams onto the simulated link."""
+        for _ in range(MOST_AT_ONCE):  # a flood of datagrams must not stop the flight
             try:
                 datagram, peer = self._socket.recvfrom(2048)
             except BlockingIOError:
                 return
-            except OSError:  # a client that is gone
+            except OSError:  # the client is gone
                 continue
             packet = crtp.parse(datagram)
             if packet is not None and self.drone.now_s >= self._cut_until_s:
                 self._up.put(packet, peer, self.drone.now_s)
 
     def _exchange(self, now_s: float) -> None:
-        """Take what has arrived, answer it, send what is due."""
+        """Handle the packets that have arrived, and send the packets that are due."""
         for packet, peer in self._up.ready(now_s):
             takes_over = self.client is None or packet.port == crtp.LOG
             if peer != self.client and takes_over and not crtp.is_null(packet):
@@ -174,16 +174,16 @@ class Server:
                 self.send(packet, peer)
 
     def answers(self, packet: crtp.Packet) -> list[crtp.Packet]:
-        """What the firmware answers to a packet."""
+        """The firmware's answers to a packet."""
         return self.firmware.take(packet)
 
     def send(self, packet: crtp.Packet, peer: crtp.Peer) -> None:
-        """Send a packet to a client that may be gone."""
+        """Send a packet. A client that is gone is no error."""
         with contextlib.suppress(OSError):
             self._socket.sendto(packet.to_bytes(), peer)
 
     def _welcome(self, peer: crtp.Peer) -> None:
-        """Another client: log data and console go there. On the ground the drone is as after its start."""
+        """Send log data and console to a new client. A drone on the ground is restarted."""
         self.client = peer
         if not self.drone.motors_on:
             self.drone.restart()
@@ -191,21 +191,21 @@ class Server:
 
 
 def _bind(host: str, port: int) -> socket.socket:
-    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    made.setblocking(False)
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp.setblocking(False)
     try:
-        made.bind((host, port))
+        udp.bind((host, port))
     except (OSError, OverflowError) as error:
-        made.close()
+        udp.close()
         raise AirTouchError(f"port {port} of {host}: {error}; choose another with --port") from None
-    return made
+    return udp
 
 
 @contextlib.contextmanager
 def serve(scenario: scenarios.Scenario | str | Path = "paper-9cm", **settings) -> Iterator[Server]:
-    """A virtual Crazyflie in a thread of its own: `with serve(port=0) as virtual: connect(virtual.uri)`.
+    """Run a virtual Crazyflie in a thread: `with serve(port=0) as virtual: connect(virtual.uri)`.
 
-    Arguments as `Server`.
+    Takes the arguments of `Server` and raises its errors.
     """
     server = Server(scenario, **settings)
     thread = threading.Thread(target=server.run, name="virtual-crazyflie", daemon=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 GET_ITEM, GET_INFO = 2, 3
 GROUP, START, STOP = 0x80, 0x81, 0x80
-MOST_NAME = 24  #: group and name together, so that an item fits into a packet
+MOST_NAME = 24  #: characters of group and name together that fit into a packet
 
 
 @dataclass(frozen=True)
@@ -23,12 +23,12 @@ class Item:
 
     @property
     def complete_name(self) -> str:
-        """group.name"""
+        """The name with its group: "group.name"."""
         return f"{self.group}.{self.name}"
 
 
 class Toc:
-    """Items in their order. shown: what of the type byte a client gets; extra: follows the info answer."""
+    """A table of contents. shown: mask of the type byte for clients; extra: bytes after the info answer."""
 
     def __init__(self, items: Sequence[Item], shown: int, extra: bytes = b"") -> None:
         self.items, self._shown, self._extra = tuple(items), shown, extra
@@ -41,7 +41,7 @@ class Toc:
         self.crc = _crc(self.items)
 
     def answer(self, data: bytes) -> bytes | None:
-        """The answer to a packet on the TOC channel; None for what the firmware ignores."""
+        """The answer to a packet on the TOC channel; None for a packet that the firmware ignores."""
         if not data:
             return None
         if data[0] == GET_INFO:
@@ -57,7 +57,7 @@ class Toc:
 
 
 def _crc(items: Sequence[Item]) -> int:
-    """The firmware chains the descriptions of all entries, starts and ends of groups among them."""
+    """The CRC of the table, over the descriptions of all entries, including starts and ends of groups."""
     crc, group = 0, None
     entries: list[tuple[int, str]] = []
     for item in items:

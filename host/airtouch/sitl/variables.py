@@ -1,6 +1,6 @@
 """The log variables and parameters of a Crazyflie 2.1 with Flow deck, Multi-ranger and AI-deck.
 
-Names, types and units as in crazyflie-firmware 2026.08; what the simulator has no value for is left out.
+Names, types and units as in crazyflie-firmware 2026.08. Variables without a value in the simulator are absent.
 """
 
 import math
@@ -19,14 +19,14 @@ from airtouch.sitl.toc import Item
 
 G = 9.81
 INVALID_RANGE_MM = 32767
-START_OVER = "sitl.startOver"  #: parameter of the virtual drone alone: a write of 1 puts it back to its start
+START_OVER = "sitl.startOver"  #: parameter that only the virtual drone has: writing 1 puts it back to its start
 GYRO_LSB_DEG = 2000.0 * 2.0 / 65536.0
 Read = Callable[[Drone], float]
 Variables = dict[str, tuple[str, Read]]
 
 
 def compress(q: tuple[float, float, float, float]) -> int:
-    """A unit quaternion x, y, z, w as Bitcraze's 32 bits (logs.quaternion.decompress is the way back)."""
+    """A unit quaternion x, y, z, w in Bitcraze's 32 bits; the inverse of logs.quaternion.decompress."""
     largest = max(range(4), key=lambda i: abs(q[i]))
     word = largest
     for i in range(4):
@@ -37,7 +37,7 @@ def compress(q: tuple[float, float, float, float]) -> int:
 
 
 def log_variables(drone: Drone) -> Variables:
-    """name -> (type, how to read it)."""
+    """The log variables: name -> (type, function that reads it)."""
     table: Variables = {}
 
     def add(group: str, names: str, kind: str, read: Callable[[Drone, int], float]) -> None:
@@ -93,7 +93,7 @@ def _of_app(name: str, drone: Drone) -> float:
 
 
 def log_items(table: Variables) -> list[Item]:
-    """TOC entries, groups together."""
+    """The entries of the table of contents, with the variables of a group together."""
     groups = dict.fromkeys(name.split(".")[0] for name in table)
     named = {group: [name for name in table if name.startswith(group + ".")] for group in groups}
     return [Item(group, name.removeprefix(group + "."), CODES[table[name][0]]) for group in groups
@@ -101,13 +101,13 @@ def log_items(table: Variables) -> list[Item]:
 
 
 def reader(table: Variables, items: list[Item], drone: Drone) -> Callable[[int], float]:
-    """read(number) for the log service."""
+    """The function read(number) for the log service."""
     reads = [(table[item.complete_name][1], item.kind) for item in items]
     return lambda number: hold(reads[number][0](drone), reads[number][1])
 
 
 def parameters(drone: Drone, ai_deck: bool) -> list[Parameter]:
-    """The PARAM groups. Those that the simulator does not act upon are kept, and no more."""
+    """The PARAM groups. Parameters without a meaning for the simulator can be set and read, without effect."""
     decks = dict.fromkeys(("bcFlow2", "bcMultiranger"), 1) | {"bcAI": int(ai_deck)} | dict.fromkeys(
         ("bcFlow", "bcZRanger", "bcZRanger2", "bcLighthouse4", "bcDWM1000", "bcLedRing", "bcUSD"), 0)
     return [
@@ -147,5 +147,5 @@ def _millimetres(metres: float) -> float:
 
 
 def _level(volts: float) -> int:
-    """Percent of the charge, in steps of 10, of the voltage of a cell."""
+    """Charge of a cell at this voltage, in percent, in steps of 10."""
     return int(10 * round(10 * float(np.interp(volts, OPEN_CIRCUIT_V, CHARGE))))
