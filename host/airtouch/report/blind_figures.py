@@ -1,4 +1,4 @@
-"""What a blind check came to: the rows of its table beside the goals, and one picture."""
+"""The result of a blind check: its figures beside the goals, and a picture."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,8 +11,8 @@ from airtouch.report.figures import FOUND, MUTED, png, style
 Rows = list[tuple[str, str, str, str]]
 
 
-def rows(found: Mapping[str, Any]) -> Rows:
-    """(figure, measured with 95 % interval, n, goal) for the console and the docs."""
+def rows(score: Mapping[str, Any]) -> Rows:
+    """Rows (figure, value with 95 % interval, n, goal) of a blind check's score, for the terminal and the docs."""
     out: Rows = []
 
     def add(name: str, value: Mapping[str, Any] | None, goal: str = "", key: str = "value") -> None:
@@ -23,55 +23,55 @@ def rows(found: Mapping[str, Any]) -> Rows:
             text = f"{value[key]:.1%} ({value['low']:.1%} to {value['high']:.1%})"
         out.append((name, text, str(value.get("n", "")), goal))
 
-    add("top-1, single effects", found["top_1"], "at least 95 %")
-    add("top-3, single effects", found["top_3"])
+    add("top-1, single effects", score["top_1"], "at least 95 %")
+    add("top-3, single effects", score["top_3"])
     for level, goal in (("weakest", "at least 80 %"), ("2x", ""), ("4x", "")):
-        add(f"top-1, {level} severity", found["by_severity"].get(level, {}).get("top_1"), goal)
-    add("exact set, single effects", found["exact"])
-    add("false alarms, no effect", found["false_alarms"], "at most 2 %")
-    add("pairs: exact set", found["pairs_exact"], "at least 80 %")
-    add("pairs: one right", found["pairs_one_right"], "at least 97 %")
-    for group, part in found["unknown"].items():
+        add(f"top-1, {level} severity", score["by_severity"].get(level, {}).get("top_1"), goal)
+    add("exact set, single effects", score["exact"])
+    add("false alarms, no effect", score["false_alarms"], "at most 2 %")
+    add("pairs: exact set", score["pairs_exact"], "at least 80 %")
+    add("pairs: one right", score["pairs_one_right"], "at least 97 %")
+    for group, part in score["unknown"].items():
         goals = ("at least 0.95", "at most 5 %") if group == "all" else ("", "")
         out.append((f"effect left out, {group}: AUROC of unknown", f"{part['auroc']:.3f}" if part["auroc"] is not None
                     else "", str(part["wrong_name"]["n"]), goals[0]))
         add(f"effect left out, {group}: given a wrong name", part["wrong_name"], goals[1])
-    add("shrink with the right effect", found["shrink"]["right"], "at least 90 %")
-    add("shrink with a wrong effect", found["shrink"]["wrong"], "at most 20 %")
-    add("parameters: median relative error", found["parameters"]["error"], "at most 10 %")
-    add("parameters: in the 90 % interval", found["parameters"]["coverage"], "85 to 95 %")
+    add("shrink with the right effect", score["shrink"]["right"], "at least 90 %")
+    add("shrink with a wrong effect", score["shrink"]["wrong"], "at most 20 %")
+    add("parameters: median relative error", score["parameters"]["error"], "at most 10 %")
+    add("parameters: in the 90 % interval", score["parameters"]["coverage"], "85 to 95 %")
     return out
 
 
-def effect_rows(found: Mapping[str, Any]) -> Rows:
-    """(effect, top-1, top-3, parameter error) of each kind of effect."""
+def effect_rows(score: Mapping[str, Any]) -> Rows:
+    """Rows (effect, top-1, top-3, median parameter error), one for each kind of effect."""
     out: Rows = []
-    for kind, part in found["by_effect"].items():
-        error = found["parameters"]["by_effect"].get(kind)
+    for kind, part in score["by_effect"].items():
+        error = score["parameters"]["by_effect"].get(kind)
         out.append((kind, *(f"{part[k]['hits']} of {part[k]['n']}" for k in ("top_1", "top_3")),
                     f"{error['error']:.0%} ({error['n']})" if error else ""))
     return out
 
 
-def picture(found: Mapping[str, Any]) -> bytes:
-    """Confusion matrix and reliability side by side, a PNG."""
+def picture(score: Mapping[str, Any]) -> bytes:
+    """PNG of the confusion matrix beside the reliability diagram."""
     with style():
         figure = Figure(figsize=(12.0, 7.6), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.7, 1.0])
-        table = found["confusion"]
+        table = score["confusion"]
         true = list(table)
-        said = sorted({a for v in table.values() for a in v} | set(true))
-        counts = np.array([[table[t].get(a, 0) for a in said] for t in true], float).reshape(len(true), len(said))
+        answers = sorted({a for v in table.values() for a in v} | set(true))
+        counts = np.array([[table[t].get(a, 0) for a in answers] for t in true], float).reshape(len(true), len(answers))
         shown = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
         left.imshow(shown, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
         for i, j in zip(*np.nonzero(counts), strict=True):
             left.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7,
                       color="white" if shown[i, j] > 0.6 else "black")
-        left.set_xticks(range(len(said)), said, rotation=90)
+        left.set_xticks(range(len(answers)), answers, rotation=90)
         left.set_yticks(range(len(true)), true)
         left.set_xlabel("answered first")
         left.set_title("flights by true effect (rows) and first answer", loc="left")
-        points = found["reliability"]
+        points = score["reliability"]
         p, share = (np.array([b[k] for b in points], float) for k in ("probability", "value"))
         bars = np.maximum([share - [b["low"] for b in points], [b["high"] for b in points] - share], 0.0)
         right.plot([0, 1], [0, 1], color=MUTED, lw=0.8)

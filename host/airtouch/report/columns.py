@@ -1,4 +1,4 @@
-"""The columns of every score table, on the terminal and in the report."""
+"""The columns of score tables, on the terminal and in reports."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ COLUMNS = {
 
 
 def cell(table: dict[str, Any], key: str, form: str) -> str:
-    """A figure with its interval below it, - where there is nothing to count."""
+    """A figure of a summary with its interval on a second line; "-" for None. key: path in the summary, with "/"."""
     def dig(source: Any) -> Any:
         for part in key.split("/"):
             source = source[part]

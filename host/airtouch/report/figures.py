@@ -16,19 +16,19 @@ from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
 
 TRUE, FOUND, OTHER, MUTED = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
-#: of a detector, in every plot
+#: detector -> its colour in every plot
 COLOURS = {"best": FOUND, "paper": OTHER, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
 KINDS = {"entry": "v", "exit": "^", "edge": "o"}
 STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
 
 
 def colour_of(name: str) -> str:
-    """A detector's colour; that of the first for one that has none of its own."""
+    """The colour of a detector; that of `best` for one that is not in COLOURS."""
     return COLOURS.get(name, FOUND)
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG at 120 dots an inch."""
+    """The figure as a PNG with 120 dots per inch."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=120)
     return buffer.getvalue()
@@ -38,11 +38,11 @@ def flight(
     log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace],
     name: str = "detected",
 ) -> bytes:
-    """One flight from signals to edges, all panes over the same seconds.
+    """PNG of one flight, from signals to edges, in panes over the same time axis.
 
-    Signals, band power, probability with detected and true edges, disturbance force
-    with its FR-CFAR threshold, down range. Panes whose signal the trace lacks are left out.
-    others: detectors whose edges are shown below those of `trace`, which is called `name`.
+    The panes: signals, band power, probability with detected and true edges, disturbance force
+    with its FR-CFAR threshold, down range. Panes without a signal in the trace are left out.
+    others: traces of other detectors, whose edges are shown below those of `trace`. name: label of `trace`.
     """
     panes: list[Callable[..., None]] = [_accelerations, _rates, _motors] if "channels" in trace.signals else []
     panes += [_band_power] if "band_power" in trace.signals else []
@@ -63,7 +63,7 @@ def flight(
 
 
 def reliability(curves: Mapping[str, Reliability]) -> bytes:
-    """How often the drone was over a platform when the detector said so with probability p."""
+    """PNG of reliability diagrams: share of samples truly over a platform against the stated probability."""
     with style():
         figure = Figure(figsize=(4.6, 4.2), layout="constrained")
         ax = figure.subplots()
@@ -142,7 +142,7 @@ def _edges(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, rows: Mapping[
 def _force(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> None:
     force = trace.signals["force"][:, 2] * 1000
     ax.plot(t, force, lw=0.6)
-    flying = airborne(log)  # on the ground it is the weight
+    flying = airborne(log)  # on the ground the force is the weight
     _finish(ax, "force f_w,z\nmN", force[flying] if flying.any() else force, legend=False)
 
 
@@ -164,7 +164,7 @@ def _range(ax: Axes, t: np.ndarray, log: FlightLog, trace: Trace, _: object) -> 
 
 
 def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> None:
-    """Axis label, and limits that a crash on landing does not spoil."""
+    """Set the label, and limits from the middle 99 % of the values, so that a hard landing does not set the scale."""
     low, high = np.nanpercentile(values, [0.5, 99.5])
     pad = 0.15 * max(high - low, 1e-9)
     ax.set_ylim(low - pad, high + pad)

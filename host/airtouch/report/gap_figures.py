@@ -1,4 +1,4 @@
-"""Plots of the gap before and after an effect is in the model, each as the bytes of a PNG."""
+"""Plots of the gap without and with the named effects in the model, each as the bytes of a PNG."""
 
 import io
 from collections.abc import Mapping, Sequence
@@ -17,38 +17,39 @@ from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE
 BEFORE, AFTER, FLOOR = OTHER, TRUE, MUTED
 STYLE = {"font.size": 10, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 10,
          "legend.frameon": False, "legend.fontsize": 9}
-WIDTH_IN = 4.4  #: a phone's width at a readable size
+WIDTH_IN = 4.4  #: inch, width of a plot; readable on a phone
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
 
-def signals(made: Signal) -> bytes:
-    """One channel of one flight: measured and modelled above, what is left below, up to the band's end."""
-    rows = 1 if made.measured is None else 2
+def signals(signal: Signal) -> bytes:
+    """PNG of one channel of one flight up to the band's upper end: measured, modelled, and below their difference."""
+    rows = 1 if signal.measured is None else 2
     with style():
         figure = Figure(figsize=(WIDTH_IN, 2.0 * rows + 0.8), layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-        if made.measured is not None:
-            axes[0].plot(made.time_s, made.measured, color="black", lw=1.0, label="measured")
-            axes[0].plot(made.time_s, made.measured - made.before, color=BEFORE, lw=1.0, label="model")
-            if made.after is not None:
-                axes[0].plot(made.time_s, made.measured - made.after, color=AFTER, lw=1.0, label="model with effect")
-            axes[0].set_ylabel(f"{CHANNEL_WORDS[made.channel]}\n{made.unit}")
-            _robust(axes[0], made.measured, made.measured - made.before)
-        axes[-1].axhspan(-made.floor, made.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
-        axes[-1].plot(made.time_s, made.before, color=BEFORE, lw=1.0, label="gap before")
-        if made.after is not None:
-            axes[-1].plot(made.time_s, made.after, color=AFTER, lw=1.0, label="gap after")
-        axes[-1].set(ylabel=f"measured - model\n{made.unit}", xlabel="time, s")
-        _robust(axes[-1], made.before, np.array([-made.floor, made.floor]))
+        if signal.measured is not None:
+            axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
+            axes[0].plot(signal.time_s, signal.measured - signal.before, color=BEFORE, lw=1.0, label="model")
+            if signal.after is not None:
+                axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
+                             label="model with effect")
+            axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{signal.unit}")
+            _robust(axes[0], signal.measured, signal.measured - signal.before)
+        axes[-1].axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
+        axes[-1].plot(signal.time_s, signal.before, color=BEFORE, lw=1.0, label="gap before")
+        if signal.after is not None:
+            axes[-1].plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
+        axes[-1].set(ylabel=f"measured - model\n{signal.unit}", xlabel="time, s")
+        _robust(axes[-1], signal.before, np.array([-signal.floor, signal.floor]))
         for ax in axes:
-            _phases(ax, made.time_s, made.phase)
+            _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
         return _png(figure)
 
 
 def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
-    """Spectra of the gap: for each shown channel before, floor and, where there is one, after."""
+    """PNG of the gap's spectra, one pane a channel: before, floor, and after if there is an effect."""
     rows = len(shown)
     with style():
         figure = Figure(figsize=(WIDTH_IN, 1.75 * rows + 0.6), layout="constrained")
@@ -66,17 +67,20 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
         return _png(figure)
 
 
-def commands(made: Mapping[str, Any]) -> bytes:
-    """The twin view: spectra of the commands as flown, beside those of nominal flights."""
-    f = np.array(made["frequency_hz"])
-    axes_named = [k for k in made if isinstance(made[k], Mapping)]
+def commands(curves: Mapping[str, Any]) -> bytes:
+    """PNG of the motor commands' spectra beside those of nominal flights, one pane an axis.
+
+    curves: "frequency_hz", and for each axis "flown" and, with baseline flights, "nominal", in N^2/Hz.
+    """
+    f = np.array(curves["frequency_hz"])
+    axes_named = [k for k in curves if isinstance(curves[k], Mapping)]
     with style():
         figure = Figure(figsize=(WIDTH_IN, 1.6 * len(axes_named) + 0.6), layout="constrained")
         axes = figure.subplots(len(axes_named), 1, sharex=True, squeeze=False)[:, 0]
         for ax, name in zip(axes, axes_named, strict=True):
-            if "nominal" in made[name]:
-                ax.loglog(f, made[name]["nominal"], color=FLOOR, lw=1.6, label="baseline flights")
-            ax.loglog(f, made[name]["flown"], color=FOUND, lw=1.2, label="these flights")
+            if "nominal" in curves[name]:
+                ax.loglog(f, curves[name]["nominal"], color=FLOOR, lw=1.6, label="baseline flights")
+            ax.loglog(f, curves[name]["flown"], color=FOUND, lw=1.2, label="these flights")
             ax.set_title(f"{name} command", loc="left")
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)
@@ -86,7 +90,7 @@ def commands(made: Mapping[str, Any]) -> bytes:
 
 
 def _png(figure: Figure) -> bytes:
-    """Fine enough for a phone's screen."""
+    """The figure as a PNG with 170 dots per inch, sharp on a phone."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=170)
     return buffer.getvalue()
@@ -107,7 +111,7 @@ def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
 
 
 def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
-    """Take-off, landing and platforms shaded behind the curves."""
+    """Shade take-off, landing and platforms behind the curves."""
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
     for a, b in zip(bounds[:-1], bounds[1:] - 1, strict=True):
         kind = KINDS[phase[a]]
@@ -119,7 +123,7 @@ def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
 
 
 def _robust(ax: Axes, *values: np.ndarray) -> None:
-    """Limits that take-off and landing do not spoil."""
+    """Set limits from the middle 99 % of the values, so that take-off and landing do not set the scale."""
     every = np.concatenate([np.ravel(v) for v in values])
     every = every[np.isfinite(every)]
     if len(every):

@@ -1,4 +1,4 @@
-"""The report on a gap: one self-contained HTML page that renders a diagnosis or a measurement, and computes nothing."""
+"""The report on a gap: a self-contained HTML page that renders a diagnosis or a measurement and computes nothing."""
 
 from collections.abc import Sequence
 from importlib import resources
@@ -19,32 +19,32 @@ from airtouch.report import gap_tables
 from airtouch.report.write import embed
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
-ANCHOR = "add-an-effect"  #: of the section that shows how
+ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 
 
-def write_measurement(path: Path, found: Measurement, pictures: Pictures | None = None, *, command: str,
+def write_measurement(path: Path, measurement: Measurement, pictures: Pictures | None = None, *, command: str,
                       force: bool = False) -> None:
-    """The page of `airtouch gap measure`: map, largest cells, signals and spectra.
+    """Write the page of `airtouch gap measure`: map, largest cells, signals and spectra.
 
-    Raises AirTouchError when the file exists, without `force`.
+    Raises AirTouchError for a file that exists, without `force`.
     """
-    headline = found.where[0] if found.where else None
+    headline = measurement.where[0] if measurement.where else None
     page = _page(
         title="Gap between flights and simulator", headline=headline,
-        answers=(words.measured(headline), words.overall(found.gap)),
-        cells=found.map.cells, floor_from=found.map.floor_from, where=found.where, pictures=pictures,
-        calibration=gap_tables.named(found.calibration),
-        lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in found.rotors]),
-               ("What these logs cannot say", found.cannot), ("Notes", _notes(found.notes, pictures)),
-               ("Left out", found.left_out)],
-        flights=_flights(found.flights, found.vehicle, found.baseline), command=command)
+        answers=(words.measured(headline), words.overall(measurement.gap)),
+        cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
+        calibration=gap_tables.named(measurement.calibration),
+        lists=[("Rotor speeds in the air", [words.rotor_in_words(r) for r in measurement.rotors]),
+               ("What these logs cannot say", measurement.cannot), ("Notes", _notes(measurement.notes, pictures)),
+               ("Left out", measurement.left_out)],
+        flights=_flights(measurement.flights, measurement.vehicle, measurement.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bool = False) -> None:
-    """The page of `airtouch gap diagnose`: the answer in three sentences, what to do, then the evidence.
+    """Write the page of `airtouch gap diagnose`: the answer in three sentences, the next steps, then the evidence.
 
-    Raises AirTouchError when the file exists, without `force`.
+    Raises AirTouchError for a file that exists, without `force`.
     """
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     left = summary.remaining(cells)
@@ -83,17 +83,17 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
 
 
 def example_effect() -> str:
-    """The effect file that the page shows."""
+    """The text of the example effect file."""
     return (resources.files("airtouch.simulation.effects") / "own_effect.py.txt").read_text("utf-8")
 
 
 def _notes(notes: Sequence[str], pictures: Pictures | None) -> list[str]:
-    """The notes, and that pictures are wanted but cannot be made."""
+    """The notes, and one more if pictures cannot be drawn for want of matplotlib."""
     return [*notes, *([NO_PICTURES] if pictures is not None and lacking("plots") else [])]
 
 
 def _images(pictures: Pictures | None) -> list[dict[str, str]]:
-    """Plots of the headline's signals, of spectra and of the commands."""
+    """Plots of the headline's signal, of the gap's spectra and of the commands' spectra, as data URLs with text."""
     if pictures is None or lacking("plots"):
         return []
     from airtouch.report import gap_figures

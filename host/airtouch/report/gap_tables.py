@@ -9,24 +9,24 @@ from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, interval,
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.words import quantity, seconds_in_words
 
-#: least ratio to the floor, background, ink
+#: (least ratio of gap to floor, background colour, text colour)
 SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd6b4d", "#ffffff"),
           (2.5, "#f2a27f", "#1f2328"), (1.5, "#f9cdb5", "#1f2328"), (0.0, "#fde9df", "#1f2328"))
 QUIET = ("#f3f4f6", "#8a8f98")
 LEGEND = [(*QUIET, "floor"), *((colour, ink, f"> {least:g}×" if least else "< 1.5×")
                                for least, colour, ink in reversed(SHADES))]
-MOST_LEFT = 10  #: cells that still stand out, in words
+MOST_LEFT = 10  #: remaining cells that the page names in words
 
 
 def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
-    """The frequency bands of the map, lowest first."""
+    """The frequency bands of the map, Hz, lowest first."""
     return sorted({c.band_hz for c in cells})
 
 
 def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
-    """One table for each phase, that with most energy first: channels down, bands across.
+    """One table for each phase, that with the most energy first. Rows are channels, columns are bands.
 
-    The first and that of the headline are open, the others folded.
+    The first table and that of the headline's phase are open, the others folded.
     """
     place = {(c.phase, c.channel, c.band_hz): c for c in cells if c.regime == "all"}
     marked = (headline.phase, headline.channel, headline.band_hz) if headline else None
@@ -47,19 +47,19 @@ def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, 
 
 
 def phase_rows(phases: Sequence[summary.Phase]) -> list[dict[str, Any]]:
-    """What the effects change in each phase."""
+    """Rows of the gap before and after the named effects, one for each phase."""
     return [{"name": capital(PHASE_WORDS[p.name]), "before": short(p.before),
              "after": "-" if p.after is None else short(p.after), "over": p.over, "stay": p.stay, "worse": p.worse}
             for p in phases]
 
 
 def capital(text: str) -> str:
-    """The text with its first letter large."""
+    """The text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def shaded(cell: Cell) -> dict[str, str]:
-    """A cell of the heat map: text, colours, and a title with its figures."""
+    """A cell of the heat map: text, colours, and a title with gap, interval, floor and sample size."""
     times = ratio(cell)
     sure = significant(cell)
     colour, ink = next((c, i) for least, c, i in SHADES if times >= least) if sure else QUIET
@@ -72,7 +72,7 @@ def shaded(cell: Cell) -> dict[str, str]:
 
 
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
-    """The largest cells in figures."""
+    """Rows of the largest cells."""
     return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": f"{short(c.gap)}",
              "interval": interval(c),
              "after": "-" if c.after is None else f"{short(c.after)}", "floor": f"{short(c.floor)}",
@@ -81,7 +81,7 @@ def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[di
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    """The parameters of the effects named."""
+    """Rows of the parameters of the named effects."""
     return [{"effect": e.name if i == 0 else "", "parameter": k, "value": f"{q.value:.3g}",
              "interval": "" if q.low is None or q.high is None else f"{q.low:.3g} to {q.high:.3g}",
              "unit": "" if q.unit == "1" else q.unit,
@@ -91,7 +91,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 
 def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """The best candidates, and `none` and `unknown` wherever they are."""
+    """Rows of the leading candidates, and of `none` and `unknown` at any rank."""
     return [{"name": r.name, "probability": f"{r.probability:.1%}", "width": round(100 * r.probability),
              "shrink": f"{r.shrink.value:.2f}", "why": r.why,
              "interval": "" if r.shrink.low is None or r.shrink.high is None
@@ -99,7 +99,10 @@ def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Gap before, after and floor, in both arms and with the wrong effect."""
+    """Table of the gap before and after, the floor and the shrink: right effect, wrong effect, and both arms.
+
+    None without figures.
+    """
     keys = ("before", "after", "floor", "shrink")
     sources: list[tuple[str, Mapping[str, Any]]] = []
     named = ", ".join(e.name for e in diagnosis.effects) or "no effect"
@@ -116,7 +119,7 @@ def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 
 def figure(value: Any) -> str:
-    """A number, a quantity or its JSON form; `-` for none."""
+    """Text of a number, a quantity or a quantity's JSON form; "-" for anything else."""
     if isinstance(value, Mapping) and "value" in value:
         value = Quantity(**{k: v for k, v in value.items() if k in ("value", "low", "high", "unit")})
     if isinstance(value, Quantity):
@@ -127,5 +130,5 @@ def figure(value: Any) -> str:
 
 
 def named(parameters: Mapping[str, Quantity]) -> list[tuple[str, str]]:
-    """Calibrated parameters with their intervals."""
+    """(name, value with interval) of calibrated parameters."""
     return [(k, quantity(q)) for k, q in parameters.items()]

@@ -1,4 +1,4 @@
-"""The edge map as a picture."""
+"""The picture of an edge map."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,26 +10,26 @@ from shapely.plotting import patch_from_polygon
 from airtouch.detector.evaluation.edge_map import EdgeMap
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, style
 
-STRIP_M = 0.3  #: drawn width of a platform that a single pass crossed
+STRIP_M = 0.3  #: m, drawn width of a platform that was crossed once; its true width is unknown
 COLOURS = {"entry": FOUND, "exit": OTHER, "edge": TRUE}
 
 
-def edge_map(made: EdgeMap, title: str) -> bytes:
-    """PNG of the track, the edges felt with 2-sigma bars along the track, platforms and a scale bar."""
+def edge_map(plane: EdgeMap, title: str) -> bytes:
+    """PNG of the track, the edges with 2-sigma bars along the track, platforms and a scale bar."""
     with style():
-        return png(drawn(made, title))
+        return png(drawn(plane, title))
 
 
-def drawn(made: EdgeMap, title: str) -> Figure:
-    """The map as a figure."""
-    xy, points = made.xy, made.points
+def drawn(plane: EdgeMap, title: str) -> Figure:
+    """The map as a matplotlib figure."""
+    xy, points = plane.xy, plane.points
     with style():
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         ax = figure.subplots()
         ax.grid(color="#e5e7eb", lw=0.6, zorder=0)
         ax.plot(*xy.T, color=MUTED, lw=0.9, label="track")
         _ends(ax, xy)
-        for platform in made.platforms:
+        for platform in plane.platforms:
             ends = (platform.near, platform.far)
             if platform.outline is None and all(isinstance(end, Point) for end in ends):
                 strip = _strip(*(np.array(end.coords[0]) for end in ends))
@@ -58,13 +58,13 @@ def drawn(made: EdgeMap, title: str) -> Figure:
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
-        figure.draw_without_rendering()  # settles the limits, which equal axes change
+        figure.draw_without_rendering()  # equal axes change the limits when they are drawn
         _scale_bar(ax)
         return figure
 
 
 def _strip(near: np.ndarray, far: np.ndarray) -> np.ndarray:
-    """Corners (4, 2) of the ground between two edges of one pass, as wide as STRIP_M: nothing tells its true width."""
+    """Corners (4, 2), m, of the area between two edges of one pass, STRIP_M wide."""
     along = far - near
     length = float(np.hypot(*along))
     side = 0.5 * STRIP_M * (np.array([-along[1], along[0]]) / length if length > 0.0 else np.array([0.0, 1.0]))
@@ -72,7 +72,7 @@ def _strip(near: np.ndarray, far: np.ndarray) -> np.ndarray:
 
 
 def _ends(ax: Axes, xy: np.ndarray) -> None:
-    """Where the flight starts and ends, and which way it goes."""
+    """Mark start, end and direction of the flight."""
     known = xy[np.isfinite(xy).all(axis=1)]
     if len(known) < 2:
         return
@@ -90,7 +90,7 @@ def _ends(ax: Axes, xy: np.ndarray) -> None:
 
 
 def _scale_bar(ax: Axes) -> None:
-    """A bar of a round length at the lower left."""
+    """Draw a scale bar of a round length at the lower left."""
     ax.autoscale(False)
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * (x1 - x0)), 0.05)
@@ -100,7 +100,7 @@ def _scale_bar(ax: Axes) -> None:
 
 
 def _direction(xy: np.ndarray, sample: int) -> np.ndarray:
-    """Unit vector along the track there; zero where it stands still."""
+    """Unit vector (2,) along the track at a sample; zero where the drone stands still."""
     low, high = max(0, sample - 10), min(len(xy) - 1, sample + 10)
     step = xy[high] - xy[low]
     length = float(np.hypot(*step))

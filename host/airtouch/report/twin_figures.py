@@ -13,7 +13,7 @@ REAL, TWIN = TRUE, FOUND
 
 
 def overlaid(pair: tuple[Signals, Signals]) -> bytes:
-    """One recorded flight and its twin, 2 s before the entry to 2 s after the exit, all twelve channels."""
+    """PNG of all twelve channels of a recorded flight and its twin, from 2 s before the entry to 2 s after the exit."""
     with style():
         figure = Figure(figsize=(7.2, 10.5), layout="constrained")
         axes = figure.subplots(6, 2, sharex=True)
@@ -29,9 +29,9 @@ def overlaid(pair: tuple[Signals, Signals]) -> bytes:
 
 
 def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
-    """Medians of the twelve channels around the edges of one height class, entry and exit side by side.
+    """PNG of the twelve channels around the edges of one height class, entry beside exit.
 
-    Bands: quarter to three quarters of the flights.
+    Lines are medians over flights, bands reach from the first to the third quartile.
     """
     time = (np.arange(BEFORE + BEHIND) - BEFORE) / RATE_HZ
     with style():
@@ -53,7 +53,10 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
 
 
 def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
-    """Band powers in free air, median and quartiles over flights, of eleven channels."""
+    """PNG of band powers in free air of eleven channels, median and quartiles over flights.
+
+    pair: recorded and simulated, each (3, 11, bands), dB.
+    """
     place = np.arange(len(BANDS_HZ))
     with style():
         figure = Figure(figsize=(7.2, 9.0), layout="constrained")
@@ -73,6 +76,6 @@ def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
 
 
 def class_in_words(name: str) -> str:
-    """A height class with its bounds."""
+    """A height class and its bounds, as text."""
     low, high = CLASSES[name]
     return f"{name}: {100 * low:g} to {100 * high:g} cm of down range over the platform"

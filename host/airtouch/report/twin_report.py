@@ -20,21 +20,27 @@ from airtouch.twin.words import answer, gap_row
 MOST_GAPS = 30
 
 
-def write_report(path: Path, recorded: Recorded, found: Comparison, drawn: Curves, levers: Sequence[Lever],
-                 values: np.ndarray, first: dict[str, float], *, command: str, force: bool = False) -> None:
-    """One self-contained HTML file. drawn: its curves. first: the misfit by group before the fit."""
-    images = [("One flight and its twin", "", twin_figures.overlaid(drawn.overlaid)),
-              ("Spectra in free air", "", twin_figures.spectra(drawn.spectra)),
+def write_report(path: Path, recorded: Recorded, comparison: Comparison, curves: Curves, levers: Sequence[Lever],
+                 values: np.ndarray, misfit_before: dict[str, float], *, command: str, force: bool = False) -> None:
+    """Write the page as a self-contained HTML file.
+
+    values: (levers,), fitted. misfit_before: group -> misfit before the fit. Raises AirTouchError for a file that
+    exists, without `force`.
+    """
+    images = [("One flight and its twin", "", twin_figures.overlaid(curves.overlaid)),
+              ("Spectra in free air", "", twin_figures.spectra(curves.spectra)),
               *(("Around the edges, medians and quartiles", twin_figures.class_in_words(name),
-                 twin_figures.edges(kinds)) for name, kinds in drawn.edges.items())]
+                 twin_figures.edges(kinds)) for name, kinds in curves.edges.items())]
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     template = environment.from_string((resources.files("airtouch.report") / "twin.html").read_text("utf-8"))
     page = template.render(
-        answer=answer(found.auroc), auroc=found.auroc, misfit=[(g, first.get(g), v) for g, v in found.misfit.items()],
-        gaps=[gap_row(g) for g in found.gaps[:MOST_GAPS]],
+        answer=answer(comparison.auroc), auroc=comparison.auroc,
+        misfit=[(g, misfit_before.get(g), v) for g, v in comparison.misfit.items()],
+        gaps=[gap_row(g) for g in comparison.gaps[:MOST_GAPS]],
         levers=[(lever.name, f"{value:.4g}", f"{lever.start:.4g}", lever.unit)
                 for lever, value in zip(levers, values, strict=True)],
         images=[(title, text, embed(data)) for title, text, data in images],
-        flights=len(recorded.courses), simulated=len(found.flown), lost=found.lost, left_out=recorded.left_out,
+        flights=len(recorded.courses), simulated=len(comparison.flown), lost=comparison.lost,
+        left_out=recorded.left_out,
         speeds=sorted({c.speed_from for c in recorded.courses}), command=command, version=__version__)
     write_bytes(page.encode(), path, force)

@@ -1,4 +1,4 @@
-"""The HTML report: one self-contained file."""
+"""The HTML report on scored flights."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -18,41 +18,43 @@ from airtouch.report.columns import COLUMNS, cell
 def write_report(
     path: Path,
     title: str,
-    made: ScoreReport,
+    scored: ScoreReport,
     *,
     parameters: Mapping[str, Any],
     command: str,
     left_out: Sequence[tuple[str, str]] = (),
     force: bool = False,
 ) -> None:
-    """Score table of the detectors side by side, plots, and a few flights, as one HTML file.
+    """Write score table, plots and a few flights as a self-contained HTML file.
 
-    Raises AirTouchError when the file exists, without `force`.
+    parameters, command: printed at the end of the page. left_out: (file, reason) of flights that were not scored.
+    Raises AirTouchError for a file that exists, without `force`.
     """
     from airtouch.report import figures
 
-    first = next(iter(made.summaries))
+    first = next(iter(scored.summaries))
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     source = (resources.files("airtouch.report") / "report.html").read_text("utf-8")
     template = environment.from_string(source)
-    answers = [answer(*row) for row in sorted(made.summaries.items(), key=_missed)]
+    answers = [answer(*row) for row in sorted(scored.summaries.items(), key=_missed)]
     page = template.render(
-        title=title, answers=answers, summaries=made.summaries, columns=COLUMNS, cell=cell,
-        breakdowns=made.breakdowns,
-        errors=embed(figures.error_distribution(made.hits)), reliability=embed(figures.reliability(made.reliability)),
+        title=title, answers=answers, summaries=scored.summaries, columns=COLUMNS, cell=cell,
+        breakdowns=scored.breakdowns,
+        errors=embed(figures.error_distribution(scored.hits)),
+        reliability=embed(figures.reliability(scored.reliability)),
         flights=[{"name": f.score.file, "text": in_words(f.score),
-                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in made.flights],
+                  "image": embed(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in scored.flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)
 
 
 def _missed(row: tuple[str, Mapping[str, Any]]) -> int:
-    """What the sentences are sorted by."""
+    """Sort key of the sentences: number of missed edges."""
     return row[1]["missed_count"]
 
 
 def answer(name: str, table: Mapping[str, Any]) -> str:
-    """The result in one sentence."""
+    """The result of a detector in one sentence. table: its summary."""
     if not table["edges"]:
         return (f"{name}: {table['detections']} edges detected on {table['flights']} flights; "
                 "there is no true edge to compare with.")
@@ -64,7 +66,7 @@ def answer(name: str, table: Mapping[str, Any]) -> str:
 
 
 def in_words(score: FlightScore) -> str:
-    """What happened on one flight."""
+    """The result of one flight in one sentence."""
     parts = []
     for edge in score.edges:
         if edge.error_s is None:
