@@ -34,7 +34,7 @@ COMMANDS = {
 
 
 class Suggesting(click.Group):
-    """A group that names the nearest commands of a name that it does not know."""
+    """A group of commands that suggests similar names for an unknown command."""
 
     def resolve_command(self, ctx: click.Context,
                         args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
@@ -44,7 +44,7 @@ class Suggesting(click.Group):
 
 
 class LazyGroup(Suggesting):
-    """A group whose commands are imported when they are asked for."""
+    """A group that imports a command's module when the command is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -70,9 +70,9 @@ def airtouch() -> None:
 
 
 def main() -> None:
-    """Entry point: one clear line and exit code 2 for bad input; names that the terminal cannot show as escapes."""
+    """Entry point. Bad input gives one line and exit code 2. Characters that a terminal lacks become escapes."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # not where a caller has put something else in its place
+        if isinstance(stream, io.TextIOWrapper):  # a caller may have replaced it
             stream.reconfigure(errors="backslashreplace")
     try:
         airtouch()

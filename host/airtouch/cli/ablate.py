@@ -55,7 +55,7 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
 
 
 def _training(rows: dict[str, dict[str, Any]]) -> Table:
-    """Epochs to converge, mean over the folds."""
+    """Table of the epochs until convergence, mean over the folds."""
     table = Table("", "epochs to converge, mean of the folds", title="training", title_justify="left")
     for what, row in rows.items():
         epochs = [f["parameters"]["converged_after_epochs"] for f in row["folds"]]
@@ -64,7 +64,7 @@ def _training(rows: dict[str, dict[str, Any]]) -> Table:
 
 
 def _sizes(rows: dict[str, dict[str, Any]]) -> Table:
-    """What the drone carries and computes, and what int8 loses against float."""
+    """Table of parameters, operations and the loss of accuracy from float to int8."""
     table = Table("", "parameters, bytes", "state, bytes", "MAC a sample", "balanced, float", "int8", "error, float",
                   "int8", "missed, float", "int8", title="size, cost and what int8 costs", title_justify="left")
     for what, row in rows.items():

@@ -13,7 +13,7 @@ from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
 
-MORE = 5  #: flights that the outlook is given for
+MORE = 5  #: further flights whose benefit is estimated
 
 
 @click.command(name="adapt")
@@ -47,9 +47,9 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     airtouch export mine.npz --out model
 
     It starts from the shipped weights, trains in the twin, and then on the flights themselves: their down range
-    labels them. Flights without down range are used with the edges that the twin's detector finds. Four flights or
-    more over a platform are held out in turn to say what to expect. What is done is kept beside --out, in a
-    folder that ends in .adapt: the same command goes on after a stop.
+    labels them. Flights without down range are labelled by the detector from the twin. With four flights or more
+    over a platform, each is held out in turn to measure what to expect. Finished stages are stored beside --out, in a
+    folder that ends in .adapt: the same command continues after a stop.
     """
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
@@ -87,24 +87,24 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
 
 
-def _say(found: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:
-    """What to expect, in sentences."""
-    rows = {"twin only": found.twin_only, "held out, half of the others": found.held_out_half,
-            "held out, all others": found.held_out}
+def _say(adapted: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:
+    """Print what to expect of the detector."""
+    rows = {"twin only": adapted.twin_only, "held out, half of the others": adapted.held_out_half,
+            "held out, all others": adapted.held_out}
     for name, scores in rows.items():
         if scores:
             click.echo(f"{name}: {in_words(summary.summarise(scores))}")
-    if any(s.in_training for s in found.twin_only):
+    if any(s.in_training for s in adapted.twin_only):
         click.echo("the weights it started from have seen some of these flights: these figures are too good; "
                    "--from scratch measures without them")
     if not hold_out:
         click.echo("nothing was held out, as asked: what to expect of new flights is not known")
         return
-    if not found.held_out:
+    if not adapted.held_out:
         click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.FEWEST} are needed to say "
                    "what to expect")
         return
-    ahead = adapt.outlook(found, labelled, MORE)
+    ahead = adapt.outlook(adapted, labelled, MORE)
     if ahead:
         click.echo(f"the next {MORE} flights: {ahead['now_m']:.3f} m would become about {ahead['then_m']:.3f} m "
                    f"(from {ahead['half_m']:.3f} m with half of the flights; a guess, see the intervals)")
@@ -125,7 +125,7 @@ def in_words(table: dict[str, Any]) -> str:
 
 
 class Stages:
-    """One progress bar a stage: call it with (stage, done, total, note)."""
+    """One progress bar for each stage: call it with (stage, done, total, note)."""
 
     def __init__(self) -> None:
         self.name = ""

@@ -108,7 +108,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
 
 @contextmanager
 def stopping(quiet: bool = False):
-    """An event that Ctrl-C and the usual signals set instead of ending the process."""
+    """An event that Ctrl-C, SIGTERM and SIGHUP set instead of ending the process."""
     stop = threading.Event()
 
     def asked(*_) -> None:
@@ -131,7 +131,7 @@ def stopping(quiet: bool = False):
 
 @contextmanager
 def _shown(seconds: float):
-    """A line that says leg, time, battery and losses; where there is no terminal one line a leg."""
+    """A status line with leg, time, battery and losses; without a terminal one line for each leg."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 

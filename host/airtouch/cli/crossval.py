@@ -105,7 +105,7 @@ def _free_air(folders: tuple[Path, ...]) -> list[FlightLog]:
 
 
 def note(ledger: Path, title: str, result: dict) -> None:
-    """One line more in the ledger of looks at the folds."""
+    """Append a line to the ledger of looks at the folds."""
     named = ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy")
     figures = {key: result[key] for key in named}
     line = f"- {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {title}: {json.dumps(figures)}\n"

@@ -15,7 +15,7 @@ from airtouch.detector.evaluation.score_report import score_report, shown_flight
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 
-EPOCHS, STEPS = 8, 800  #: as much as fits in the time on two cores
+EPOCHS, STEPS = 8, 800  #: epochs of `paper`, training steps of `best`: two minutes on two cores
 SCORED = ("best", "paper", "baseline")  #: detectors
 SHOWN = 4  #: flights plotted in the report
 

@@ -70,7 +70,7 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
 
 
 def _pass_on(said: dict[str, list[str]]) -> None:
-    """What the logs' own checks say, one line each, on stderr."""
+    """Print the warnings of the quality checks on stderr, one line each."""
     files: dict[str, list[str]] = {}
     for file, lines in said.items():
         for line in lines:

@@ -55,7 +55,7 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
 
 
 def _load(path: Path) -> Trained:
-    """A model of either kind."""
+    """The model in a file, of `best` or of `paper`."""
     data = archive.read(path)
     _, metadata = archive.parse(data, str(path))
     module = best_model if metadata.get("network") == "stream" else model_file

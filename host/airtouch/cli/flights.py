@@ -1,4 +1,4 @@
-"""Where recorded flights may lie."""
+"""The folder of recorded flights."""
 
 import os
 from pathlib import Path
@@ -11,8 +11,8 @@ from airtouch.errors import AirTouchError
 def find_flights() -> Path | None:
     """The folder of the authors' flights: AIRTOUCH_FLIGHTS or ../shared/flights, beside here or the checkout.
 
-    Each may be that folder or one with an `airtouch` folder in it. None where there is none; AirTouchError
-    where AIRTOUCH_FLIGHTS names no folder.
+    Each may be that folder or one with an `airtouch` folder in it. None if there is none. Raises AirTouchError
+    if AIRTOUCH_FLIGHTS names no folder.
     """
     named = os.environ.get("AIRTOUCH_FLIGHTS")
     if named:
@@ -28,7 +28,7 @@ def find_flights() -> Path | None:
 
 
 def need_flights(folder: Path | None = None) -> Path:
-    """The folder given, else `find_flights`; a usage error where there is none."""
+    """The given folder, else that of `find_flights`. Raises a usage error if there is none."""
     found = folder or find_flights()
     if found is None:
         raise click.UsageError("no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS")

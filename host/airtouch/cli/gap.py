@@ -21,7 +21,7 @@ def command() -> None:
 
 
 class Greedy(click.Command):
-    """A command whose --baseline takes every word up to the next option, as a shell's pattern gives them."""
+    """A command whose --baseline takes all words up to the next option, so that a shell pattern works."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         spread: list[str] = []
@@ -38,7 +38,7 @@ class Greedy(click.Command):
 
 
 def _shared(function: Callable) -> Callable:
-    """Options of `measure` and `diagnose` alike."""
+    """Add the options that `measure` and `diagnose` share."""
     path = click.Path(path_type=Path, dir_okay=False)
     for option in (
         click.option("--force", is_flag=True, help="Replace the files."),
@@ -175,7 +175,7 @@ def demo_command(out: Path, force: bool) -> None:
 
 
 def _case(vehicle: Any, nominal: list, without: tuple[str, ...]) -> Callable:
-    """The diagnosis of some flights, everything else being given."""
+    """A function that diagnoses flights, with all other arguments fixed."""
     from functools import partial
 
     from airtouch.gap import diagnose
@@ -192,7 +192,7 @@ def _runner(dask: str | None, effect_files: tuple[str, ...]) -> Callable:
 
 
 def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> None:
-    """Every flight diagnosed alone, one row each."""
+    """Diagnose each flight alone and print one row for each."""
     from functools import partial
 
     from rich.table import Table
@@ -295,7 +295,7 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
 
 
 def _scored(found: dict[str, Any], json_path: Path | None, plot: Path | None, force: bool) -> None:
-    """Figures of a blind check on the console and in files."""
+    """Print the score of a blind check, and write it to files."""
     from rich.table import Table
 
     from airtouch.logs.files import write_bytes
@@ -320,7 +320,7 @@ def _check_free(report: Path | None, json_path: Path | None, force: bool) -> Non
 
 
 def _line(name: str, real: tuple[str, ...], baseline: tuple[str, ...], vehicle: str | None) -> str:
-    """The command as it was given, for the report; long lists of files cut short."""
+    """The command as typed, for the report, with long lists of files shortened."""
     def few(names: tuple[str, ...]) -> str:
         return " ".join(names[:4]) + (f" [and {len(names) - 4} more]" if len(names) > 4 else "")
 

@@ -1,4 +1,4 @@
-"""What `airtouch gap` prints: tables, sentences, and a bar when it takes long."""
+"""The output of `airtouch gap`: tables, sentences, and a progress bar for long work."""
 
 import threading
 import time
@@ -19,9 +19,9 @@ MOST_CELLS = 16
 
 
 class Bar:
-    """A progress bar on stderr that shows itself when the work takes more than two seconds.
+    """A progress bar on stderr that appears when the work takes more than two seconds.
 
-    Called with a line of what is done now; `total` calls are the whole, None: unknown.
+    Call it with a description of each step. total: number of steps, None if unknown.
     """
 
     def __init__(self, total: int | None = None) -> None:
@@ -44,7 +44,7 @@ class Bar:
 
 
 class Steps:
-    """A line when something else is done and LINE_S have passed since the last, with the seconds since the start."""
+    """Prints the seconds since the start and the present step every LINE_S. Call it with each step."""
 
     LINE_S = 1.5
 
@@ -65,13 +65,13 @@ class Steps:
         self.text = text
 
     def _tick(self) -> None:
-        """Something on the screen every LINE_S, whatever the work does meanwhile."""
+        """Print a line every LINE_S, also during a long step."""
         while not self.stopped.wait(self.LINE_S):
             click.echo(f"[{time.monotonic() - self.began:4.0f} s] {self.text}", err=True)
 
 
 def cells(some: Iterable[Cell], title: str) -> Table:
-    """The largest cells of a gap map."""
+    """A table of cells of a gap map."""
     some = list(some)[:MOST_CELLS]
     after = any(c.after is not None for c in some)
     table = Table(title=title, title_justify="left", caption_justify="left",
@@ -91,7 +91,7 @@ def cells(some: Iterable[Cell], title: str) -> Table:
 
 
 def measurement(screen: Console, found: Measurement) -> None:
-    """What `measure` says."""
+    """Print a measurement."""
     count = len(found.flights)
     screen.print(f"{count} flight{'s' * (count != 1)} against {found.vehicle}; floor: {found.map.floor_from}"
                  + (f" ({len(found.baseline)})" if found.baseline else ""))
@@ -106,7 +106,7 @@ def measurement(screen: Console, found: Measurement) -> None:
 
 
 def diagnosis(screen: Console, found: Diagnosis) -> None:
-    """What `diagnose` says: sentence, effects, ranking, where, advice."""
+    """Print a diagnosis: sentences, effects, ranking, largest cells and next steps."""
     for sentence in words.sentences(found):
         screen.print(sentence)
     for effect in found.effects:
@@ -133,7 +133,7 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
 
 
 def remarks(screen: Console, title: str, lines: Sequence[str]) -> None:
-    """A list with a heading, nothing when it is empty."""
+    """Print a list with a heading; an empty list prints nothing."""
     if lines:
         screen.print(f"{title}:")
     for line in lines:
@@ -141,6 +141,6 @@ def remarks(screen: Console, title: str, lines: Sequence[str]) -> None:
 
 
 def left_out(reasons: Iterable[str]) -> None:
-    """Flights that could not be used, on stderr."""
+    """Print the flights that could not be used on stderr."""
     for reason in reasons:
         click.echo(f"airtouch: left out: {reason}", err=True)

@@ -16,8 +16,8 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.rosbag import is_bag
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
-RERUN = ".rrd"  #: written, never read
-FOREIGN = (".ulg",)  #: read in folders as well
+RERUN = ".rrd"  #: ending of Rerun files, which are only written
+FOREIGN = (".ulg",)  #: endings of other programs' logs that are read from folders too
 FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
 
 
@@ -138,7 +138,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
 
 
 def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], list[dict[str, str]]]:
-    """`act` on every file; what fails is left out with its reason, the others go on."""
+    """Call `act` on every file. Returns the results, and the failed files with their reasons."""
     paths = list(_expand(files))
     found, left_out = [], []
     for path in _progress(paths):
@@ -212,7 +212,7 @@ def _print_json(found: list[dict[str, Any]], left_out: list[dict[str, str]]) -> 
 
 
 def _finite(value: Any) -> Any:
-    """The same data with NaN and infinities as null, as JSON has it."""
+    """The data with None for NaN and infinities, which JSON lacks."""
     if isinstance(value, dict):
         return {k: _finite(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
@@ -221,7 +221,7 @@ def _finite(value: Any) -> Any:
 
 
 def _finish(done: int, left_out: list[dict[str, str]], verb: str) -> None:
-    """Say what was left out and why; exit code 2 then."""
+    """Print the files that were left out with their reasons, and exit with code 2 if there are any."""
     for item in left_out:
         click.echo(f"airtouch: {item['reason']}", err=True)
     click.echo(f"{done} {'flight' if done == 1 else 'flights'} {verb}, {len(left_out)} left out", err=True)

@@ -67,7 +67,7 @@ def _in_words(edge) -> str:
 
 
 class screen:
-    """(show, say): a live view where there is a terminal, else a line a second and one an edge."""
+    """A live view; without a terminal a line for each second and each edge."""
 
     def __init__(self, live: bool = True, every_s: float = 1.0) -> None:
         self.live, self.every_s, self.printed_s, self.drawn = live, every_s, -1.0, 0.0
@@ -89,7 +89,7 @@ class screen:
             self.view.__exit__(*error)
 
     def show(self, board) -> None:
-        """Draw ten times a second, or print once a second of the drone's time."""
+        """Draw ten times a second; without a terminal print once in each second of the drone's time."""
         if self.view:
             if time.monotonic() - self.drawn > 0.1:
                 self.drawn = time.monotonic()
@@ -99,7 +99,7 @@ class screen:
             click.echo(board.line())
 
     def say(self, text: str) -> None:
-        """A line that stays."""
+        """Print a line above the live view."""
         if self.view:
             self.view.console.print(text)
         else:

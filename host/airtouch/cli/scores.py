@@ -1,4 +1,4 @@
-"""What `evaluate`, `crossval` and `demo` print and write alike."""
+"""Output that `evaluate`, `crossval` and `demo` share."""
 
 import json
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from airtouch.report.columns import COLUMNS, cell
 
 
 def table(rows: Mapping[str, dict[str, Any]], title: str) -> Table:
-    """A table of summaries, one row each, with intervals."""
+    """A table with a row of figures and intervals for each summary."""
     result = Table(title=title, title_justify="left", show_lines=True, caption_justify="left",
                    caption="second line: 95 % interval, bootstrap by flight. A miss has no detection within "
                            "1.5 s; a detection serves one edge, the others are false. "
@@ -28,18 +28,18 @@ def table(rows: Mapping[str, dict[str, Any]], title: str) -> Table:
 
 
 def console() -> Console:
-    """Standard output, wide enough for the table where it is not a terminal."""
-    found = Console()
-    return found if found.is_terminal else Console(width=170)
+    """Standard output; if it is no terminal, wide enough for the table."""
+    output = Console()
+    return output if output.is_terminal else Console(width=170)
 
 
 def left_out(failures: list[tuple[str, str]], scored: int) -> None:
-    """The summary of what was left out, on stderr."""
+    """Print the numbers of scored and left-out flights on stderr."""
     if failures:
         click.echo(f"airtouch: {scored} flights scored, {len(failures)} left out (see above)", err=True)
 
 
 def write_json(path: Path, content: dict[str, Any], force: bool) -> None:
-    """Numbers as JSON, whole or not at all; the folder is made where it is missing."""
+    """Write JSON, whole or not at all, and make its folder. Raises AirTouchError for a file that exists."""
     make_folder(path)
     write_bytes((json.dumps(content, indent=1, allow_nan=False) + "\n").encode(), path, force)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from airtouch.logs.flight_log import FlightLog
     from airtouch.simulation.flight import Diverged
 
-FLIGHTS_A_PROCESS = 10  #: no further process for fewer
+FLIGHTS_A_PROCESS = 10  #: least flights for each process
 
 
 def _list_effects(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -97,7 +97,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
                                   seed=seed,
                                   plugins=plugins)
     else:
-        # a process takes a second to start, a flight a tenth of one to fly and write
+        # starting a process takes 1 s, flying and writing a flight 0.1 s
         most = max(1, min(workers or batch.available_cores(), len(todo) // FLIGHTS_A_PROCESS))
         results = local.write(out, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
                               plugins=plugins, workers=most)

@@ -114,7 +114,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
 
 
 def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
-    """The logs that can be trained on with `spare` sensors missing, and how many could not."""
+    """The logs that can be trained on with at most `spare` sensors missing, and the number of the others."""
     found, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
@@ -126,7 +126,7 @@ def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
 
 def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: int,
               progress: Callable[[str, int, int, str], None]) -> tuple[list[FlightLog], dict[str, Any]]:
-    """Flights of the simulator, and what they are."""
+    """Simulated flights and their description for the model's metadata."""
     from airtouch.detector.evaluation import simulated
 
     return simulated.training_flights(count, scenario or simulated.SCENARIO, without=without, seed=seed,
@@ -149,7 +149,7 @@ def _report(metadata: dict, seconds: float) -> None:
 
 
 def _command() -> str:
-    """The command as typed, without the folder that `airtouch` lies in."""
+    """The command as typed, without the folder of the `airtouch` program."""
     return shlex.join(["airtouch", *sys.argv[1:]])
 
 

@@ -101,7 +101,7 @@ def _check_free(fit_file: Path, resume: bool, force: bool) -> None:
 
 
 def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
-    """What the report shows, as plain values."""
+    """The content of the report as plain values for JSON."""
     return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
             "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.lost,
             "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,

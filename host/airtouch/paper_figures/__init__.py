@@ -1,1 +1,1 @@
-"""Every table and figure of the paper's evaluation (section 7), made again: `airtouch paper`."""
+"""Every table and figure of the paper's evaluation (section 7), reproduced: `airtouch paper`."""

@@ -1,7 +1,7 @@
-"""What the paper says: each claim of its evaluation, with its place in the paper's source.
+"""The claims of the paper's evaluation, each with its place in the paper's source.
 
-Every number of `values` stands in `quote`, and every quote stands in the line of `airtouch.tex`, so that a
-transcription can be checked.
+Every number in `values` is in `quote`, and every quote is in its line of `airtouch.tex`. So the transcription can
+be checked.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ REPRODUCED, NOT_REPRODUCED, UNTESTABLE = "reproduced", "not reproduced", "cannot
 
 @dataclass(frozen=True)
 class Said:
-    """A claim: the figure it belongs to, what it says, line and words of the source, its numbers in SI units."""
+    """A claim: its figure, its content, line and quote of the source, and its numbers in SI units."""
 
     figure: str
     text: str
@@ -92,5 +92,5 @@ SAID = {
 
 
 def of(figure: str) -> dict[str, Said]:
-    """The claims of one figure, by name."""
+    """The claims of a figure: name -> claim."""
     return {name: said for name, said in SAID.items() if said.figure == figure}

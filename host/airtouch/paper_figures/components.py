@@ -1,4 +1,4 @@
-"""What the paper's choices are worth: its loss, its time resolution, its input size (Performance:1g, 1h and 1i)."""
+"""Ablations of the paper's choices: loss, time resolution and input size (Performance:1g, 1h and 1i)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID
 from airtouch.paper_figures.figure import Figure, Job
 
-FEW = 10  #: training flights where the paper says that its loss helps most
+FEW = 10  #: training flights in the small training set, with which the paper says that its loss helps most
 EPOCHS, QUICK_EPOCHS = 6, 1
 
 
 @dataclass(frozen=True)
 class Few(Variant):
-    """A variant that is trained on the first FEW of its training flights, drawn by seed."""
+    """A variant that is trained on FEW of its training flights, drawn by seed."""
 
     def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = EPOCHS) -> VariantModel:
         """As `Variant.fit`."""
@@ -29,7 +29,7 @@ class Few(Variant):
 
 
 UNFILTERED = Variant(physical_filter=False)
-#: name -> variant; names are those of `airtouch ablate` where it has them
+#: name -> variant, with the names of `airtouch ablate` for variants that it has
 LOSSES = {"with the loss": ("paper", Variant()), "without": ("no-df-loss", Variant(df_lambda=0.0)),
           f"with, {FEW} flights": (f"few-{FEW}", Few()), f"without, {FEW} flights": (f"few-{FEW}-no-df-loss",
                                                                                     Few(df_lambda=0.0))}
@@ -40,7 +40,7 @@ SIZES = {50: ("input-50", replace(UNFILTERED, rows=50)), 100: ("no-filter", UNFI
 
 
 def scores(job: Job, name: str, variant: Variant) -> tuple[list[FlightScore], list[dict[str, Any]]]:
-    """(scores, folds) of a variant."""
+    """Scores of a variant, one for each flight, and the entries of its folds."""
     return recorded.varied(job, name, variant, {"epochs": QUICK_EPOCHS if job.quick else EPOCHS})
 
 

@@ -1,4 +1,4 @@
-"""What is made of each figure: a table, a picture, a caption, and a verdict on each claim of the paper."""
+"""A reproduced figure: a table, a picture, a caption, and a verdict on each claim of the paper."""
 
 import csv
 import io
@@ -11,16 +11,16 @@ from airtouch.errors import AirTouchError
 
 
 class Missing(AirTouchError):
-    """What a figure needs is not there; the message says what, and how to get it."""
+    """Input of a figure is missing. The message names it, and says how to get it."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What figures are made from.
+    """The input and settings of a run.
 
-    flights: folder of recorded flights with a manifest, or None. work: folder in which finished folds and trained
-    networks are kept. quick: fewer flights, folds and training steps. power_log: INA219 log with a column of stages,
-    or None. tell: gets a line for each step.
+    flights: folder of recorded flights with a manifest, or None. work: folder for finished folds and trained
+    networks. quick: fewer flights, folds and training steps. power_log: INA219 log with a column of stages, or
+    None. tell: called with a line for each step.
     """
 
     flights: Path | None
@@ -32,7 +32,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Verdict:
-    """reproduced, not reproduced or cannot be tested here, and what was found: figures with n and interval."""
+    """A verdict (reproduced, not reproduced, cannot be tested here) and the figures behind it, with n and interval."""
 
     verdict: str
     found: str
@@ -40,9 +40,10 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure made again. rows: the table, one dict a row. draw: puts the picture on an empty matplotlib figure.
+    """A reproduced figure.
 
-    verdicts: claim of `claims.SAID` -> verdict; every claim of the figure has one.
+    rows: the table, one dict for each row. draw: draws the picture on an empty matplotlib figure.
+    verdicts: claim of `claims.SAID` -> verdict, for every claim of the figure.
     """
 
     title: str
@@ -53,7 +54,7 @@ class Figure:
 
 
 def table_csv(rows: Sequence[dict[str, Any]]) -> bytes:
-    """The rows as CSV, a column for each key, in the order in which keys first appear."""
+    """The rows as CSV, with a column for each key in order of first appearance."""
     names = list(dict.fromkeys(key for row in rows for key in row))
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n")

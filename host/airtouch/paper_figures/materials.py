@@ -25,7 +25,7 @@ CIRCULAR = ("no recorded flight crosses a material, and the simulator's material
 
 
 def pair_scores(job: Job) -> dict[tuple[str, str], list[FlightScore]]:
-    """(detector, scenario) -> scores, by detectors trained on other simulated flights over all four pairs."""
+    """(detector, scenario) -> scores of detectors trained on other simulated flights over all four pairs."""
     return _pair_scores(job.quick, job.tell)
 
 

@@ -8,12 +8,12 @@ from airtouch.paper_figures.figure import Figure, Job
 
 
 def errors_m(scores: list[FlightScore]) -> list[float]:
-    """Errors of the edges that were found, m, positive early, in the order of the flights."""
+    """Errors of the detected edges, m, positive early, in the order of the flights."""
     return [e.error_m for s in scores for e in s.edges if e.error_m is not None]
 
 
 def each_m(scores: list[FlightScore]) -> list[float | None]:
-    """The error of every true edge, m, None where it was missed."""
+    """Errors of all true edges, m, positive early; None for a missed edge."""
     return [e.error_m for s in scores for e in s.edges]
 
 

@@ -1,4 +1,4 @@
-"""The page: every figure, the paper's numbers beside ours, a verdict on each claim."""
+"""The page: every figure, the paper's numbers beside the reproduced ones, and a verdict on each claim."""
 
 import csv
 import io
@@ -18,7 +18,10 @@ CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNTESTABLE: "open"}
 
 
 def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
-    """`index.html` in the folder: self-contained but for the links to each figure's SVG and CSV."""
+    """Write `index.html` to the folder `out`. It is self-contained except for links to each figure's SVG and CSV.
+
+    records: name of a figure -> its record (`run.record`). Returns the file.
+    """
     verdicts = [(entry, claim) for entry in records.values() for claim in entry["claims"].values()]
     count = Counter(claim["verdict"] for _, claim in verdicts)
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
@@ -33,7 +36,7 @@ def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
 
 
 def cells(table: bytes) -> list[list[str]]:
-    """The cells of a CSV, the header first."""
+    """The cells of a CSV by row, the header first."""
     return list(csv.reader(io.StringIO(table.decode())))
 
 

@@ -10,7 +10,7 @@ from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.report.figures import COLOURS, MUTED, STYLE
 
-PAPER = "#444444"  #: what the paper says, in every plot
+PAPER = "#444444"  #: colour of the paper's figures in every plot
 WIDTH_IN, HEIGHT_IN = 6.4, 3.8
 
 
@@ -37,7 +37,7 @@ def colour(name: str) -> str:
 
 
 def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper_m: float) -> None:
-    """Errors edge by edge, positive early, None for a missed one; the band is the paper's mean absolute error."""
+    """Draw errors edge by edge, m, positive early, None for a missed edge; the band is the paper's mean error."""
     axes.axhspan(-paper_m, paper_m, color=PAPER, alpha=0.15, lw=0, label=f"paper: mean |error| {paper_m:.4g} m")
     for row, (name, values) in enumerate(errors.items()):
         edges = np.arange(1, len(values) + 1)
@@ -64,7 +64,7 @@ def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: M
 
 def curve(axes: Any, places: Sequence[float], rows: Sequence[Mapping[str, Any]], key: str, factor: float, colour: str,
           label: str | None = None) -> None:
-    """A summary's figure at each place with its 95 % interval; no point where nothing was found."""
+    """Draw a figure of summaries with its 95 % interval at each place; no point if no edge was detected."""
     axes.plot(places, [np.nan if r[key] is None else factor * r[key] for r in rows], "o-", ms=4, color=colour,
               label=label)
     for place, row in zip(places, rows, strict=True):
@@ -74,7 +74,7 @@ def curve(axes: Any, places: Sequence[float], rows: Sequence[Mapping[str, Any]],
 
 def bars(axes: Any, rows: Sequence[Mapping[str, Any]], value: str, low: str, high: str, label: str,
          colours: Sequence[str] | None = None, factor: float = 1.0) -> None:
-    """One bar a row with its 95 % interval."""
+    """Draw a bar with its 95 % interval for each row."""
     for i, row in enumerate(rows):
         if row[value] is None:
             axes.text(i, 0.0, "none found", ha="center", va="bottom", fontsize=7)
@@ -88,6 +88,6 @@ def bars(axes: Any, rows: Sequence[Mapping[str, Any]], value: str, low: str, hig
 
 
 def paper_stars(axes: Any, values: Mapping[int, float]) -> None:
-    """Stars at what the paper says, place on the axis -> value."""
+    """Draw stars at the paper's values, place on the axis -> value."""
     axes.plot(list(values), list(values.values()), "*", color="black", ms=9, ls="none", label="in the paper")
     axes.legend(fontsize=7, frameon=False, loc="upper left")

@@ -1,4 +1,4 @@
-"""Scores of detectors on recorded flights, cross-validated by flight, as `airtouch crossval` makes them."""
+"""Scores of detectors on recorded flights, cross-validated by flight as in `airtouch crossval`."""
 
 from functools import cache
 from pathlib import Path
@@ -10,12 +10,12 @@ from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, get
 from airtouch.paper_figures.figure import Job, Missing
 
-#: of a full run and of a quick one: a detector's training options
+#: detector -> training options of a full run and of a quick run
 FULL: dict[str, dict[str, Any]] = {"best": {}, "paper": {}, "baseline": {}}
 QUICK: dict[str, dict[str, Any]] = {"best": {"steps": 300}, "paper": {"epochs": 3}, "baseline": {}}
-QUICK_FOLD = 0  #: the one fold that a quick run holds out
-ABLATION_FOLDS = (0, 1)  #: held out one after another where the paper's choices are varied; the others are trained on
-AIR = ("neuralswarm/flights", "crazypad", "imrclab")  #: folders beside the flights in which nothing is an edge
+QUICK_FOLD = 0  #: the only fold that a quick run holds out
+ABLATION_FOLDS = (0, 1)  #: folds that ablations hold out in turn
+AIR = ("neuralswarm/flights", "crazypad", "imrclab")  #: folders, beside the flights, of flights without edges
 
 
 def files(job: Job) -> list[dataset.FlightFile]:
@@ -27,8 +27,10 @@ def files(job: Job) -> list[dataset.FlightFile]:
 
 @cache
 def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]]:
-    """(one score a flight, one entry a fold) of a detector that never saw the flight it is scored on; kept while the
-    program runs, since several figures are of the same scores."""
+    """Scores, one for each flight, and entries, one for each fold, of a detector by cross-validation over flights.
+
+    Results are cached while the program runs, because several figures show the same scores.
+    """
     found = files(job)
     options = (QUICK if job.quick else FULL)[name]
     air = free_air.read(_air(job.flights)) if job.flights and name == "best" and not job.quick else []
@@ -42,7 +44,7 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
 
 def varied(job: Job, name: str, detector: Detector | None, options: dict[str, Any],
            ) -> tuple[list[FlightScore], list[dict[str, Any]]]:
-    """The same for one of the paper's choices varied, over ABLATION_FOLDS (a quick run: QUICK_FOLD alone)."""
+    """As `scores`, of a variant of a detector, over ABLATION_FOLDS (in a quick run over QUICK_FOLD)."""
     found = files(job)
     every = folds.by_fold(found)
     wanted = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
@@ -54,7 +56,7 @@ def varied(job: Job, name: str, detector: Detector | None, options: dict[str, An
 
 
 def in_float(job: Job, name: str, entries: list[dict[str, Any]]) -> list[FlightScore]:
-    """The same folds and models as `varied` gave, with the float network as trained."""
+    """Scores of the float networks of a variant, on the folds and with the models of `varied`."""
     kept = {entry["fold"] for entry in entries}
     return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in kept], entries,
                              job.work / "folds")
@@ -65,7 +67,7 @@ def _air(flights: Path) -> list[Path]:
 
 
 def said(job: Job, flights: int, edges: int) -> str:
-    """How the recorded flights were split, for captions."""
+    """The sentence of a caption on the number of flights and edges and how they were split."""
     if job.quick:
         return (f"Recorded flights, {flights} of one fold ({edges} edges), by models of the other folds, briefly "
                 "trained (--quick).")

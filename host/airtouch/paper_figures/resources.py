@@ -1,4 +1,4 @@
-"""Table 2: operations, parameters, training time and memory of both ways."""
+"""Table 2: operations, parameters, training time and memory of AirTouch and of the camera."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ FLOPS_A_MAC = 2
 
 
 def resources(job: Job) -> Figure:
-    """The paper's network, `best` and a network with TEED's structure, counted from their shapes."""
+    """Table 2: the paper's network, `best` and a network with TEED's structure, counted from their shapes."""
     ours, stream = paper.load(None), best.load(None)
     count = sum(int(np.size(w)) for w in ours.weights.values())
     mac = multiplications(ours.int8)
@@ -79,7 +79,7 @@ def resources(job: Job) -> Figure:
 
 
 def _training(job: Job, rows: list[dict[str, Any]], vision_seconds: float) -> Verdict:
-    """What a fold of the paper's network took in this run, beside the vision network's training."""
+    """Verdict on training time: a fold of the paper's network in this run against the vision network."""
     text = f"vision network {vision_seconds / 60:.1f} min of processor time on rendered images"
     try:
         _, folds = recorded.scores(job, "paper")
@@ -94,7 +94,7 @@ def _training(job: Job, rows: list[dict[str, Any]], vision_seconds: float) -> Ve
 
 
 def _dense_multiplications(model: Any) -> int:
-    """Multiply-accumulates of the float network, no weight left out."""
+    """Multiply-accumulates of the float network without pruning."""
     total = 0
     for layer in model.float_layers:
         if layer.weights.size:

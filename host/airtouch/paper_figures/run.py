@@ -1,4 +1,4 @@
-"""Makes the figures one by one, keeps what is done, and goes on where a figure cannot be made."""
+"""Makes the figures one by one, skips finished ones, and continues when a figure cannot be made."""
 
 import hashlib
 import importlib
@@ -29,7 +29,10 @@ FIGURES = {
 
 
 def names(only: Sequence[str]) -> list[str]:
-    """The figures asked for, all where none is. Raises AirTouchError for an unknown one."""
+    """The chosen figures in the order of the page; all of them if `only` is empty.
+
+    Raises AirTouchError for an unknown name.
+    """
     for name in only:
         if name not in FIGURES:
             raise AirTouchError(f"no figure {name!r}{nearest(name, FIGURES)}; known: {', '.join(FIGURES)}")
@@ -38,11 +41,11 @@ def names(only: Sequence[str]) -> list[str]:
 
 def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, command: str = "airtouch paper",
         ) -> dict[str, dict[str, Any]]:
-    """Figures as NAME.png, .svg, .csv and .json in `out`, and index.html of all that are there; the records by name.
+    """Write figures as NAME.png, .svg, .csv and .json to `out`, and index.html of all figures there.
 
-    A figure that is there with the same settings is not made again. One that needs what is missing, or whose input is
-    bad, says so in its record ("missing") and the others are made. Raises AirTouchError, before any work, where `out`
-    holds a figure of other settings and `force` is not given.
+    Returns the records: name -> record. A figure with the same settings is not made again. A figure with missing or bad
+    input has the reason in its record ("missing"), and the others are made. Raises AirTouchError, before any work, if
+    `out` holds a figure with other settings, without `force`.
     """
     key = settings_key(job)
     old = {name: record(out, name) for name in chosen}
@@ -68,7 +71,7 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
 
 
 def make(name: str, job: Job, out: Path) -> dict[str, Any]:
-    """The record of one figure, whose picture and table are written."""
+    """Make one figure: write its picture and table to `out`, and return its record."""
     module, function = FIGURES[name]
     said: dict[str, dict[str, Any]] = {
         claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
@@ -93,12 +96,12 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
 
 
 def records(out: Path) -> dict[str, dict[str, Any]]:
-    """The records of all figures in a folder, in the order of the page."""
+    """Name -> record of all figures in a folder, in the order of the page."""
     return {name: entry for name in FIGURES if (entry := record(out, name))}
 
 
 def record(out: Path, name: str) -> dict[str, Any] | None:
-    """A figure's record, None where there is none, it is damaged or its files are gone."""
+    """The record of a figure in a folder; None if it is missing or damaged, or if its files are missing."""
     try:
         entry = json.loads((out / f"{name}.json").read_text())
         whole = "missing" in entry or all((out / f"{name}.{e}").exists() for e in ("png", "svg", "csv"))
@@ -108,7 +111,7 @@ def record(out: Path, name: str) -> dict[str, Any] | None:
 
 
 def settings_key(job: Job) -> str:
-    """Twelve hexadecimal digits that change with anything a figure depends on but its code."""
+    """Hash, of twelve hexadecimal digits, of everything that a figure depends on except the code."""
     total = hashlib.sha256(f"{__version__} {job.quick}".encode())
     for place in (job.flights, job.power_log):
         for path in sorted(place.iterdir()) if place is not None and place.is_dir() else [place]:

@@ -1,4 +1,4 @@
-"""From how far a drone feels the ground: mass and rotor size, curves measured and published (section 8.1)."""
+"""Sensing range against mass and rotor size, by measured and published ground-effect curves (section 8.1)."""
 
 import math
 from collections.abc import Callable
@@ -13,28 +13,37 @@ from airtouch.paper_figures.figure import Figure, Job
 from airtouch.simulation import effects
 from airtouch.simulation.effects.ground_effect import faded, thrust_ratio
 
-#: rms of the vertical force that thrust does not explain, share of the weight, recorded flights of the authors at
-#: 100 Hz (0.5 to 0.7 %); a larger drone is taken to know its thrust as well
+#: rms of the vertical force that thrust does not explain, as a fraction of the weight: 0.5 to 0.7 % in the authors'
+#: recorded flights at 100 Hz; a larger drone is assumed to know its thrust equally well
 NOISE = 0.006
-THRESHOLD = 0.01  #: share of the weight at which the small drone's range comes out as the paper's 12 cm or less
-IDEAL = 3.0 * NOISE / math.sqrt(100.0)  #: three sigma of the mean over one second, were the noise white
+THRESHOLD = 0.01  #: detectable lift as a fraction of the weight; gives the small drone the paper's 12 cm or less
+IDEAL = 3.0 * NOISE / math.sqrt(100.0)  #: three standard errors of a mean over one second, if the noise were white
 GRAVITY = 9.81
-HEIGHTS_M = np.geomspace(0.02, 6.0, 400)  #: of the rotor discs over the ground
+HEIGHTS_M = np.geomspace(0.02, 6.0, 400)  #: m, heights of the rotor discs over the ground
 SMALL = "crazyflie-34g"  #: preset of `ground_effect` fitted to neural-swarm's flights
 
 
 def cheeseman_bennett(height_m: np.ndarray, radius_m: float) -> np.ndarray:
-    """Gain of lift at the same power, share: 1 / (1 - (R / 4 h)^2) - 1. Source: Cheeseman, Bennett 1955, hover."""
+    """Relative gain of lift at constant power, 1 / (1 - (R / 4 h)^2) - 1, at heights h (n,), in m.
+
+    Source: Cheeseman, Bennett 1955, hover.
+    """
     return 1.0 / (1.0 - np.minimum((radius_m / (4.0 * height_m)) ** 2, 0.9)) - 1.0
 
 
 def sanchez_cuevas(height_m: np.ndarray, radius_m: float, spacing_m: float) -> np.ndarray:
-    """Gain of lift of a quadrotor, share. Source: Sanchez-Cuevas, Heredia, Ollero 2017, eq. 8, K_b = 2."""
+    """Relative gain of lift of a quadrotor at heights (n,), in m; spacing: between neighbouring rotors, m.
+
+    Source: Sanchez-Cuevas, Heredia, Ollero 2017, eq. 8, K_b = 2.
+    """
     return np.array([thrust_ratio(h, radius_m, spacing_m, 2.0) for h in np.atleast_1d(height_m)])
 
 
 def measured(height_m: np.ndarray, preset: str, scale: float = 1.0) -> np.ndarray:
-    """Gain of lift, share, of a curve fitted to recorded flights; scale: of all lengths against the drone flown."""
+    """Relative gain of lift at heights (n,), in m, of a curve fitted to recorded flights.
+
+    scale: ratio of all lengths to those of the drone that flew.
+    """
     values = effects.get("ground_effect").presets[preset]
     craft = vehicles.load("crazyflie-2.1")
     spacing = math.sqrt(2.0) * craft.arm_m
@@ -43,13 +52,13 @@ def measured(height_m: np.ndarray, preset: str, scale: float = 1.0) -> np.ndarra
 
 
 def reach(curve: Callable[[np.ndarray], np.ndarray], threshold: float = THRESHOLD) -> float:
-    """The greatest height, m, at which a curve of lift is at least the threshold; 0 where it never is."""
+    """The greatest height, m, at which a curve of lift is at least the threshold; 0 if it never is."""
     above = np.flatnonzero(curve(HEIGHTS_M) >= threshold)
     return float(HEIGHTS_M[above[-1]]) if len(above) else 0.0
 
 
 def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
-    """Lift against height of a quadrotor by each source, measured curves scaled with the rotor."""
+    """Source -> curve of lift against height of a quadrotor. Measured curves are scaled with the rotor's radius."""
     scale = radius_m / vehicles.load("crazyflie-2.1").rotor_radius_m
     return {"Cheeseman, Bennett": lambda h: cheeseman_bennett(h, radius_m),
             "Sanchez-Cuevas": lambda h: sanchez_cuevas(h, radius_m, math.sqrt(2.0) * arm_m),
@@ -57,7 +66,7 @@ def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np
 
 
 def sensing_range(job: Job) -> Figure:
-    """Heights at which the lift is THRESHOLD of the weight, and what is left of it at the paper's 3 m."""
+    """Section 8.1: heights at which the lift is THRESHOLD of the weight, and the lift at the paper's 3 m."""
     mass, span, propeller, claimed = SAID["range"].values
     small = vehicles.load("crazyflie-2.1-flow")
     craft = [("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
@@ -115,15 +124,15 @@ def sensing_range(job: Job) -> Figure:
 
 
 def averaging_s(lift: float, sigmas: float = 3.0, rate_hz: float = 100.0) -> float:
-    """Seconds of hover after which a lift (share) stands `sigmas` above white noise of the force."""
+    """Seconds of hover after which a lift, as a fraction of the weight, is `sigmas` standard errors of white noise."""
     return (sigmas * NOISE / lift) ** 2 / rate_hz if lift > 0.0 else math.inf
 
 
 def least(rows: list[dict]) -> float:
-    """The shortest range of some rows."""
+    """The shortest range of the rows."""
     return min(r["range_m"] for r in rows)
 
 
 def most(rows: list[dict]) -> float:
-    """The longest range of some rows."""
+    """The longest range of the rows."""
     return max(r["range_m"] for r in rows)

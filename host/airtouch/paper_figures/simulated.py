@@ -1,4 +1,4 @@
-"""Flights of the simulator and their scores, where no recorded flight has the paper's condition."""
+"""Simulated flights and their scores, for conditions of the paper without recorded flights."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -18,16 +18,16 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch, scenario
 from airtouch.simulation.flight import Diverged
 
-SEED = 9  #: of every batch of flights here; any other would do
-SPARE = 2  #: flights tried for each one wanted, at most
+SEED = 9  #: seed of every batch of flights here; arbitrary
+SPARE = 2  #: most flights simulated for each one returned; the rest diverged
 Effects = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]  #: name and parameters, hashable
 
 
 @cache
 def flown(name: str, count: int, effects: Effects = (), seed: int = SEED) -> tuple[FlightLog, ...]:
-    """The first `count` flights of a built-in scenario that end well; effects on top of the scenario's.
+    """The first `count` flights of a built-in scenario that do not diverge. effects: added to the scenario's.
 
-    Raises AirTouchError where too few do.
+    Raises AirTouchError if too many diverge.
     """
     chosen = [(effect, dict(values)) for effect, values in effects]
     kept: list[FlightLog] = []
@@ -40,7 +40,7 @@ def flown(name: str, count: int, effects: Effects = (), seed: int = SEED) -> tup
 
 
 def scores(flights: Sequence[FlightLog], detector: str, model: Any = None) -> list[FlightScore]:
-    """One score a flight, edges told by the log's down range; model None: the shipped one."""
+    """One score for each flight. True edges come from the down range. model: None for the shipped one."""
     chosen = registry.get(detector)
     model = chosen.load(None) if model is None else model
     return [evaluate.evaluate_flight(FlightFile(Path(log.source), condition(log)), log, chosen, model).score
@@ -48,16 +48,15 @@ def scores(flights: Sequence[FlightLog], detector: str, model: Any = None) -> li
 
 
 def condition(log: FlightLog) -> Condition:
-    """Speed and angle of a simulated flight."""
+    """The condition, speed and angle, of a simulated flight."""
     drawn = log.meta["condition"]
     return Condition(speed_mps=drawn["speed"], angle_deg=drawn.get("angle"))
 
 
 def crossings(log: FlightLog) -> list[Edge]:
-    """Edges by the drone's true place: the samples at which it passes the platform's front and back in x.
+    """True edges by the drone's true position: the samples at which it crosses the platform's front and back in x.
 
-    For platforms of the height of the floor, which the down range cannot tell. Tilted platforms count by where the
-    drone is, y included.
+    For platforms level with the floor, which the down range does not show. On a rotated platform y counts too.
     """
     plan = scenario.draw_flight(scenario.load(log.meta["scenario"]), log.meta["seed"], log.meta["flight"])
     over = inside(plan.world.corners[plan.world.first[0]:plan.world.first[1]], log["x_m"], log["y_m"])
@@ -66,14 +65,14 @@ def crossings(log: FlightLog) -> list[Edge]:
 
 
 def inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(n,) whether places lie in a convex polygon, corners (k, 2) anticlockwise."""
+    """True for positions inside a convex polygon, (n,) bool; corners (k, 2) anticlockwise."""
     ahead = np.roll(corners, -1, axis=0) - corners
     side = [ahead[i, 0] * (y - corners[i, 1]) - ahead[i, 1] * (x - corners[i, 0]) for i in range(len(corners))]
     return np.all(np.array(side) >= 0.0, axis=0)
 
 
 def labelled(log: FlightLog, edges: Callable[[FlightLog], list[Edge]] = crossings) -> FlightLog:
-    """The log with a down range that steps by 1 m at each edge: truth for training and scoring, never an input."""
+    """The log with a down range that steps by 1 m at each edge, as ground truth for training and scoring."""
     over = np.zeros(len(log), bool)
     for edge in edges(log):
         over[edge.sample:] = edge.kind == "entry"

@@ -17,7 +17,7 @@ FLOAT_BYTES = 4
 
 
 def sizes(job: Job) -> Figure:
-    """The paper's network in float and int8, with none and with the shipped share of the first dense layer zero."""
+    """Section 7.6: the paper's network in float and int8, unpruned and with the shipped sparsity of its dense layer."""
     model = paper.load(None)
     weights = sum(int(np.size(w)) for w in model.weights.values())
     times = _milliseconds(model)
@@ -69,7 +69,7 @@ def sizes(job: Job) -> Figure:
 
 
 def _milliseconds(model: Any) -> dict[str, float]:
-    """Milliseconds a window of the float and the int8 network through the C kernels here; least of three runs."""
+    """Milliseconds per window of the float and the int8 network in C on this computer; the least of three runs."""
     windows = np.random.default_rng(0).normal(size=(200, 100, 3)).astype(np.float32)
     found = {}
     for name, call in (("float", lambda: infer_float(model.float_layers, windows)),
@@ -84,7 +84,7 @@ def _milliseconds(model: Any) -> dict[str, float]:
 
 
 def _accuracies(job: Job, rows: list[dict[str, Any]]) -> str:
-    """Adds a row for each share of zeros, with the accuracies of float and int8 on flights held out; says them."""
+    """Add a row for each sparsity, with float and int8 accuracy on held-out flights. Returns them as text."""
     epochs = {"epochs": 3} if job.quick else {}
     said = []
     for zeros, options in ((0.0, {"sparsity": 0.0}), (SPARSITY, {})):

@@ -1,4 +1,4 @@
-"""Table 1: power of each stage, measured where there is a log of an INA219, estimated where not."""
+"""Table 1: power of each stage, measured if there is an INA219 log, otherwise estimated."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ def power(job: Job) -> Figure:
 
 
 def measured(log: Path) -> Figure:
-    """From a log with a column of stages. Raises AirTouchError for one that cannot be read."""
+    """Table 1 from a power log with a column of stages. Raises AirTouchError if it cannot be read."""
     try:
         trace = ina219.parse(log.read_text(encoding="utf-8", errors="replace"), str(log))
     except OSError as error:
@@ -37,7 +37,7 @@ def measured(log: Path) -> Figure:
 
 
 def estimated() -> Figure:
-    """From counted instructions. Raises Missing where the counts are not there."""
+    """Table 1 estimated from instruction counts. Raises Missing without the counts."""
     if not stages.BUDGETS.is_dir():
         raise Missing("the counted instructions are in a checkout alone (tests/emulation); clone the repository, or "
                       "measure and give --power-log")

@@ -16,14 +16,14 @@ from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.vision import teed, weights
 from airtouch.vision.camera import Camera
 
-SCENE = "paper-4cm"  #: 4 cm over the platform, straight on, as the paper's comparison
+SCENE = "paper-4cm"  #: scenario: 4 cm over the platform, straight on, as in the paper's comparison
 LUX, QUICK_LUX = (500.0, 100.0, 50.0, 20.0, 5.0), (100.0, 20.0)
-SIZE_LUX = 100.0  #: at which the smaller networks are run too
-FILMS, QUICK_FILMS = (4, 16), (2, 4)  #: flights whose thresholds are chosen, flights that are scored; the paper has 20
+SIZE_LUX = 100.0  #: lux at which the smaller networks run too
+FILMS, QUICK_FILMS = (4, 16), (2, 4)  #: flights to choose thresholds on, flights to score; the paper has 20
 SEED = 31
 FELT = ("best", "paper")
-BEST_ZEROS = (0.85, 0.0)  #: share of zeros in `best`, for its error against its size
-STEPS, QUICK_STEPS = 800, 100  #: of its training
+BEST_ZEROS = (0.85, 0.0)  #: sparsities of `best` in the plot of error against size
+STEPS, QUICK_STEPS = 800, 100  #: training steps of `best`
 COLOURS = {"classical": "#8a6d00", "teed": "#7a3e9d", "half": "#a678c4", "quarter": "#c9aedb", "eighth": "#e0d3ea",
            "fusion": "#1a7f37"}
 LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate move the error of a line's place. It "
@@ -111,7 +111,7 @@ def network_size(job: Job) -> Figure:
 
 
 def _airtouch_sizes(job: Job, table: list[dict[str, Any]]) -> Verdict:
-    """`best` with few and with all of its weights on recorded flights; adds a row for each."""
+    """Add a row for `best` at each sparsity, scored on recorded flights. Returns the verdict."""
     rows = {}
     try:
         for zeros in BEST_ZEROS:
@@ -128,7 +128,7 @@ def _airtouch_sizes(job: Job, table: list[dict[str, Any]]) -> Verdict:
 
 
 def fusion(job: Job) -> Figure:
-    """Camera and AirTouch joined: the timed F1 of each and of both at every light."""
+    """Late fusion of camera and AirTouch: the timed F1 of each and of both at every illuminance."""
     films, seen, felt = _everything(job)
     table, scores = [], {}
     for lux in _lux(job):
@@ -165,9 +165,9 @@ def fusion(job: Job) -> Figure:
 
 
 def _loss(films: Sequence[Any], found: dict[str, Any], draws: int = 2000) -> tuple[float, float, float]:
-    """(how far the timed F1 of both is below the better sense's, its 95 % interval), bootstrap by flight.
+    """Timed F1 of the better sense less that of the fusion, and its 95 % interval by bootstrap over flights.
 
-    Credits and counts of the timed F1 add up over flights, so that a draw is a sum.
+    The terms of the timed F1 are additive over flights, so each bootstrap draw is a sum.
     """
     counts = {n: np.array([len(f.edges) + len(d) for f, d in zip(films, some, strict=True)])
               for n, some in found.items()}
@@ -185,7 +185,10 @@ def _loss(films: Sequence[Any], found: dict[str, Any], draws: int = 2000) -> tup
 
 
 def _everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dict[str, list]]:
-    """(films that are scored, (way, lux) -> crossings of each, detector -> crossings of each); kept in `work`."""
+    """The films to score, (method, lux) -> crossings of each film, and detector -> crossings of each.
+
+    Results are stored in the work folder.
+    """
     lacking = extras.lacking("vision")
     if lacking:
         raise Missing(f"the camera needs {', '.join(lacking)}: pip install 'airtouch[vision]'")
@@ -210,9 +213,9 @@ def _everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dic
 
 
 def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name: str) -> dict[str, list]:
-    """The crossings of each way to an edge map at one light, from the work folder where they were found before.
+    """Method -> crossings of each film at one illuminance, from the work folder if they are there.
 
-    Each way has a threshold for each light, since a camera knows its exposure.
+    Each method has a threshold for each illuminance, because a camera knows its exposure.
     """
     from airtouch.detector.trace import Detection
     from airtouch.vision import compare, lines
@@ -233,14 +236,14 @@ def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name
 
 
 def _airtouch(axes: Any, ours: dict[str, dict[str, Any]], key: str, factor: float) -> None:
-    """A level line for each of AirTouch's detectors, which see no light."""
+    """Draw a horizontal line for each of AirTouch's detectors, which do not depend on light."""
     for name, row in ours.items():
         if row[key] is not None:
             axes.axhline(factor * row[key], color=pictures.colour(name), lw=1.2, label=f"AirTouch, {name}")
 
 
 def _labelled(canvas: Any, left: Any, right: Any) -> None:
-    """Names of two axes, errors and misses, and one legend below them."""
+    """Label the axes of errors and of misses, and draw one legend below them."""
     left.set_ylabel("mean error of edges found, m")
     right.set_ylabel("missed edges, %")
     canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
@@ -261,7 +264,7 @@ def _count(job: Job) -> tuple[int, int]:
 
 
 def _crossing(rows: dict[tuple[str, float], dict[str, Any]], ours: dict[str, Any], lux: Sequence[float]) -> str:
-    """Between which lights the camera's mean error passes AirTouch's, in words."""
+    """The illuminances between which the mean errors of camera and AirTouch cross, in words."""
     errors = [(v, rows["teed", v]["mean_abs_error_m"]) for v in lux if rows["teed", v]["mean_abs_error_m"] is not None]
     crossed = [f"between {a:g} and {b:g} lux" for (a, x), (b, y) in zip(errors, errors[1:], strict=False)
                if (x < ours["mean_abs_error_m"]) != (y < ours["mean_abs_error_m"])]

@@ -1,4 +1,4 @@
-"""Figures in words: values with intervals, and the rules by which a claim counts as reproduced."""
+"""Values with intervals as text, and the rules by which a claim counts as reproduced."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED
 from airtouch.paper_figures.figure import Verdict
 
-MOST_MISSED = 0.10  #: share of missed edges above which a mean error over the others says little
+MOST_MISSED = 0.10  #: fraction of missed edges above which the mean error of the others is not compared
 
 
 def metres(row: Mapping[str, Any]) -> str:
@@ -18,7 +18,7 @@ def metres(row: Mapping[str, Any]) -> str:
 
 
 def percent(value: float | None, interval: tuple[float, float] | list[float] | None = None) -> str:
-    """`2.9 % [0, 6.9]` of shares."""
+    """A fraction with its interval as `2.9 % [0, 6.9]`."""
     if value is None:
         return "-"
     said = f"{100 * value:.1f} %"
@@ -38,7 +38,7 @@ def score(row: Mapping[str, Any]) -> str:
 
 
 def reaches(row: Mapping[str, Any], error_m: float) -> bool:
-    """Whether the 95 % interval of the mean error reaches down to the paper's, at MOST_MISSED missed at most."""
+    """True if the 95 % interval of the mean error reaches the paper's error, with MOST_MISSED missed at most."""
     interval = row["intervals"]["mean_abs_error_m"]
     value = row["mean_abs_error_m"]
     if value is None or row["missed"] > MOST_MISSED:
@@ -47,18 +47,18 @@ def reaches(row: Mapping[str, Any], error_m: float) -> bool:
 
 
 def worse(first: dict, second: dict) -> bool:
-    """Whether the second has a greater error or more misses than the first, beyond the 95 % intervals of both."""
+    """True if the second has a larger error or more misses than the first, with disjoint 95 % intervals."""
     return any(a is not None and b is not None and b[0] > a[1]
                for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
 
 
 def judged(yes: bool, found: str) -> Verdict:
-    """A verdict of two."""
+    """The verdict "reproduced" or "not reproduced", with the figures behind it."""
     return Verdict(REPRODUCED if yes else NOT_REPRODUCED, found)
 
 
 def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:
-    """The columns that every table of scores has."""
+    """A row of a table of scores: the common columns, and `more`."""
     def pair(key: str) -> tuple[float | None, float | None]:
         return tuple(row["intervals"][key] or (None, None))
 
