@@ -1,0 +1,52 @@
+"""Values and times that cannot be, against a search through every stretch of time and hand-made logs."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.readings import LARGEST, checked
+
+
+def log(**columns):
+    meta = {"warnings": [], **columns.pop("meta", {})}
+    return FlightLog({name: np.asarray(values, float) for name, values in columns.items()}, meta)
+
+
+def most_together(times):
+    """How many times at most lie in one stretch of n times 5 s, by trying each as its beginning."""
+    return max(int(((times >= t) & (times <= t + 5.0 * len(times))).sum()) for t in times)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.sampled_from([0.0, 0.01, 0.5, 7.0, 31.0, 90.0, 400.0, 5000.0, -60.0]), min_size=2, max_size=9))
+def test_the_times_that_stay_are_the_most_that_fit_together(times):
+    times = np.array(times)
+    most = most_together(times)
+    try:
+        kept = checked(log(t_s=times, gyro_x_radps=times))["t_s"]
+    except AirTouchError as error:
+        assert "times cannot be" in str(error)
+        return
+    stay = kept[np.isfinite(kept)]
+    assert len(stay) == most and 2 * most >= len(times)
+    assert np.ptp(stay) <= 5.0 * len(times) and set(stay) <= set(times)
+
+
+def test_values_beyond_float32_are_missing_and_counted():
+    found = checked(log(m1_pwm=[1.0, 2.0 * LARGEST, -np.inf, LARGEST, np.nan]))
+    np.testing.assert_array_equal(found["m1_pwm"], [1.0, np.nan, np.nan, LARGEST, np.nan])
+    assert "2 of 5 values" in found.meta["warnings"][0] and "sample 1" in found.meta["warnings"][0]
+
+
+def test_a_clock_that_is_not_in_seconds_is_refused():
+    with pytest.raises(AirTouchError, match="10 s from sample to sample"):
+        checked(log(t_s=np.arange(0.0, 5000.0, 10.0)))
+
+
+def test_metadata_that_cannot_be_is_left_out():
+    found = checked(log(t_s=[0.0, 0.01], meta={"sample_period_s": True, "acc_frame": "moon"}))
+    assert "sample_period_s" not in found.meta and found.meta["acc_frame"] == "body"
+    assert len(found.meta["warnings"]) == 2
