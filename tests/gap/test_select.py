@@ -5,54 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap import calibrate, judging
+from airtouch.gap import judging
 from airtouch.gap.candidates import every
 from airtouch.gap.clock import clock_gain
 from airtouch.gap.data import Data
-from airtouch.gap.fit import fit, judge
 from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.nominal_scatter import Scatter
-from airtouch.gap.select import MOST_EFFECTS, seconds, select
+from airtouch.gap.select import MOST_EFFECTS, seconds
 from airtouch.gap.spectra import AIR
-from gap_flights import VEHICLE, flight, noise
-
-ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and goes
-LOUDNESS = np.sqrt(2.0)  #: the floor of a study without flights is twice the declared power
-DOWN = 0.5  #: m/s^2, pushed where a test pushes
-FLOOR = calibrate.declared(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise
-
-
-def made(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
-    """A hover with white noise `louder` times as strong as the floor has it, and a steady force, m/s^2."""
-    declared = calibrate.sensor_noise(VEHICLE)
-    acc, gyro = LOUDNESS * louder * declared[:3], LOUDNESS * louder * declared[3:6]
-    return flight(length_s, noise(length_s, 1.0, seed) * acc + np.array(force),
-                  noise(length_s, 1.0, seed + 500) * gyro, **options)
-
-
-def chosen(names):
-    return {n: v for n, v in every().items() if n in names}
-
-
-def found(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: None):
-    data = Data(study, flights, slow=True)
-    return select(data, chosen(names), progress, without), data
-
-
-def scattered(**rms):
-    return replace(FLOOR, scatter=Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0)))
-
-
-def own_gain(data, terms, first=None):
-    """Held-out log likelihood of effects by the definition: fitted on one half, judged on the other, both ways."""
-    total = 0.0
-    for train, test in ((0, 1), (1, 0)):
-        parts = judging.halves(data)
-        start = None if first is None else first[train]
-        fitted = fit(data, parts[train], terms, start).terms
-        random = any(t.kind == "spectrum" for t in fitted)
-        total += judge(data, parts[test], fitted) - judge(data, parts[test], (), random)
-    return total
+from gap_flights import VEHICLE
+from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, chosen, found, made, own_gain, scattered
 
 
 @pytest.fixture(scope="module")

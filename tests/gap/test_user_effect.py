@@ -10,6 +10,7 @@ from airtouch.gap import measure
 from airtouch.gap.diagnose import brief, diagnose
 from airtouch.simulation import batch, effects
 from airtouch.vehicle import load
+from hovers import STIFF
 
 PAGE = Path(__file__).parents[2] / "host/docs/effects.md"
 FORCE_N = 0.02
@@ -48,19 +49,6 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     unknown, nearest, *_ = left_out.ranking
     assert left_out.verdict == unknown.name == "unknown" and unknown.shrink.value == 0.0  # as nothing is named
     assert re.match(r"a model without names gains \d+ nats beside it, up to \d+ may be left", nearest.why)
-
-
-STIFF = '''"""A height loop tuned otherwise: nothing of it is in what the logged commands lead to expect."""
-from airtouch.simulation.effects import Effect, Parameter
-
-
-def settings(plant, v):
-    plant["height_gain"] *= v["factor"]
-
-
-FACTOR = Parameter("factor", "1", 1.5, 0.2, 5.0, 1.0, "of the gain")
-EFFECT = Effect("stiff_climb", "gain of the height loop", (FACTOR,), settings=settings)
-'''
 
 
 def test_a_users_effect_that_only_the_commands_show_is_fitted(tmp_path):
