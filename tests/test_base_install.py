@@ -1,13 +1,16 @@
 """The base install detects, diagnoses and simulates: nothing on those paths asks for an extra."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+import airtouch
 import short_flights
 from airtouch import logs
 from airtouch.errors import AirTouchError
@@ -106,3 +109,20 @@ def test_an_extra_that_is_missing_is_named(monkeypatch):
     with pytest.raises(AirTouchError,
                        match=r"flying needs no_such_module_of_this_name: pip install 'airtouch\[none\]'"):
         need("none", "flying")
+
+
+def test_base_install_takes_less_than_400_mb():
+    """Files of the package and of all that it requires without an extra, byte code aside."""
+    names, todo = set(), ["airtouch"]
+    while todo:
+        name = todo.pop().lower().replace("_", "-")
+        if name in names:
+            continue
+        names.add(name)
+        todo += [re.match(r"[\w.-]+", line).group() for line in metadata.requires(name) or ()
+                 if "extra ==" not in line and "python_version <" not in line]
+    assert {"numpy", "scipy", "numba", "llvmlite"} <= names and not names & {"tensorflow-cpu", "matplotlib", "pandas"}
+    files = [Path(str(file.locate())) for name in names - {"airtouch"} for file in metadata.files(name)]
+    files += [f for f in Path(airtouch.__file__).parent.rglob("*") if f.is_file()]
+    size = sum(f.stat().st_size for f in files if f.exists() and f.suffix not in (".pyc", ".nbc", ".nbi"))
+    assert 200e6 < size < 400 * 2**20, f"{size / 2**20:.0f} MB of {sorted(names)}"
