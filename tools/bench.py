@@ -6,7 +6,8 @@ Every pair is timed in turn (A B A B ...), after one warm-up; the ratio is the m
 import argparse
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -76,14 +77,18 @@ def bench_band_power(table: Table, some: list[FlightLog]) -> None:
         "scipy.signal.ShortTimeFFT", f"n = {len(some)} flights")
 
 
+def _each(act: Callable[..., object], inputs: Iterable, *further: object) -> None:
+    for x in inputs:
+        act(x, *further)
+
+
 def bench_pipelines(table: Table, some: list[FlightLog]) -> None:
     """Whole detectors against real time."""
     flown = sum(len(log) for log in some) / 100
     for name, detector in (("paper", paper), ("best", best)):
         model = detector.load(None)
         detector.run(some[0], model)
-        spent = statistics.median(seconds(lambda run=detector.run, model=model: [run(log, model) for log in some])
-                                  for _ in range(3))
+        spent = statistics.median(seconds(partial(_each, detector.run, some, model)) for _ in range(3))
         table.add_row(f"{name} detector, a flight", f"{1e3 * spent / len(some):.2f} ms", "", f"{flown / spent:.0f}x",
                       "real time", f"n = {len(some)} flights, {flown:.0f} s")
 
@@ -115,7 +120,7 @@ def row_of_peers(table: Table, name: str, ours: Callable[[], object], tflite: by
     for peer, invoke in (("tflite-micro", micro(tflite)), ("LiteRT", litert(tflite))):
         if invoke is None:
             continue
-        a, b, ratio = compare(ours, lambda invoke=invoke: [invoke(x[None]) for x in q])
+        a, b, ratio = compare(ours, partial(_each, invoke, [x[None] for x in q]))
         row(table, name, a / computed, b / len(q), ratio * computed / len(q), peer, f"n = {computed} and {len(q)}")
 
 
@@ -154,7 +159,7 @@ def litert(content: bytes) -> Callable | None:
 def bench_training(table: Table, some: list[FlightLog]) -> None:
     """Training of the shipped models' size, once."""
     for name, detector in (("paper", paper), ("best", best)):
-        spent = seconds(lambda detector=detector: detector.fit(some, seed=0))
+        spent = seconds(partial(detector.fit, some, seed=0))
         table.add_row(f"training {name}", f"{spent:.0f} s", "", "", "", f"n = {len(some)} flights")
 
 

@@ -89,29 +89,31 @@ def main() -> None:
     parser.add_argument("--json", help="write the figures here")
     parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")
     options = parser.parse_args()
-    rounds = []
+    own, other, rotorpy, crazyflow = [], [], [], []
     for _ in range(ROUNDS):
-        ours = measure(options.flights, options.workers)
-        bare = measure(options.flights, options.workers, on=False)
-        rounds.append((ours, bare, rotorpy_rate(), crazyflow_rates(options.crazyflow)))
-    figures = {**rounds[-1][0], "first_flight_s": rounds[0][0]["first_flight_s"]}
+        own.append(measure(options.flights, options.workers))
+        other.append(measure(options.flights, options.workers, on=False))
+        rotorpy.append(rotorpy_rate())
+        crazyflow.append(crazyflow_rates(options.crazyflow))
+    figures = {**own[-1], "first_flight_s": own[0]["first_flight_s"]}
     for k, unit in enumerate(("wall_s", "cpu_s")):
         rate = f"simulated_s_per_{unit}"
-        figures[rate] = statistics.median(r[0][rate] for r in rounds)
-        figures[f"no_effects_s_per_{unit}"] = statistics.median(r[1][rate] for r in rounds)
-        for name in rounds[0][3]:
-            figures[f"crazyflow_{name}_s_per_{unit}"] = statistics.median(r[3][name][k] for r in rounds)
-            for label, i in (("", 0), ("no_effects_", 1)):
-                figures[f"{label}times_crazyflow_{name}_{unit}"] = round(
-                    statistics.median(r[i][rate] / r[3][name][k] for r in rounds), 2)
-    if rounds[0][2] is not None:
-        figures["rotorpy_s_per_wall_s"] = round(statistics.median(r[2] for r in rounds), 2)
+        figures[rate] = statistics.median(r[rate] for r in own)
+        figures[f"no_effects_s_per_{unit}"] = statistics.median(r[rate] for r in other)
+        for name in crazyflow[0]:
+            figures[f"crazyflow_{name}_s_per_{unit}"] = statistics.median(r[name][k] for r in crazyflow)
+            for label, ours in (("", own), ("no_effects_", other)):
+                figures[f"{label}times_crazyflow_{name}_{unit}"] = round(statistics.median(
+                    r[rate] / c[name][k] for r, c in zip(ours, crazyflow, strict=True)), 2)
+    peers = [rate for rate in rotorpy if rate is not None]
+    if peers:
+        figures["rotorpy_s_per_wall_s"] = round(statistics.median(peers), 2)
         figures["times_rotorpy"] = round(statistics.median(
-            r[0]["simulated_s_per_wall_s"] / r[2] for r in rounds))
+            r["simulated_s_per_wall_s"] / peer for r, peer in zip(own, peers, strict=True)))
     print("\n".join(f"{key}: {value}" for key, value in figures.items()))
-    if rounds[0][2] is None:
+    if not peers:
         print("RotorPy is not installed (extra 'bench'), so it is not compared")
-    if not rounds[0][3]:
+    if not crazyflow[0]:
         print("crazyflow is not installed, so it is not compared: python -m venv crazyflow && "
               "crazyflow/bin/pip install crazyflow==0.4.0, then --crazyflow crazyflow/bin/python")
     if options.json:

@@ -16,7 +16,7 @@ from rich.progress import track
 
 from airtouch import kernels, logs
 from airtouch.cli import scores as show_scores
-from airtouch.cli.flights import find_flights
+from airtouch.cli.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.best.recipe import STRIDE
 from airtouch.detector.evaluation import dataset, evaluate
@@ -123,7 +123,7 @@ def main() -> None:
                         help="decode the flights without this sensor")
     parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/sensor_figures.py")
     options = parser.parse_args()
-    flights = [flight for out in options.out for flight in flights_of(find_flights(), out, tuple(options.silence))]
+    flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
     tried = candidates(options.count, np.random.default_rng(0), options.hold)
     found = [outcomes(flights, config) for config in track(tried, "settings")]
     show("as shipped", flights, outcomes(flights, best.DECODER))

@@ -56,7 +56,8 @@ def steps_before_exits(flown: Flown) -> np.ndarray:
     for course, x in flown:
         both = near_range.around(course, x)
         if len(both) == 2:
-            height, _, down, _ = (values[-27:] for values in both[1])
+            height, _, down, _ = both[1]
+            height, down = height[-27:], down[-27:]
             out.append((100.0 * np.median(down), 100.0 * np.median(height - down)))
     return np.array(out)
 

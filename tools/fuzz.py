@@ -193,8 +193,9 @@ def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None 
     log.parent.mkdir(parents=True, exist_ok=True)
     held = corpus(name, folder)
     known = sum(1 for _ in held.iterdir())
-    command = [program, f"-runs={runs + known}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
-               "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", held]
+    command: list[str | Path] = [
+        program, f"-runs={runs + known}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
+        "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", held]
     used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     with log.open("w") as to:
         done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | OPTIONS)
@@ -266,8 +267,8 @@ def keep(name: str, program: Path) -> tuple[int, int]:
 def cover(names: list[str]) -> None:
     """Prints the share of lines of each source that the corpora reach, and the functions that none does."""
     made_by = engine("libfuzzer")
-    tools = [shutil.which(name) for name in ("llvm-profdata", "llvm-cov")]
-    if made_by is None or None in tools:
+    profiler, reporter = (shutil.which(name) for name in ("llvm-profdata", "llvm-cov"))
+    if made_by is None or profiler is None or reporter is None:
         raise SystemExit("coverage needs clang with libFuzzer, llvm-profdata and llvm-cov: apt-get install clang llvm")
     folder = BUILD / "coverage"
     programs = build(names, made_by, folder=folder, flags=("-fprofile-instr-generate", "-fcoverage-mapping"))
@@ -276,9 +277,9 @@ def cover(names: list[str]) -> None:
                        check=True, capture_output=True,
                        env=os.environ | {"LLVM_PROFILE_FILE": str(folder / f"{name}.raw")})
     merged = folder / "all.profile"
-    subprocess.run([tools[0], "merge", *folder.glob("*.raw"), "-o", merged], check=True)
+    subprocess.run([profiler, "merge", *folder.glob("*.raw"), "-o", merged], check=True)
     objects = [word for name in names for word in ("-object", programs[name])]
-    subprocess.run([tools[1], "report", f"-instr-profile={merged}", *objects[1:], *product_sources()], check=True)
+    subprocess.run([reporter, "report", f"-instr-profile={merged}", *objects[1:], *product_sources()], check=True)
 
 
 def main() -> None:

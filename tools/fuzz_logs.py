@@ -63,7 +63,9 @@ _FILES: dict[str, list[bytes]] = {}
 
 def files_of(name: str) -> list[bytes]:
     """The sound files of one format, made once."""
-    return _FILES.setdefault(name, []) or _FILES[name].extend(sound.files(name)) or _FILES[name]
+    if name not in _FILES:
+        _FILES[name] = list(sound.files(name))
+    return _FILES[name]
 
 
 def one(name: str, seed: int, number: int, folder: Path, every: int = COMMAND_EVERY) -> tuple[str, float, float]:
@@ -135,8 +137,11 @@ def shapes(length: int, folder: Path) -> int:
     print("shape                 bytes        s      MB  outcome")
     for name, make in hostile.HOSTILE.items():
         data = make(length)
-        outcome, seconds, mb = measured(lambda path, data=data: walk.walk(data, str(path), Random(0)), folder / "shape",
-                                        len(data))
+
+        def act(path: Path, data: bytes = data) -> str:
+            return walk.walk(data, str(path), Random(0))
+
+        outcome, seconds, mb = measured(act, folder / "shape", len(data))
         print(f"{name:16}{len(data):11}{seconds:9.2f}{mb:8.0f}  {outcome}", flush=True)
     return 0
 

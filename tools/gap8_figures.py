@@ -99,7 +99,7 @@ def cost(row: Row, model: Any) -> dict[str, Any]:
 
 def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any], Any]:
     """Figures over the folds, int8 and float, and the first fold's model."""
-    detector = registry.get(row.detector)
+    detector: Any = registry.get(row.detector)  # which has run_float as well
 
     def tell(line: str) -> None:
         click.echo(f"{row.name}: {line}", err=True)

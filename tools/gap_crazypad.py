@@ -16,6 +16,7 @@ import re
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import spearmanr
@@ -30,7 +31,7 @@ FAMILIES = ("normal", "rotor damage", "added weight", "slung load")
 FAMILY_OF = {"weak_motor": "rotor damage", "mass": "added weight", "com_offset": "added weight",
              "slung_load": "slung load"}
 RESAMPLES = 2000
-SAME = ((0.4, 0.35), (0.3, 0.5))  #: unsteadiness and heave that do not tell defects apart
+SAME: Any = ((0.4, 0.35), (0.3, 0.5))  #: unsteadiness and heave that do not tell defects apart
 GRID = [hover_balance.Beliefs(own=own, worked_on=(0.012, 0.012, 0.012, yaw), hung=hung, **manner)
         for own, yaw, hung, manner in itertools.product(
             (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),

@@ -23,6 +23,8 @@ def main(folder: Path) -> None:
     nominal = batch.flights(SCENARIO, 4, seed=NOMINAL_SEED, workers=1)
     real = batch.flights(SCENARIO, 1, effects=list(EFFECT.items()), seed=REAL_SEED, workers=1)
     for name, log in [*((f"nominal_{i}", log) for i, log in enumerate(nominal)), *(("real", log) for log in real)]:
+        if not isinstance(log, logs.FlightLog):
+            raise SystemExit(f"{name}: {log}")
         kept = {k: v for k, v in log.columns.items() if not k.startswith(DROPPED)}
         about = {"vehicle": log.meta["vehicle"], "acc_frame": log.meta["acc_frame"],
                  "made_by": "python tools/gap_example.py"}

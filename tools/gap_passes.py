@@ -19,7 +19,8 @@ SHORTEST_FREE, SHORTEST_OVER = 400, 100  #: samples
 
 def _edges(log: FlightLog) -> tuple[int, int]:
     """Samples of the first entry and its exit; zeros where there are none."""
-    return tuple([*(e.sample for e in logs.true_edges(log)), 0, 0][:2])
+    first, last, *_ = [*(e.sample for e in logs.true_edges(log)), 0, 0]
+    return first, last
 
 
 def pieces(log: FlightLog) -> tuple[FlightLog, FlightLog] | None:

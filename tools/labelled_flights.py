@@ -66,10 +66,14 @@ def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
     flights: dict[str, list[FlightScore]] = {}
     for score in scores:
         flights.setdefault(score.file, []).append(score)
-    return [FlightScore(name, some[0].condition, sum((s.edges for s in some), ()), sum((s.false for s in some), ()),
-                        sum(s.detections for s in some), sum(s.airborne_s for s in some),
-                        tuple(int(n) for n in np.sum([s.windows for s in some], axis=0)),
-                        np.sum([s.bins for s in some], axis=0)) for name, some in flights.items()]
+    return [_merged(name, some) for name, some in flights.items()]
+
+
+def _merged(name: str, some: Sequence[FlightScore]) -> FlightScore:
+    a, b, c, d = (sum(s.windows[i] for s in some) for i in range(4))
+    return FlightScore(name, some[0].condition, tuple(e for s in some for e in s.edges),
+                       tuple(e for s in some for e in s.false or ()), sum(s.detections for s in some),
+                       sum(s.airborne_s for s in some), (a, b, c, d), np.sum([s.bins for s in some], axis=0))
 
 
 def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
@@ -113,8 +117,10 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
         return [FlightScore.from_dict(entry) for entry in json.loads(kept.read_text())]
     some = drawn(pool, count, draw)
     if row == "start":
+        if start is None:
+            raise AirTouchError("no model to start from: give --start")
         model = start
-    elif flown and row == "labelled":
+    elif start is not None and flown and row == "labelled":
         model = adapt.together(start if options.beside else None, start, some, flown, seed, None, COMMAND)
     else:
         model = best.fit([f.log for f in some], seed=seed, start=start if row == "labelled" else None, steps=steps,

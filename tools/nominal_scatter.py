@@ -18,6 +18,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -62,8 +63,13 @@ def groups(folder: Path) -> Iterator[Group]:
     flown = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
         logs = blind.nominal(flown, blind.CAL_FIRST, blind.CAL, seed)
-        named = [(f"simulated {seed} {i}", lambda log=log: log) for i, log in enumerate(logs)]
+        named: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log)) for i, log in enumerate(logs)]
         yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, named
+
+
+def nothing_done(log: FlightLog) -> FlightLog:
+    """A log that is here already."""
+    return log
 
 
 def _read(path: Path) -> Log:
@@ -156,8 +162,8 @@ def main() -> None:
         flown_by[of] = flown.name
         for others in (False, True):
             for row in (done[key] for name, _ in files if (key := _name(name, others)) in done):
-                parts = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
-                cases[of].append(Apparent(*parts, row["rate"], row["passing_rates"]))
+                strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
+                cases[of].append(Apparent(strengths, errors, row["rate"], row["passing_rates"]))
                 if not others:
                     alike[of].append(cases[of][-1])
     classes = {of: replace(measured(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from airtouch import logs
-from airtouch.cli.flights import find_flights
+from airtouch.cli.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.evaluation import dataset
@@ -33,7 +33,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, default=Path("out/best.json"), help="what crossval wrote")
     parser.add_argument("--out", type=Path, default=Path("host/docs/img"), help="folder")
     options = parser.parse_args()
-    folder = find_flights()
+    folder = need_flights()
     file = next(f for f in dataset.collect([folder]) if f.path.name == options.flight)
     path = next(iter(sorted(options.models.glob(f"best_fold{file.condition.fold}_*.npz"))))
     write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out / "flight.png", force=True)
@@ -66,8 +66,8 @@ def draw(log, model, name: str) -> bytes:
         axes[2].set(xlabel="time, s", ylabel="m", xlim=(first, last))
         axes[2].set_title("down range: the truth, never an input", loc="left")
         for ax in axes:
-            for edge in truth:
-                ax.axvline(edge.sample * 0.01, color=TRUE, ls="--", lw=1)
+            for crossed in truth:
+                ax.axvline(crossed.sample * 0.01, color=TRUE, ls="--", lw=1)
         return png(figure)
 
 

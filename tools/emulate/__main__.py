@@ -29,8 +29,9 @@ from tools.emulate.replay import VEHICLES, Replay, replay
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
 CLONE = "git clone --recursive --branch 2026.08 https://github.com/bitcraze/crazyflie-firmware ~/crazyflie-firmware"
 #: step -> parameters: three that are taken over, one out of range, the other detector and back
-CHANGES = {100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0},
-           300: {"detector": 1, "scoreIn": 2.3}}
+CHANGES: dict[int, dict[str, float]] = {
+    100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0},
+    300: {"detector": 1, "scoreIn": 2.3}}
 
 
 def recorded(count: int) -> list[FlightLog]:
@@ -94,7 +95,7 @@ def main(arguments: list[str]) -> int:
     logs = [read(path) for path in given.flights] or recorded(2)
     different = 0
     for i, log in enumerate(logs):
-        changes = CHANGES if i == len(logs) - 1 else {}
+        changes: dict[int, dict[str, float]] = CHANGES if i == len(logs) - 1 else {}
         begun = time.monotonic()
         found = replay(elf, later(log, given.begin), given.steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes

@@ -87,14 +87,14 @@ def main() -> None:
     source = unpack(parser.parse_args().sdist)
     flight = made_flight()
     print(f"{'compiler':18}{'one FFT':>9}{'nine':>10}{'the step':>10}{'ratio':>8}")
-    least, most = None, 0.0
+    least, most = sys.maxsize, 0.0
     for compiler in compilers("cortex-m4"):
         for optimise in ("-O2", "-O3", "-Os"):
             fft = fft_instructions(source, compiler, optimise)
             code = FlightCode(compile_flight_code(optimise=optimise, compiler=compiler))
             steps = code.fly("edge_pipeline", flight)
             step = steps.instructions[steps.ready].mean()
-            least, most = min(least or fft, fft), max(most, step)
+            least, most = min(least, fft), max(most, step)
             name, nine = f"{compiler} {optimise}", CHANNELS * fft
             print(f"{name:18}{fft:9,}{nine:10,}{step:10,.0f}{nine / step:8.1f}")
     print(f"{'best / worst':18}{least:9,}{CHANNELS * least:10,}{most:10,.0f}{CHANNELS * least / most:8.1f}")

@@ -47,7 +47,7 @@ def made_logits(n: int = 1500) -> np.ndarray:
     """(n, 3): over a platform and off it again every six seconds of steps, entry and exit peaking between."""
     over = 6.0 * np.sin(np.arange(n) / 50.0)
     slope = np.gradient(over) * 50.0
-    return np.float32(np.column_stack([over, slope - 2.0, -slope - 2.0]))
+    return np.column_stack([over, slope - 2.0, -slope - 2.0]).astype(np.float32)
 
 
 def measure(code: FlightCode, flight: np.ndarray | None = None) -> dict[str, Cost]:

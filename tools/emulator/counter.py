@@ -6,11 +6,15 @@ is compiled by Numba, is called once a block of code, and adds up in a buffer th
 
 import ctypes
 from functools import cache
+from typing import Any
 
 import numpy as np
-from numba import carray, cfunc, types
+from numba import carray as numba_carray
+from numba import cfunc, types
 from unicorn import unicorn_const
 from unicorn.unicorn_py3 import unicorn as binding
+
+carray: Any = numba_carray  # whose type hints know pointers of ctypes alone
 
 # The buffer, in 64-bit words: these numbers, then for each halfword of code the halfwords of an
 # instruction that starts there, then what is known of a block that starts there: size << 32 | instructions.
@@ -23,7 +27,7 @@ class InstructionCounter:
     code: the bytes that can run, from address `base` on; thumb: Thumb-2, else compressed RISC-V.
     """
 
-    def __init__(self, uc: object, base: int, code: bytes, thumb: bool):
+    def __init__(self, uc: Any, base: int, code: bytes, thumb: bool):
         halfwords = np.frombuffer(code[:len(code) // 2 * 2], dtype="<u2")
         long = halfwords >= 0xE800 if thumb else halfwords & 3 == 3
         self._numbers = np.zeros(_TABLE + 2 * len(halfwords), dtype=np.uint64)
@@ -50,11 +54,11 @@ class InstructionCounter:
 
 
 @cache
-def _hook() -> object:
+def _hook() -> Any:
     stop = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)(("uc_emu_stop", binding.uclib))
 
     @cfunc(types.void(types.voidptr, types.uint64, types.uint32, types.voidptr))
-    def count(uc: int, address: int, size: int, buffer: int) -> None:
+    def count(uc: Any, address: int, size: int, buffer: Any) -> None:
         head = carray(buffer, _TABLE, np.uint64)
         halfwords = np.int64(head[_HALFWORDS])
         table = carray(buffer, _TABLE + 2 * halfwords, np.uint64)

@@ -16,6 +16,7 @@ instructions of set-up each time that the loop is entered.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from unicorn import riscv_const as riscv
 from unicorn import unicorn_const as uc_const
@@ -116,7 +117,7 @@ class XpulpMachine(Machine):
             self._branch = at
         self._cycles += cost
 
-    def _refused(self, uc: object, number: int, data: object) -> None:
+    def _refused(self, uc: Any, number: int, data: object) -> None:
         """An instruction that unicorn does not know: the counter already stands behind it."""
         at = (uc.reg_read(riscv.UC_RISCV_REG_PC) - 4 - self._base) >> 2
         if number != 2 or not 0 <= at < len(self._words) or not self._extension(self._words[at]):

@@ -7,6 +7,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -197,7 +198,7 @@ def parquet(flight: Motion) -> bytes:
 
 #: format -> the file's bytes from a Motion
 FORMATS: dict[str, Callable[[Motion], bytes]] = {
-    **{f"authors-{n}": lambda flight, n=n: authors(flight, n) for n in AUTHORS},
+    **{f"authors-{n}": partial(authors, width=n) for n in AUTHORS},
     "crazypad": crazypad, "imrclab": imrclab, "thrust-stand": thrust_stand, "canonical": canonical,
     "canonical-gz": lambda flight: gzip.compress(canonical(flight), 1, mtime=0),
     "usd-0": usd_old, "usd-1": lambda flight: usd(flight, 1), "usd-2": lambda flight: usd(flight, 2),

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
+from typing import TypeVar
 
 import numpy as np
 from click.testing import CliRunner
@@ -24,6 +25,7 @@ importlib.import_module("scipy.signal")  # its import counts for no input
 
 RATES = (100.0, 100.0, 50.0, 7.3, 250.0, 1000.0, 10000.0)
 LONGEST_MESSAGE = 450
+T = TypeVar("T")
 
 
 def walk(data: bytes, source: str, r: Random) -> str:
@@ -72,7 +74,7 @@ def command(arguments: list[str], path: Path) -> None:
         _clear(lines[0].removeprefix("airtouch: "), str(path))
 
 
-def _or_refusal(act: Callable[[], FlightLog], source: str) -> FlightLog | None:
+def _or_refusal(act: Callable[[], T], source: str) -> T | None:
     try:
         return act()
     except AirTouchError as error:

@@ -29,6 +29,7 @@ HEALTH = {  #: bits of the log variable `health`
     "no horizontal": 1024, "other vehicle": 2048,
 }
 PACKETS = 2  #: packets that the app sends in a step, at most
+Numbers = Sequence[float] | np.ndarray
 UNKNOWN = (np.nan,) * 4
 MOST = {"uint8_t": 255, "uint16_t": 65_535}  #: of the integer parameters
 
@@ -52,8 +53,8 @@ class AppCore:
             call("appHostSetVehicle")(self._memory, vehicle_struct(vehicle), vehicle.arm_pwm)
         call("appHostClamp")(self._params)
 
-    def step(self, acc: Sequence[float], gyro: Sequence[float], pwm: Sequence[float], *,
-             vbat_v: float = np.nan, attitude: Sequence[float] = UNKNOWN, acc_in_body: bool = False) -> str:
+    def step(self, acc: Numbers, gyro: Numbers, pwm: Numbers, *,
+             vbat_v: float = np.nan, attitude: Numbers = UNKNOWN, acc_in_body: bool = False) -> str:
         """One sample of 100 Hz; the kind of the edge that is reported now, "none" mostly.
 
         acc m/s^2 with gravity, world axes or body axes; gyro rad/s; pwm 0..65535;
