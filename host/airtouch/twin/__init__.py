@@ -1,1 +1,1 @@
-"""A simulator fitted to one drone: what its logs show, flown again and matched."""
+"""A twin: the simulator fitted to the recorded flights of one drone."""

@@ -1,7 +1,7 @@
-"""A detector for the drone that flew some flights: trained in its twin, and on the flights themselves.
+"""A detector for the drone of given flights, trained on simulated flights of its twin and on the flights themselves.
 
-Flights whose down range shows edges label themselves. Those without get the edges that the detector of the
-twin finds (pseudo-labels). What to expect is measured on flights held out.
+Edges in the down range are the labels. Flights without down range get the edges that the twin's detector reports
+(pseudo-labels). Expected errors are measured on held-out flights.
 """
 
 import hashlib
@@ -30,11 +30,11 @@ from airtouch.twin import overlay
 from airtouch.vehicle import Vehicle
 
 SIMULATED = 150  #: flights of the twin to train on
-TWIN_STEPS = {"shipped": 400, "scratch": 1000}  #: training steps in the twin, from given weights and from none
-TUNE_STEPS = 300  #: from there on flights without labels
-MIXED = 12  #: simulated flights beside the recorded ones in that, at least
+TWIN_STEPS = {"shipped": 400, "scratch": 1000}  #: training steps on the twin's flights, from given or random weights
+TUNE_STEPS = 300  #: further training steps on flights without labels
+MIXED = 12  #: least number of simulated flights among the recorded ones in those steps
 FOLDS = 4
-FEWEST = 4  #: labelled flights for a hold-out
+FEWEST = 4  #: least number of labelled flights for a hold-out
 #: Decoder of a detector that has been trained on the twin alone: its logits are lower over recorded edges than over
 #: simulated ones, and recorded free air leaves room below. Chosen on folds 0 to 2 with two trainings out of nine
 #: (host/docs/looks.md).
@@ -49,20 +49,20 @@ Progress = Callable[[str, int, int, str], None]
 
 @dataclass(frozen=True)
 class Flight:
-    """A log and its file's condition (speed, fold)."""
+    """A log and the condition (speed, fold) of its file."""
 
     file: FlightFile
     log: FlightLog
 
     @property
     def labelled(self) -> bool:
-        """Whether its down range shows edges."""
+        """True if its down range shows edges."""
         return bool(evaluate.truth(self.log))
 
 
 @dataclass(frozen=True)
 class Flown:
-    """Flights of the twin: logs, and the edges of each, None where its own down range shows them."""
+    """Simulated flights: logs, and the edges of each; None if its own down range shows them."""
 
     logs: list[FlightLog]
     edges: list[list[Edge] | None]
@@ -70,7 +70,10 @@ class Flown:
 
 @dataclass(frozen=True)
 class Adapted:
-    """model; scores of held-out flights with all others and with half of them in training (both may be empty)."""
+    """The model, and scores of held-out flights after training on all others and on half of them (both may be empty).
+
+    twin_only: scores of all labelled flights by the detector that was trained on the twin alone.
+    """
 
     model: BestModel
     held_out: list[FlightScore]
@@ -81,13 +84,12 @@ class Adapted:
 def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Path, *,
           start: BestModel | None, seed: int = 0, hold_out: bool = True, withhold: bool = False,
           progress: Progress | None = None, command: str = "airtouch adapt") -> Adapted:
-    """A detector from flights and their twin. Same arguments, same bits.
+    """Train a detector on flights and their twin. The same arguments give the same bits.
 
-    start: weights to go on from, None for none. work: a folder in which each finished stage is kept, so that the
-    same call goes on after a stop. withhold: the last stage takes all flights as if they had no down range, to measure
-    what unlabelled ones bring. twin_only: all labelled flights scored by the detector that has seen the twin only.
-    A sensor that all flights lack is taken from the simulated ones too. Raises AirTouchError where nothing crosses an
-    edge.
+    start: weights to start from, None for random ones. work: folder for finished stages, so that the same call
+    continues after a stop. withhold: use all flights in the last stage as if they had no down range, to measure the
+    benefit of unlabelled ones. A sensor that all flights lack is removed from the simulated ones too. Raises
+    AirTouchError if no flight crosses an edge.
     """
     work.mkdir(parents=True, exist_ok=True)
     absent = lacking(flights)
@@ -114,13 +116,13 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
 
 
 def lacking(flights: Sequence[Flight]) -> tuple[str, ...]:
-    """The sensors that none of the flights has."""
+    """The sensors that all of the flights lack."""
     return tuple(s for s in sensors.SENSORS if all(s in sensors.missing(f.log) for f in flights))
 
 
 def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,
                       progress: Progress | None) -> tuple[Flown, dict[str, Any]]:
-    """Flights of the twin, laid over the free air of the recorded ones where they have some, and what they are."""
+    """Simulated flights of the twin, added to the recorded flights' free air if there is any, and their description."""
     air = overlay.free_air([f.log for f in flights if f.labelled])
     if not air:
         flown, what = simulated.training_flights(SIMULATED, scene, vehicle=vehicle, seed=seed, progress=progress)
@@ -133,11 +135,11 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
 
 def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], flown: Flown, seed: int,
              progress: Progress | None, command: str) -> BestModel:
-    """A detector of these flights and the twin's; the twin's own without flights.
+    """A detector trained on recorded and simulated flights; the twin's detector itself without recorded ones.
 
-    With labelled flights it is trained from `start` on both, each with half of the crops: a network that goes on from
-    the twin's on a few labelled flights forgets the edges that those lack. Without, the twin's detector is trained
-    further with the edges that it finds.
+    With labelled flights it is trained from `start` on both kinds, each with half of the crops: a network that is
+    trained further on a few labelled flights alone forgets the edges that those lack. Without labelled flights the
+    twin's detector is trained further with pseudo-labels.
     """
     if not flights:
         return twin
@@ -157,9 +159,9 @@ def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight]
 def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
                     twin: BestModel, work: Path, key: str, seed: int, progress: Progress | None, command: str,
                     ) -> tuple[list[FlightScore], list[FlightScore]]:
-    """Scores of the labelled flights, each by a model that has not seen it: of all the others, and of half of them.
+    """Scores of the labelled flights by cross-validation: trained on all other folds, and on half of their flights.
 
-    The labelled flights are dealt into FOLDS parts by seed. Models and scores are kept in `work` under `key`.
+    The labelled flights are assigned to FOLDS folds by seed. Models and scores are stored in `work` under `key`.
     """
     order = np.random.default_rng([seed, 7]).permutation(len(labelled))
     others = [f for f in flights if not f.labelled]
@@ -180,9 +182,10 @@ def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown
 
 
 def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:
-    """What `more` flights would bring: the mean error now and then, metres, and the exponent p of error ~ flights^-p.
+    """Estimated mean error, m, with the present flights and with `more`, and the exponent p of error ~ flights^-p.
 
-    From the error with all and with half of the training flights; p is kept within 0 and 1. None without hold-out.
+    Extrapolated from the errors with all and with half of the training flights; p is limited to 0 to 1. None without
+    a hold-out.
     """
     if not adapted.held_out or not adapted.held_out_half:
         return None
@@ -195,7 +198,7 @@ def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] 
 
 
 def _without_range(flight: Flight) -> Flight:
-    """The flight as logged without a down range."""
+    """The flight without its down range."""
     log = flight.log
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
@@ -223,7 +226,7 @@ def _named(progress: Progress | None, name: str) -> Progress | None:
 
 
 def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
-    """Digits that change with anything the result depends on."""
+    """Hash of everything that the result depends on."""
     settings = (scene.table, vehicle, seed, SIMULATED, TWIN_STEPS, TUNE_STEPS, MIXED, DECODER, MIXED_DECODER)
     total = hashlib.sha256(repr(settings).encode())
     for flight in flights:
@@ -236,7 +239,7 @@ def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: Be
 
 def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
              progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
-    """(flights that can be used, those left out with the reason). Speeds that nothing states are read off the log."""
+    """Flights that can be used, and the others with the reason. A speed that is not stated comes from the log."""
     from airtouch import logs
     from airtouch.twin.course import course
 

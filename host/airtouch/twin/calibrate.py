@@ -1,4 +1,4 @@
-"""A twin from recorded flights: the rounds of the fit, then the levers that act at edges, then the files."""
+"""A twin fitted to recorded flights: first the rounds of the fit, then the levers that act at edges, then the files."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -21,15 +21,15 @@ from airtouch.twin.levers import Lever
 from airtouch.vehicle import Vehicle
 
 FIT = "fit.json"
-ROUNDS, BATCH = 8, 160  #: rounds, and flights a round, of a twin that is fitted for a detector
-BARE = "paper-mixed"  #: scenario where no twin can be fitted
-#: bar(stage) is a context whose value is called with (done, total, note)
+ROUNDS, BATCH = 8, 160  #: rounds, and flights per round, of a twin that is fitted for a detector
+BARE = "paper-mixed"  #: scenario to train in if no twin can be fitted
+#: bar(stage) is a context manager; its value is called with (done, total, note)
 Bars = Callable[[str], AbstractContextManager[Callable[[int, int, str], None]]]
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """What the twin was fitted to, its levers and their values (levers,), and the rounds of the fit."""
+    """A fit: its target, its levers and their values (levers,), and the misfit of each round."""
 
     aim: Target
     levers: tuple[Lever, ...]
@@ -39,7 +39,7 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class Twin:
-    """What flies like one drone: a scenario, a vehicle, and in words where they come from."""
+    """A twin: scenario, vehicle, and a description of their origin."""
 
     scenario: Scenario
     vehicle: Vehicle
@@ -47,16 +47,16 @@ class Twin:
 
 
 def of_folder(folder: Path) -> Twin:
-    """The twin that `airtouch twin` wrote."""
+    """The twin in a folder that `airtouch twin` wrote. Raises AirTouchError if it cannot be read."""
     return Twin(scenario.load(folder / files.SCENARIO), vehicles.load(str(folder / files.VEHICLE)), f"twin of {folder}")
 
 
 def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps: float | None = None, seed: int = 0,
                bar: Bars) -> Twin:
-    """A twin fitted to flights over a platform that have every sensor; with too few of them the simulator as it is.
+    """A twin fitted to flights over a platform that have every sensor; the plain simulator if there are too few.
 
-    work: folder under which the fit is kept; the same call does not fit again. speed_mps: commanded, of flights whose
-    manifest does not say.
+    work: folder for the fit; the same call does not fit again. speed_mps: commanded speed of flights without one in
+    their manifest.
     """
     if len(paths) < recordings.FEWEST:
         return Twin(scenario.load(BARE), vehicle, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
@@ -72,10 +72,10 @@ def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps
 
 def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, flights: int, seed: int, bar: Bars,
               workers: int | None = None) -> Calibrated:
-    """Fit a twin and write vehicle.toml, scenario.toml and fit.json into a folder. Same arguments, same twin.
+    """Fit a twin and write vehicle.toml, scenario.toml and fit.json to a folder. The same arguments give the same twin.
 
-    What is done is in fit.json: the same call goes on after a stop, and does nothing twice. Raises AirTouchError where
-    that is a fit of other flights or settings.
+    Finished rounds are in fit.json, so that the same call continues after a stop. Raises AirTouchError if fit.json is
+    a fit of other flights or settings.
     """
     out.mkdir(parents=True, exist_ok=True)
     workers = workers or available_cores()
@@ -95,7 +95,7 @@ def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, f
 
 
 def key(recorded: Recorded, vehicle: Vehicle, *, flights: int, seed: int) -> str:
-    """Twelve digits that change with the flights, the vehicle and the settings of a fit."""
+    """Hash, of twelve digits, of the flights, the vehicle and the settings of a fit."""
     return _asked(recorded, vehicle, flights, seed)[2]
 
 
@@ -106,5 +106,5 @@ def _asked(recorded: Recorded, vehicle: Vehicle, flights: int, seed: int) -> tup
 
 
 def in_words(misfit: dict[str, float]) -> str:
-    """Group and misfit in scatters, one after the other."""
+    """Each group with its misfit in scatters, as text."""
     return ", ".join(f"{name} {value:.2f}" for name, value in misfit.items())

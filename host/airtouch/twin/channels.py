@@ -17,16 +17,16 @@ NAMES = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "motor roll", "motor pi
 UNITS = ("m/s²",) * 3 + ("°/s",) * 3 + ("PWM",) * 4 + ("m/s²", "cm")
 (AX, AY, AZ, GYRO_X, GYRO_Y, GYRO_Z, ROLL, PITCH, YAW, MEAN, UNEXPLAINED, DOWN) = range(12)
 GRAVITY = 9.81
-LAG_S, DELAY = 0.06, 2  #: thrust after a command: first-order lag, and samples (as `reference.motion_channels`)
+LAG_S, DELAY = 0.06, 2  #: first-order lag (s) and delay (samples) of thrust, as in `reference.motion_channels`
 RATE_HZ = 100.0
 #: motors 1 to 4 to roll, pitch, yaw and mean
 MIX = np.array([[-1, -1, 1, 1], [1, -1, -1, 1], [1, -1, 1, -1], [0.25, 0.25, 0.25, 0.25]])
 
 
 def channels(log: FlightLog) -> np.ndarray:
-    """(n, 12) of a 100 Hz log, columns as NAMES in UNITS; az without gravity.
+    """The channels of a 100 Hz log, (n, 12), with columns NAMES in UNITS; az is without gravity.
 
-    `unexplained az` is az less g times the lagged thrust over its mean in the air, so that mass and
+    `unexplained az` is az less g times the lagged thrust divided by its mean in the air, so that mass and
     thrust curve matter little. Raises AirTouchError for columns that the log lacks.
     """
     acc = hold_finite(level_acceleration(log))[0]

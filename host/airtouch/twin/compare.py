@@ -1,4 +1,4 @@
-"""A fitted twin beside the recorded flights: what stays different, and how well a classifier tells."""
+"""Comparison of a fitted twin with the recorded flights: remaining differences, and AUROC of a classifier."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from airtouch.twin.two_sample import Auroc, two_sample, windows
 from airtouch.vehicle import Vehicle
 
 REPEATS = 2  #: simulated flights of each recorded course
-FIRST = 1_000_000  #: number of the first flight: none that the fit has flown
+FIRST = 1_000_000  #: number of the first flight; larger than that of any flight of the fit
 
 
 @dataclass(frozen=True)
 class Flown:
-    """Simulated flights: course flown, its number among the recorded, channels (n, 12), features."""
+    """A simulated flight: its course, the number of that course, channels (n, 12) and features (features,)."""
 
     course: Course
     number: int
@@ -33,7 +33,7 @@ class Flown:
 
 @dataclass(frozen=True)
 class Gap:
-    """One feature that differs: mean difference simulated - recorded in its unit and in scatters, flights."""
+    """Difference of a feature: mean of simulated less recorded, in its unit and in scatters; number of flights."""
 
     feature: Feature
     difference: float
@@ -43,7 +43,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Misfit by group (rms of mean differences in scatters), gaps largest first, AUROC by phase."""
+    """A comparison: misfit by group (rms of mean differences in scatters), gaps from the largest, AUROC by phase."""
 
     misfit: dict[str, float]
     gaps: list[Gap]
@@ -55,7 +55,7 @@ class Comparison:
 def flown(chosen: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, seed: int,
           fixed: Mapping[str, Any] | None = None, repeats: int = REPEATS,
           progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flown], int]:
-    """(each course flown `repeats` times with the levers' values, flights that did not end well)."""
+    """Fly each course `repeats` times with the levers' values. Returns the flights, and the number that diverged."""
     out, lost, total = [], 0, repeats * len(chosen)
     for k in range(total):
         wanted = chosen[k % len(chosen)]
@@ -73,7 +73,7 @@ def flown(chosen: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], v
 
 def compare(recorded: Recorded, aim: fit.Target, simulated: Sequence[Flown], lost: int, seed: int = 0,
             progress: Callable[[str], None] = lambda _: None) -> Comparison:
-    """Everything that the report shows. Features are compared course by course."""
+    """The comparison that the report shows. Features are compared course by course."""
     apart = np.array([f.features - recorded.features[f.number] for f in simulated])
     with np.errstate(invalid="ignore"):
         standard = np.clip(apart / aim.scatter, -fit.CLIP, fit.CLIP)

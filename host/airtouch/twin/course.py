@@ -1,7 +1,7 @@
-"""What a log says of a flight's course: heights, times, speed, phases. Nothing but the log is used.
+"""The course of a flight, from its log alone: heights, times, speed, phases.
 
-A course is what the simulator needs to fly the same again: hover, a velocity step, a platform,
-a stop. The platform is known by the steps of the down range.
+A course is the input with which the simulator repeats the flight: hover, a velocity step, a platform,
+a stop. The platform follows from the steps of the down range.
 """
 
 from collections.abc import Sequence
@@ -20,13 +20,13 @@ from airtouch.logs.segments import LEVEL_PART, PLATFORM_STEP_M
 from airtouch.twin import pulses
 
 RATE_HZ = 100.0
-LEAST_FREE_S = 3.0  #: free air before the platform; spectra need it
-LEAST_FREE_M = 0.25  #: down range above which no ground effect is left
-SETTLED_S = 1.0  #: after the climb, before level flight counts as free air
-STEP_S = 1.5  #: a velocity step is over within this time
-RISE_S = 0.35  #: from a velocity step to half of its speed, Crazyflie with the firmware's gains
+LEAST_FREE_S = 3.0  #: s, least free air before the platform; spectra need it
+LEAST_FREE_M = 0.25  #: m, down range above which there is no ground effect
+SETTLED_S = 1.0  #: s after the climb until level flight counts as free air
+STEP_S = 1.5  #: s, longest duration of a velocity step
+RISE_S = 0.35  #: s from a velocity step to half of its speed, Crazyflie with the firmware's gains
 PHASES = ("hover", "cruise", "entry", "over", "exit", "after")
-AROUND_S = (0.5, 1.0)  #: an edge's phase begins and ends this far from it
+AROUND_S = (0.5, 1.0)  #: s before and after an edge that belong to the edge's phase
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Course:
     top_m: float = 0.0
 
     def as_dict(self) -> dict[str, float | int | str]:
-        """Plain values, for files."""
+        """The fields as plain values, for files."""
         return asdict(self)
 
     def phases(self) -> dict[str, slice]:
@@ -89,9 +89,9 @@ class Course:
 
 
 def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | None = None) -> Course:
-    """The course of one flight over one platform (the first, where there are more).
+    """The course of a flight over one platform, the first one.
 
-    speed_mps, angle_deg: where a manifest states them. Raises AirTouchError, with what to fly, for a log
+    speed_mps, angle_deg: from a manifest, if it states them. Raises AirTouchError, with what to fly, for a log
     without down range, platform or free air.
     """
     check(log)
@@ -127,12 +127,12 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
 
 
 def platform_edges(log: FlightLog) -> list[Edge]:
-    """True edges; where there is none, those of platforms from 12 cm on."""
+    """True edges of a log; without any, the edges of platforms of at least 12 cm."""
     return true_edges(log) or true_edges(log, PLATFORM_STEP_M)
 
 
 def check(log: FlightLog) -> None:
-    """Raise AirTouchError, one line with the remedy, for a log that no twin can be fitted to."""
+    """Raise AirTouchError, in one line with the remedy, for a log that cannot be used to fit a twin."""
     log.require(*ACC, *GYRO, *PWM)
     if not log.has("zrange_m") or not np.isfinite(log["zrange_m"]).any():
         raise AirTouchError(f"{log.source}: no down range in this log; log range.zrange (flow deck or Z-ranger) too")
@@ -143,7 +143,7 @@ def check(log: FlightLog) -> None:
 
 
 def one_vehicle(logs: Sequence[FlightLog]) -> str:
-    """The vehicle that flew all of these logs, "" where none is named. Raises AirTouchError for two."""
+    """The vehicle of all the logs; "" if none names one. Raises AirTouchError for two different ones."""
     names = {str(log.meta["vehicle"]): log.source for log in logs if log.meta.get("vehicle")}
     if len(names) > 1:
         (first, one), (second, other) = list(names.items())[:2]
@@ -162,10 +162,10 @@ def _held(values: np.ndarray) -> np.ndarray:
 
 
 def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, str]:
-    """Sample of the forward velocity step before an entry, its speed in m/s, and where that comes from.
+    """Sample of the forward velocity step before an entry, its speed in m/s, and the source of the speed.
 
-    From logged velocities where there are some; else from horizontal acceleration, whose bias is that of
-    level flight, integrated over STEP_S: the speed that is reached, good to about 0.07 m/s.
+    The source is the logged velocity, or without one the horizontal acceleration, less its mean in level
+    flight, integrated over STEP_S; accurate to about 0.07 m/s.
     """
     settled = min(level + int(SETTLED_S * RATE_HZ), entry - 50)
     if log.has(*VELOCITY[:2]):
@@ -183,7 +183,7 @@ def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, 
 
 
 def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:
-    """Sample after an exit at which the forward flight ends: the largest loss of speed, by the same means."""
+    """Sample after an exit at which the forward flight ends: that of the largest loss of speed."""
     if landing - leave < int(STEP_S * RATE_HZ):
         return landing
     if log.has(*VELOCITY[:2]):
@@ -202,14 +202,14 @@ def _speed(log: FlightLog) -> np.ndarray:
 
 
 def _gain(acc: np.ndarray) -> np.ndarray:
-    """(m, 2) m/s gained over STEP_S (or half of the stretch) from each sample on, of acc (n, 2)."""
+    """Gain of speed over STEP_S (or half of the interval) from each sample on, (m, 2) m/s, of acc (n, 2)."""
     n = max(min(int(STEP_S * RATE_HZ), len(acc) // 2), 1)
     total = np.vstack([np.zeros(2), np.cumsum(acc, axis=0)]) / RATE_HZ
     return total[n:] - total[:-n]
 
 
 def _horizontal(log: FlightLog, start: int, stop: int) -> np.ndarray:
-    """(n, 2) horizontal specific force of some samples less its median, m/s^2, holes filled."""
+    """Horizontal specific force of samples start to stop - 1 less its median, (n, 2) m/s^2, with gaps filled."""
     acc = level_acceleration(log)[start:stop, :2]
     acc = np.column_stack([_held(a) for a in acc.T])
     return acc - np.median(acc, axis=0)

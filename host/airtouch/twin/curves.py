@@ -12,14 +12,14 @@ from airtouch.twin.course import Course
 from airtouch.twin.features import BANDS_HZ, CLASSES, edge_locked, height_class, names
 from airtouch.twin.flights import Recorded
 
-BEFORE, BEHIND = 50, 100  #: samples around an edge
+BEFORE, BEHIND = 50, 100  #: samples before and after an edge
 MARGIN = 200  #: samples before the entry and after the exit
 QUARTILES = (25, 50, 75)
 
 
 @dataclass(frozen=True)
 class Signals:
-    """One flight: time after its entry (n,), s, and channels (n, 12) without their level in free air."""
+    """A flight: time after its entry, (n,) s, and channels (n, 12) less their level in free air."""
 
     time_s: np.ndarray
     channels: np.ndarray
@@ -27,7 +27,7 @@ class Signals:
 
 @dataclass(frozen=True)
 class AroundEdges:
-    """Quartiles (3, BEFORE + BEHIND, 12) of the channels around the edges of one kind, and how many flights."""
+    """Quartiles (3, BEFORE + BEHIND, 12) of the channels around the edges of one kind, and the number of flights."""
 
     quartiles: np.ndarray
     flights: int
@@ -35,7 +35,7 @@ class AroundEdges:
 
 @dataclass(frozen=True)
 class Curves:
-    """Each pair: recorded, simulated.
+    """The curves of a report. A pair is (recorded, simulated).
 
     edges: height class -> "entry" or "exit" -> pair, for classes that both have. spectra: quartiles (3, 11, bands) of
     band powers, dB.
@@ -47,7 +47,7 @@ class Curves:
 
 
 def curves(recorded: Recorded, simulated: Sequence[Flown]) -> Curves:
-    """Everything that the report draws. The flight overlaid is that of median length over the platform."""
+    """The curves of the report. The overlaid flight is that with the median duration over the platform."""
     length = [f.course.exit - f.course.entry for f in simulated]
     one = simulated[int(np.argsort(length)[len(length) // 2])]
     edges = {}

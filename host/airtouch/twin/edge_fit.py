@@ -25,12 +25,12 @@ EFFECTS = ("ground_effect", "flow_scale", "flow_latency", "range_bias", "range_s
 FLIGHTS = 60  #: of each comparison
 STEPS = 4  #: Gauss-Newton steps
 SHRINK = 0.5  #: of a step that did not help
-FIRST = 500_000  #: number of the first flight: none that the rounds fly
+FIRST = 500_000  #: number of the first flight; larger than that of any flight of the rounds
 
 
 @dataclass(frozen=True)
 class EdgeFit:
-    """values: (levers,). misfit: cost before each step and after the last, weighted squares of all groups' misfits."""
+    """A fit: values (levers,), and the cost before each step and after the last (weighted squared misfits)."""
 
     values: np.ndarray
     misfit: list[float]
@@ -39,9 +39,9 @@ class EdgeFit:
 def refine(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, *, seed: int = 0,
            fixed: Mapping[str, Any] | None = None, workers: int = 1, flights: int = FLIGHTS,
            progress: Callable[[int, int], None] = lambda *_: None) -> EdgeFit:
-    """Levers of EFFECTS moved so that simulated edges are nearer to the recorded ones. Same arguments, same result.
+    """Fit the levers of EFFECTS to the recorded edges. The same arguments give the same result.
 
-    values: (levers,) to start from. The cost is that of `fit.best`, on `flights` flights that both sides share.
+    values: (levers,) to start from. The cost is that of `fit.best`, on `flights` flights that all comparisons share.
     """
     moved = [k for k, lever in enumerate(levers) if lever.of in EFFECTS]
     some = [levers[k] for k in moved]
@@ -80,12 +80,12 @@ def refine(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np.nd
 
 
 def share(batch: int) -> int:
-    """Flights of a comparison beside rounds of `batch` flights: FLIGHTS where there are 160."""
+    """Flights of a comparison, in proportion to the `batch` flights of a round: FLIGHTS for 160."""
     return FLIGHTS * batch // 160
 
 
 def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) -> np.ndarray:
-    """(count,) numbers of courses: each height class that there is as often, and so each course of a class."""
+    """Numbers of courses, (count,), with equal numbers of each height class and of each course within a class."""
     height = [height_class(c.clearance_m) for c in courses]
     classes = [rng.permutation([i for i, h in enumerate(height) if h == name]) for name in CLASSES if name in height]
     classes = classes or [np.arange(len(courses))]
@@ -94,7 +94,7 @@ def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) ->
 
 
 def _sign(value: float, lever: Lever) -> float:
-    """The side to which a lever is moved: down where up is out of bounds."""
+    """The direction in which a lever is moved: 1, or -1 if 1 is out of bounds."""
     return 1.0 if value + lever.step <= lever.high else -1.0
 
 

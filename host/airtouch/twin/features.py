@@ -1,7 +1,7 @@
-"""A flight as numbers: trims, spectra and coherency in free air and over the platform, edge-locked means.
+"""Features of a flight: trims, spectra and coherency in free air and over the platform, edge-locked means.
 
-Each feature carries the unit in which a gap of it is judged, later its scatter between flights. What a
-flight does not have (a height class, a phase too short) is NaN.
+Each feature has a unit; differences are measured in its scatter between flights. A feature that a flight
+lacks (another height class, a phase that is too short) is NaN.
 """
 
 import functools
@@ -30,9 +30,9 @@ GROUPS = ("trim", "spectrum", "coherency", "over", "entry", "exit")
 
 @dataclass(frozen=True)
 class Feature:
-    """One number of a flight. group: of GROUPS. least: scatter that is taken at least, in `unit`.
+    """A feature. group: one of GROUPS. least: lower bound of its scatter, in `unit`.
 
-    paired: it belongs to the course, so that `least` is its scatter however much the courses differ.
+    paired: it depends on the course, so that `least` is its scatter however much the courses differ.
     """
 
     name: str
@@ -43,13 +43,13 @@ class Feature:
 
 
 def height_class(clearance_m: float) -> str | None:
-    """The class of a down range over the platform, None above all."""
+    """The height class of a down range over the platform, m; None above the highest class."""
     return next((name for name, (low, high) in CLASSES.items() if low <= clearance_m < high), None)
 
 
 @functools.cache
 def names() -> tuple[Feature, ...]:
-    """What `features` returns, in its order."""
+    """The features in the order of `features`."""
     out = [Feature("hover PWM", "trim", "PWM", 300.0), Feature("hover PWM slope", "trim", "PWM/s", 5.0),
            Feature("height before the entry", "trim", "cm", 1.0, paired=True)]
     out += [Feature(f"trim {NAMES[k]}", "trim", "PWM", 100.0) for k in (ch.ROLL, ch.PITCH, ch.YAW)]
@@ -65,7 +65,7 @@ def names() -> tuple[Feature, ...]:
 
 
 def features(log: FlightLog, course: Course) -> np.ndarray:
-    """(len(names()),) of one flight over one platform."""
+    """The features of a flight over one platform, (len(names()),)."""
     x = channels(log)
     free = x[course.free]
     parts = [_trims(log, free, course), *_free_spectra(free), _over(x, course)]
@@ -74,7 +74,7 @@ def features(log: FlightLog, course: Course) -> np.ndarray:
 
 
 def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = 50, behind: int = 100) -> np.ndarray:
-    """(before + behind, 12) channels around an edge, less their level before the entry (not the down range)."""
+    """Channels around an edge, (before + behind, 12), less their level before the entry (except the down range)."""
     level = x[course.entry + int(BASELINE_S[0] * RATE_HZ):course.entry + int(BASELINE_S[1] * RATE_HZ)].mean(axis=0)
     level[ch.DOWN] = 0.0
     out = np.full((before + behind, 12), np.nan)
@@ -93,7 +93,7 @@ def _trims(log: FlightLog, free: np.ndarray, course: Course) -> np.ndarray:
 
 
 def _blocks(x: np.ndarray, length: int, step: int) -> np.ndarray | None:
-    """(blocks, frequencies, channels) of detrended, windowed stretches; None where too short."""
+    """Spectra of detrended, windowed blocks, (blocks, frequencies, channels) complex; None if x is too short."""
     if len(x) < length:
         return None
     starts = np.arange(0, len(x) - length + 1, step)
@@ -113,7 +113,7 @@ def _free_spectra(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     blocks = _blocks(free[:, :ch.DOWN], LENGTH, LENGTH // 2)
     if blocks is None:
         return (np.full(ch.DOWN * len(BANDS_HZ), np.nan), np.full(2 * len(PAIRS) * COHERENT_BANDS, np.nan))
-    power = np.median(np.abs(blocks) ** 2, axis=0) / np.log(2.0)  # a velocity step in one block does not count
+    power = np.median(np.abs(blocks) ** 2, axis=0) / np.log(2.0)  # the median ignores a velocity step in one block
     bins = _bins(LENGTH, BANDS_HZ)
     spectrum = [_decibel(power[b].mean(axis=0)) for b in bins]
     coherency = []

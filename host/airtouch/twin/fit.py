@@ -1,9 +1,9 @@
-"""Fit of the levers: rounds of simulated flights, then one weighted least-squares step on their features.
+"""Fit of the levers: each round simulates flights, then takes one weighted least-squares step on their features.
 
 Each simulated flight flies the course of a recorded one, with levers drawn around their present values.
 The difference of the two flights' features is regressed on the levers (an ensemble of flights gives the
 Jacobian; Evensen, The Ensemble Kalman Filter, 2003), and the levers move to where the mean difference, in
-units of the recorded flights' scatter, is least. A ridge keeps a step within what the round has tried.
+units of the recorded flights' scatter, is least. A ridge limits a step to the range that the round tried.
 """
 
 import hashlib
@@ -29,11 +29,11 @@ from airtouch.vehicle import Vehicle
 ROUNDS, FLIGHTS = 12, 240
 MEMORY_ROUNDS = 4  #: rounds whose flights enter a regression
 RIDGE = 1.0  #: weight of a step of one `Lever.step` against a misfit of one scatter in each group
-MOST_STEP = 2.0  #: of a round, in `Lever.step`
-MODEL = 0.25  #: scatters by which a mean feature may stay off: no simulator has everything
-FREEDOM = 40.0  #: independent features that a group counts as
-CLIP = 5.0  #: scatters; larger differences of one flight count as that
-FEWEST = 4  #: recorded flights that must have a feature
+MOST_STEP = 2.0  #: largest step of a round, in `Lever.step`
+MODEL = 0.25  #: scatters, standard deviation of the model's error in a mean feature
+FREEDOM = 40.0  #: independent features that each group counts as, whatever their number
+CLIP = 5.0  #: scatters, to which the difference of one flight is clipped
+FEWEST = 4  #: least number of recorded flights that must have a feature
 GROUP_WEIGHT = {"trim": 1.0, "spectrum": 1.0, "coherency": 1.0, "over": 0.7, "entry": 1.0, "exit": 1.0}
 #: progress(round, rounds, misfit by group)
 Progress = Callable[[int, int, Mapping[str, float]], None]
@@ -41,7 +41,7 @@ Progress = Callable[[int, int, Mapping[str, float]], None]
 
 @dataclass(frozen=True)
 class Target:
-    """Recorded flights: courses, features (flights, features), and each feature's scatter (features,)."""
+    """The target of a fit: courses, features (flights, features), and the features' scatter (features,)."""
 
     courses: Sequence[Course]
     features: np.ndarray
@@ -50,9 +50,9 @@ class Target:
 
 @dataclass
 class State:
-    """A fit between rounds: levers (p,), misfit by group of each round, and the last rounds' flights.
+    """The state of a fit: levers (p,), misfit by group of each round, and the flights of the last rounds.
 
-    refined: (p,) levers after the stage of the edges (`calibrate`), None before it.
+    refined: (p,) levers after the fit to edges (`edge_fit`), None before it.
     """
 
     values: np.ndarray
@@ -63,7 +63,7 @@ class State:
 
 
 def target(courses: Sequence[Course], features: np.ndarray) -> Target:
-    """Recorded flights with the scatter of their features: 1.48 median deviations, at least `Feature.least`."""
+    """The target with the scatter of each feature: 1.48 median absolute deviations, at least `Feature.least`."""
     listed = names()
     scatter = np.full(len(listed), np.nan)
     for k, feature in enumerate(listed):
@@ -77,10 +77,10 @@ def target(courses: Sequence[Course], features: np.ndarray) -> Target:
 def fit(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int = ROUNDS, flights: int = FLIGHTS,
         seed: int = 0, fixed: Mapping[str, Any] | None = None, workers: int = 1, kept: Path | None = None,
         progress: Progress | None = None) -> State:
-    """The levers after all rounds. Same arguments, same result.
+    """The state after all rounds. The same arguments give the same result.
 
-    kept: a file in which each finished round is written; a fit that stopped goes on from it. Raises AirTouchError where
-    it holds a fit of other flights or settings.
+    kept: file to which each finished round is written, and from which a stopped fit continues. Raises AirTouchError if
+    it is a fit of other flights or settings.
     """
     asked = key(aim, vehicle, levers, flights=flights, seed=seed, fixed=fixed)
     state = load(kept, asked) or State(lever_set.starts(levers), [], [], [])
@@ -96,22 +96,22 @@ def fit(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int =
 
 def key(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, flights: int = FLIGHTS, seed: int = 0,
         fixed: Mapping[str, Any] | None = None) -> str:
-    """Twelve digits that change with anything a round depends on; more rounds of the same fit have the same."""
+    """Hash, of twelve digits, of everything that a round depends on; the number of rounds does not enter."""
     courses = [replace(course, source="") for course in aim.courses]
     said = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
     return hashlib.sha256(said.encode() + np.ascontiguousarray(aim.features).tobytes()).hexdigest()[:12]
 
 
 def best(state: State) -> np.ndarray:
-    """(levers,) of the round whose flights were nearest to the recorded ones: the last step is not always the best.
+    """The levers, (levers,), of the round with the least weighted sum of squared misfits over the groups.
 
-    Nearest: least sum of squared misfits over the groups, each with its weight.
+    The last round is not always the best.
     """
     return np.array(min(state.history, key=lambda entry: total(entry["misfit"]))["values"])
 
 
 def total(misfit: Mapping[str, float]) -> float:
-    """All groups' misfits as one number, scatters: root of the weighted sum of squares."""
+    """The misfit of all groups, in scatters: root of the weighted sum of squares."""
     return float(np.sqrt(sum((GROUP_WEIGHT[name] * off) ** 2 for name, off in misfit.items())))
 
 
@@ -143,10 +143,10 @@ def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever],
 
 def regression(drawn: np.ndarray, apart: np.ndarray, centre: np.ndarray, steps: np.ndarray,
                newest: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(features, levers) change by `Lever.step`; (features,) mean difference at `centre` and its variance, in scatters.
+    """Jacobian (features, levers) per `Lever.step`; mean difference (features,) at `centre`; its variance; in scatters.
 
-    drawn: (flights, levers); apart: (flights, features), NaN where a flight has none. The mean is the newest
-    flights' own, corrected by the Jacobian for where their levers were drawn.
+    drawn: (flights, levers), levers of each flight. apart: (flights, features), differences, NaN for a missing feature.
+    The mean is that of the newest flights, corrected by the Jacobian to `centre`.
     """
     x = (drawn - centre) / steps
     jacobian = np.zeros((apart.shape[1], x.shape[1]))
@@ -172,7 +172,7 @@ def regression(drawn: np.ndarray, apart: np.ndarray, centre: np.ndarray, steps: 
 
 
 def _rounds(use: np.ndarray, newest: int) -> np.ndarray:
-    """(used flights, rounds) which round each flight is of: an intercept each."""
+    """Indicator of each flight's round, (used flights, rounds): one intercept for each round."""
     number = np.arange(len(use)) // newest
     return (number[use][:, None] == np.unique(number[use])[None, :]).astype(float)
 
@@ -186,7 +186,7 @@ def misfit(gap: np.ndarray) -> dict[str, float]:
 
 def least_squares_step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarray, levers: Sequence[Lever],
           values: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Steps of the levers, in `Lever.step`, that make the weighted sum of squared gaps least."""
+    """The steps of the levers, (levers,) in `Lever.step`, with the least weighted sum of squared gaps."""
     listed: tuple[Feature, ...] = names()
     good = np.isfinite(gap)
     group = np.array([f.group for f in listed])
@@ -203,7 +203,7 @@ def least_squares_step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarr
 
 
 def save(path: Path, state: State, asked: str) -> None:
-    """Write a fit to a file that `load` reads. asked: its `key`."""
+    """Write a fit to a file for `load`. asked: its `key`."""
     write_bytes(json.dumps({
         "key": asked, "values": state.values.tolist(), "history": state.history,
         "drawn": [d.tolist() for d in state.drawn],
@@ -212,7 +212,7 @@ def save(path: Path, state: State, asked: str) -> None:
 
 
 def load(path: Path | None, asked: str) -> State | None:
-    """The fit in a file, None without one. Raises AirTouchError for a damaged file and for a fit of another `key`."""
+    """The fit in a file; None without one. Raises AirTouchError for a damaged file and for a fit of another `key`."""
     if path is None or not path.is_file():
         return None
     try:

@@ -16,14 +16,14 @@ from airtouch.twin.course import Course
 from airtouch.twin.features import features
 from airtouch.twin.near_range import NearRange
 
-FEWEST = 4  #: flights that a twin is fitted to, at least
+FEWEST = 4  #: least number of flights to fit a twin to
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """Flights that a twin is fitted to: courses, channels (each (n, 12)), features (flights, features).
+    """Flights to fit a twin to: courses, channels (each (n, 12)), features (flights, features).
 
-    near: what their down range reads close to the platform, None where they do not tell.
+    near: error of their down range near the platform, None if unknown.
     """
 
     vehicle: str
@@ -36,10 +36,10 @@ class Recorded:
 
 def recorded(paths: Sequence[str | Path], *, speed_mps: float | None = None, folds: Sequence[int] = (),
              progress: Callable[[int, int], None] = lambda *_: None) -> Recorded:
-    """Flights of files and folders; speeds and angles from a manifest beside them, or from the logs.
+    """Read the flights of files and folders. Speeds and angles come from a manifest beside them, or from the logs.
 
-    folds: only flights of these folds of the manifest. Those that cannot be used are in `left_out` with
-    the reason. Raises AirTouchError, with what to fly, where fewer than FEWEST can be used, and for two vehicles.
+    folds: only flights of these folds of the manifest. Flights that cannot be used are in `left_out` with
+    the reason. Raises AirTouchError, with what to fly, if fewer than FEWEST can be used, and for two vehicles.
     """
     files = [f for f in dataset.collect(paths, speed_mps) if not folds or f.condition.fold in folds]
     if not files:

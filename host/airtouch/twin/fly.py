@@ -20,7 +20,7 @@ from airtouch.vehicle import Vehicle
 
 def fly(chosen: Course, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, seed: int, number: int,
         fixed: Mapping[str, Any] | None = None) -> FlightLog | Diverged:
-    """One recorded course in the simulator with these levers."""
+    """Fly a recorded course in the simulator with these levers, values (levers,)."""
     effects = lever_set.table(levers, values, fixed)
     scene = missions.one(chosen, effects, missions.NAME, **lever_set.mission(levers, values))
     return flight.fly(scene, lever_set.craft(vehicle, levers, values), seed, number)
@@ -33,7 +33,10 @@ def simulated_course(log: FlightLog, chosen: Course) -> Course:
 
 def flown_features(courses: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray,
                    seed: int, first: int = 0, fixed: Mapping[str, Any] | None = None, workers: int = 1) -> np.ndarray:
-    """(flights, features): flight i flies courses[i] with the levers values[i]; NaN where it does not end well."""
+    """Features (flights, features) of simulated flights; flight i flies courses[i] with the levers values[i].
+
+    The row of a flight that diverges is NaN.
+    """
     def one(i: int) -> np.ndarray:
         log = fly(courses[i], vehicle, levers, values[i], seed, first + i, fixed)
         if isinstance(log, Diverged):

@@ -1,4 +1,4 @@
-"""What may be moved to make simulated flights like recorded ones, with bounds and units."""
+"""Levers: the parameters of the simulator that a fit may change, with bounds and units."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,17 +14,17 @@ from airtouch.vehicle import Vehicle
 VEHICLE, MISSION = "vehicle", "mission"
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"
-#: effects that every twin has: rows of the log lie anywhere in the controllers' cycle, otherwise in each flight
+#: effects that every twin has: a log's rows are at any phase of the controllers' cycle, another one in each flight
 FIXED: dict[str, Any] = {"time_jitter": {"rms": 0.0, "behind": {"low": 0.0, "high": 0.01}}}
 
 
 @dataclass(frozen=True)
 class Lever:
-    """One number of the simulator.
+    """A parameter of the simulator.
 
     of: an effect, "vehicle", "mission" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
-    axis), or a direction of ROTOR_SIGNS. step: a change that a round tries. spread: half width over which
-    each flight draws it, None where all flights have the same.
+    axis), or a direction of ROTOR_SIGNS. step: typical change in a round. spread: half width of the range
+    from which each flight draws it, None for one value in all flights.
     """
 
     of: str
@@ -38,14 +38,14 @@ class Lever:
 
     @property
     def name(self) -> str:
-        """As printed and stored."""
+        """Name in output and files."""
         return f"{self.of}.{self.key}"
 
 
 def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...]:
-    """The levers of a fit, started from a vehicle and plain effects.
+    """The levers of a fit, with the values of a vehicle and of plain effects as start.
 
-    near: what recorded flights say of the down range.
+    near: error of the recorded flights' down range near the platform.
     """
     near = near or NearRange(0.0, -0.045, 0.03, 0.035)
     gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
@@ -109,12 +109,12 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
 
 
 def starts(levers: Sequence[Lever]) -> np.ndarray:
-    """(levers,) the start of each."""
+    """The start values, (levers,)."""
     return np.array([lever.start for lever in levers])
 
 
 def clipped(levers: Sequence[Lever], values: np.ndarray) -> np.ndarray:
-    """Values within their bounds."""
+    """Values (levers,) clipped to their bounds."""
     return np.clip(values, [lever.low for lever in levers], [lever.high for lever in levers])
 
 
@@ -135,16 +135,15 @@ def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float] | n
 
 
 def mission(levers: Sequence[Lever], values: Sequence[float] | np.ndarray) -> dict[str, float]:
-    """What `missions.drawn` takes: height_m added to the set height, pulse_mps of the pulses in hover."""
+    """Arguments of `missions.drawn`: height_m, added to the set height, and pulse_mps, of the pulses in hover."""
     return {lever.key: float(v) for lever, v in zip(levers, values, strict=True) if lever.of == MISSION}
 
 
 def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: Mapping[str, Any] | None = None,
           spread: bool = True) -> dict[str, Any]:
-    """The effects of a scenario with the levers set; `fixed` are effects that no lever moves.
+    """The table of a scenario's effects with the levers set. fixed: effects without levers.
 
-    spread: levers with a spread become ranges that each flight draws from. Raises AirTouchError for a
-    lever of an effect or parameter that does not exist.
+    spread: write levers with a spread as ranges. Raises AirTouchError for a lever of an unknown effect or parameter.
     """
     out: dict[str, Any] = {name: dict(given) if isinstance(given, Mapping) else list(given)
                            for name, given in (fixed or {}).items()}

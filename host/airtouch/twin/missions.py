@@ -12,14 +12,14 @@ from airtouch.simulation.scenario import Scenario
 from airtouch.twin.course import RISE_S, Course
 
 NAME = "twin"
-WIDTH_M = 4.0  #: of the platform, across the path
-LEAST_BEFORE_M = 0.05  #: from the velocity step to the edge
-LEAST_STOP_M = 0.35  #: flown on after the platform, so that drift does not keep a flight over it
+WIDTH_M = 4.0  #: m, width of the platform across the path
+LEAST_BEFORE_M = 0.05  #: m, least distance from the velocity step to the edge
+LEAST_STOP_M = 0.35  #: m, least distance flown after the platform, so that no flight stops over it by drift
 WAIT_S = 0.5
-LEAST_CLEARANCE_M = 0.012  #: true distance at an entry; the legs end 6 mm below the sensor
-SETTLED_S = 0.15  #: after an entry, when the reading just after it is taken
-LAND_MPS = 0.2  #: of the firmware's landing
-#: what a flight draws together, from one recorded course
+LEAST_CLEARANCE_M = 0.012  #: m, least true distance at an entry; the legs end 6 mm below the sensor
+SETTLED_S = 0.15  #: s after an entry at which the reading behind it is taken
+LAND_MPS = 0.2  #: m/s, speed of the firmware's landing
+#: values that a flight draws together, from one recorded course
 KEYS = ("cruise", "clearance", "top", "speed", "angle", "climb", "hover", "before", "length", "stop", "after", "pulse",
         "every")
 
@@ -28,10 +28,10 @@ def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: fl
           pulse_mps: float = 0.0) -> dict[str, float]:
     """The values (KEYS) with which the simulator flies a course: m, s, m/s, degrees.
 
-    The edges are put where the recorded flight, at its speed and with the same rise, crossed them. The
-    platform's height is the course's own where it is known; else it follows from the readings on both sides of the
-    entry, less the error that `effects` give the down range. height_m: added to the set height, for a simulator that
-    flies higher than it is told. pulse_mps: of the pulses in the hover, where the course has some.
+    The edges are at the positions where the recorded flight, at its speed and with the same rise, crossed them. The
+    platform's height is that of the course if known. Otherwise it follows from the readings before and after the
+    entry, less the down range's error by `effects`. height_m: added to the set height, for a simulator that
+    flies higher than its set point. pulse_mps: speed of the pulses in the hover, if the course has some.
     """
     clearance = max(course.before_m - course.top_m if course.top_m else
                     true_distance(course.entered_m, (effects or {}).get("range_bias", {})), LEAST_CLEARANCE_M)
@@ -48,9 +48,9 @@ def drawn(course: Course, effects: Mapping[str, Any] | None = None, height_m: fl
 
 
 def true_distance(reading_m: float, bias: Mapping[str, Any]) -> float:
-    """The distance that a down range reading just after an entry stands for, m, with the effect `range_bias`.
+    """The true distance, m, of a down range reading just after an entry, with the effect `range_bias`.
 
-    Of a parameter that each flight draws from a range, the middle counts.
+    A parameter that is a range counts with its middle.
     """
     bias = {name: 0.5 * (v["low"] + v["high"]) if isinstance(v, Mapping) else v for name, v in bias.items()}
     values = registry.get("range_bias").values(bias) if bias else dict.fromkeys(("near", "dip"), 0.0)
@@ -64,9 +64,9 @@ def true_distance(reading_m: float, bias: Mapping[str, Any]) -> float:
 
 def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME,
           **mission: float) -> dict[str, Any]:
-    """A scenario's table: each flight draws one of the courses and flies it with these effects.
+    """The table of a scenario in which each flight draws one of the courses and flies it with these effects.
 
-    mission: as of `drawn`.
+    mission: arguments of `drawn`.
     """
     return {
         "name": name,
@@ -87,5 +87,5 @@ def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAM
 
 
 def one(course: Course, effects: Mapping[str, Any], name: str = NAME, **mission: float) -> Scenario:
-    """A scenario of one course. mission: as of `drawn`."""
+    """The scenario of one course. mission: arguments of `drawn`."""
     return Scenario(name, "", table([course], effects, name, **mission))

@@ -1,8 +1,8 @@
-"""How high the platform is, and what the down range reads close to it: from dead-reckoned height around the edges.
+"""Height of the platform, and error of the down range near it, from dead-reckoned height around the edges.
 
-A reading close to a surface is too small, so that the step of the down range at an edge alone gives neither. Before an
-entry and behind an exit the floor is below and the reading is right; from there on the vertical acceleration,
-integrated twice, carries the height over the floor on for some tenths of a second.
+A reading near a surface is too small, so the step of the down range at an edge gives neither of the two. Before an
+entry and after an exit the floor is below and the reading is right. From there the vertical acceleration, integrated
+twice, gives the height over the floor for some tenths of a second.
 """
 
 from collections.abc import Sequence
@@ -15,15 +15,16 @@ from airtouch.twin import channels as ch
 from airtouch.twin.channels import RATE_HZ
 from airtouch.twin.course import Course
 
-ANCHOR_S, CARRIED_S = 1.0, 0.8  #: the height is tied to readings over the floor for so long, and carried on for so long
-#: m: of a reading, and of a dead-reckoned height after 1 s (it grows with the square of time: a bias of 0.04 m/s^2)
+ANCHOR_S, CARRIED_S = 1.0, 0.8  #: s of readings over the floor that anchor the height, and s of dead reckoning after it
+#: m, standard deviations: of a reading, and of the dead-reckoned height after 1 s (from a bias of 0.04 m/s^2, it grows
+#: with the square of time)
 READING_STD_M, DRIFT_M = 0.002, 0.02
-#: middle and width of what is expected of near (m), fade (m), delay (s): weak where flights differ in height
+#: mean and standard deviation of the prior of near (m), fade (m), delay (s); weak if the flights differ in height
 PRIOR = np.array([[-0.04, 0.04], [0.055, 0.01], [0.035, 0.01]])
-FIRM = 10.0  #: weight of that against the flights'
+FIRM = 10.0  #: weight of this prior against the flights
 LEAST, MOST = (-0.2, 0.01, 0.0), (0.0, 0.2, 0.1)
-ALIKE_M = 0.06  #: steps of the down range this close together may be of one platform, whose readings differ by height
-FEWEST = 4  #: flights
+ALIKE_M = 0.06  #: m, largest difference of the steps at one platform, whose readings differ by height
+FEWEST = 4  #: least number of flights
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,11 @@ class NearRange:
 
 
 def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRange | None:
-    """The platform of these flights, None where their steps are of more than one platform or they are too few.
+    """The platform of these flights; None if they cross more than one platform or are too few.
 
     channels: (n, 12) of each flight, as `channels.channels`. Nonlinear least squares over all flights with one
-    platform, one bias curve and one delay. On simulated flights the height comes out up to 8 mm too large, the error
-    too small.
+    platform, one bias curve and one delay. On simulated flights the fitted height is up to 8 mm too large, and the
+    error too small.
     """
     steps = np.array([c.before_m - c.entered_m for c in courses])
     if len(courses) < FEWEST or np.ptp(np.percentile(steps, (10, 90))) > ALIKE_M:
@@ -66,8 +67,9 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
 
 
 def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, float]]:
-    """For each edge: (m,) height over the floor in m, its slope in m/s, down range in m, and the scatter of their
-    difference, as if each edge were one measurement."""
+    """For each edge: height over the floor (m,), m; its slope (m,), m/s; down range (m,), m; and the scatter of their
+    difference, with each edge as one measurement.
+    """
     down, dt = 0.01 * x[:, ch.DOWN], 1.0 / RATE_HZ
     gained = np.cumsum(np.cumsum(x[:, ch.AZ] - np.median(x[course.free, ch.AZ]))) * dt * dt
     t = np.arange(len(x)) * dt

@@ -1,9 +1,8 @@
-"""Simulated edges laid over recorded free air: flights to train on whose background is the drone's own.
+"""Simulated edges added to recorded free air: training flights with the drone's own background.
 
-A detector that is trained on simulated flights learns the simulator's free air with them. What a platform does to a
-flight is the difference of two simulated flights with the same random numbers, one with the platform and one without.
-Added to stretches of recorded flights far from any edge, it gives flights with known edges in air as lively as the
-real one.
+A detector that is trained on simulated flights learns the simulator's free air too. The response to a platform is the
+difference of two simulated flights with the same random numbers, one with the platform and one without. Added to
+parts of recorded flights far from any edge, it gives flights with known edges in real air.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,17 +25,17 @@ from airtouch.vehicle import Vehicle
 
 COLUMNS = (*ACC_WORLD, *GYRO, *PWM)
 RATE_HZ = 100
-SPARE = 3  #: simulated flights tried for each one wanted, at most
-BEFORE_S, BEHIND_S, FADE_S = 0.4, 2.5, 0.5  #: of a response: before the entry, after the exit, last part that dies out
-FREE_S, AWAY_S, AFTER_S = 1.5, 0.6, 1.5  #: shortest hover; gap in the recorded samples before an entry, after an exit
-SETTLED_S, EARLIEST_S = 1.0, 2.0  #: after the climb: where hover begins, and where an edge may be laid first
-HOVERS = 2  #: hovers of other flights that lengthen each flight
-JOIN_S = 0.3  #: over which two stretches are blended
+SPARE = 3  #: most flights simulated for each one returned; the rest diverged
+BEFORE_S, BEHIND_S, FADE_S = 0.4, 2.5, 0.5  #: s of a response: before the entry, after the exit, fade-out at its end
+FREE_S, AWAY_S, AFTER_S = 1.5, 0.6, 1.5  #: s: shortest hover; recorded samples left out before an entry, after an exit
+SETTLED_S, EARLIEST_S = 1.0, 2.0  #: s after the climb: start of hover, earliest added edge
+HOVERS = 2  #: hovers of other flights that are inserted into each flight
+JOIN_S = 0.3  #: s over which two parts are blended
 
 
 @dataclass(frozen=True)
 class Response:
-    """What a platform changes: values (m, 10) of COLUMNS, and the edges (samples counted from its first row)."""
+    """The response to a platform: changes (m, 10) of COLUMNS, and the edges (samples from its first row)."""
 
     values: np.ndarray
     edges: tuple[Edge, Edge]
@@ -44,7 +43,7 @@ class Response:
 
 @dataclass(frozen=True)
 class FreeAir:
-    """One recorded flight without its platform.
+    """The free air of a recorded flight, without its platform.
 
     start: (n, 10) with take-off, level from row `level` on. hover: (k, 10). end: (m, 10).
     """
@@ -59,7 +58,7 @@ def responses(scene: Scenario, vehicle: Vehicle, count: int, seed: int = 0,
               progress: Callable[[int, int], None] = lambda *_: None) -> list[Response]:
     """The first `count` responses of a scenario's flights over one platform.
 
-    Raises AirTouchError where too few flights end well.
+    Raises AirTouchError if too many flights diverge.
     """
     out: list[Response] = []
     for number in range(SPARE * count):
@@ -99,7 +98,7 @@ def _response(scene: Scenario, vehicle: Vehicle, seed: int, number: int) -> Resp
 
 
 def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:
-    """The free air of flights whose down range shows a platform; the others are left out."""
+    """The free air of each flight whose down range shows a platform; other flights are left out."""
     out = []
     for log in flights:
         try:
@@ -118,9 +117,9 @@ def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:
 
 def flights(air: Sequence[FreeAir], laid: Sequence[Response],
             seed: int = 0) -> tuple[list[FlightLog], list[list[Edge]]]:
-    """A flight for each response that fits, with its edges. Same arguments, same flights.
+    """A flight, with its edges, for each response that fits. The same arguments give the same flights.
 
-    Each is the free air of one recorded flight, lengthened by hovers of others that are moved to its own mean.
+    Each has the free air of one recorded flight, lengthened by hovers of other flights that are shifted to its mean.
     """
     rng = np.random.default_rng([seed, 77])
     out, labels = [], []
@@ -145,12 +144,12 @@ def flights(air: Sequence[FreeAir], laid: Sequence[Response],
 
 
 def _values(log: FlightLog) -> np.ndarray:
-    """(n, 10) of COLUMNS, holes held."""
+    """Values (n, 10) of COLUMNS, with gaps held."""
     return hold_finite(np.column_stack([level_acceleration(log), log.stack(GYRO), log.stack(PWM)]))[0]
 
 
 def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
-    """Stretches one after the other, each blended into the next over JOIN_S; one that is too short is left out."""
+    """The parts in sequence, each blended into the next over JOIN_S. Parts that are too short are left out."""
     n = round(JOIN_S * RATE_HZ)
     share = np.linspace(0.0, 1.0, n)[:, None]
     out = parts[0].copy()

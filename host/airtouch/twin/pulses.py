@@ -1,7 +1,7 @@
-"""Short velocity set-points that a script sends at regular times while the drone hovers, read off the motors.
+"""Periodic velocity pulses that a script sends while the drone hovers, detected in the motor commands.
 
-The authors' pilot program sent one of about 20 ms each 0.52 s in hover: a jump of the motors' pitch command and 20
-deg/s of pitch rate. Without them a simulated hover is calmer than the recorded one just where a platform's edge shows.
+The authors' program sent one of about 20 ms every 0.52 s in hover: a step of the pitch command and 20 deg/s of
+pitch rate. Without them a simulated hover is calmer than the recorded one, in the channels that show an edge.
 """
 
 import numpy as np
@@ -15,12 +15,12 @@ LEAST_PULSES = 4
 #: standard errors of the mean jump; of the authors' flights (folds 0 to 2) those with pulses have 7.5 or more, all at
 #: 0.52 s, the others 6.5 or less
 CLEAR = 7.0
-CLIP = 10.0  #: robust standard deviations: larger jumps (kicks of a set-point step) count as that
+CLIP = 10.0  #: robust standard deviations, to which larger jumps (set-point steps) are clipped
 RATE_HZ = 100.0
 
 
 def period(log: FlightLog, start: int, stop: int) -> float:
-    """Period in s of the pulses between two samples of a 100 Hz log, 0 where there are none."""
+    """Period in s of the pulses between two samples of a 100 Hz log; 0 without pulses."""
     if stop - start < LEAST_PULSES * PERIODS_S[0] * RATE_HZ:
         return 0.0
     jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ PITCH)

@@ -1,8 +1,7 @@
-"""How well a classifier tells simulated from recorded flights, phase by phase: AUROC, 0.5 where it cannot.
+"""Classifier two-sample test of simulated against recorded flights: AUROC by phase, 0.5 if they are alike.
 
-Windows of one second become numbers (levels, slopes, band powers, correlations), gradient boosting learns
-to tell the two kinds apart, and is scored on flights that it has not seen. Source: Lopez-Paz, Oquab,
-Revisiting Classifier Two-Sample Tests, 2017.
+Features of windows of one second (levels, slopes, band powers, correlations) are classified by gradient boosting,
+and scored on held-out flights. Source: Lopez-Paz, Oquab, Revisiting Classifier Two-Sample Tests, 2017.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,17 +18,17 @@ from airtouch.twin.features import PAIRS
 
 WINDOW, HOP = 100, 50  #: samples
 BANDS_HZ = ((0.5, 2.5), (2.5, 5), (5, 9), (9, 15), (15, 25), (25, 50))
-USED = ch.DOWN  #: channels that the classifier gets: all but the down range, which no detector sees either
+USED = ch.DOWN  #: number of channels that the classifier gets: all except the down range, which no detector gets
 FOLDS = 5
-STEPS = 255  #: into which the classifier divides a number, scikit-learn's most
-REPLICATES = 500  #: of the bootstrap
+STEPS = 255  #: bins of each feature, scikit-learn's maximum
+REPLICATES = 500  #: draws of the bootstrap
 LEVEL = 0.95
-FEWEST = 4  #: flights of each kind in a phase
+FEWEST = 4  #: least number of flights of each kind in a phase
 
 
 @dataclass(frozen=True)
 class Auroc:
-    """Of one phase: area under the ROC curve of unseen flights, its interval by flight, sample sizes."""
+    """AUROC of a phase on held-out flights, its interval by flight, and sample sizes."""
 
     phase: str
     value: float
@@ -38,7 +37,7 @@ class Auroc:
     real_flights: int
     simulated_flights: int
     windows: int
-    telling: tuple[str, ...]  #: the window numbers that tell most, largest first
+    telling: tuple[str, ...]  #: the features that separate best, from the best
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class Windows:
 
 
 def number_names() -> list[str]:
-    """What a window's numbers are."""
+    """Names of a window's features."""
     out = []
     for name in NAMES[:USED]:
         out += [f"{name} level", f"{name} slope"] + [f"{name} {a:g}-{b:g} Hz" for a, b in BANDS_HZ]
@@ -62,9 +61,9 @@ def number_names() -> list[str]:
 
 
 def windows(flights: Sequence[tuple[np.ndarray, Course, int]]) -> Windows:
-    """Windows of flights, each as (channels (n, 12), course, flight number).
+    """Windows of flights, each given as (channels (n, 12), course, flight number).
 
-    Levels are against the median of the flight's own free air, so that trims do not tell.
+    Levels are relative to the median in the flight's own free air, so that trims do not count.
     """
     values, phases, numbers = [], [], []
     for x, course, number in flights:
@@ -93,7 +92,7 @@ def _numbers(x: np.ndarray) -> np.ndarray:
 
 def two_sample(real: Windows, simulated: Windows, seed: int = 0,
                progress: Callable[[str], None] = lambda _: None) -> list[Auroc]:
-    """AUROC of each phase in which both sets have FEWEST flights. Same arguments, same result.
+    """AUROC of each phase in which both sets have FEWEST flights. The same arguments give the same result.
 
     Raises AirTouchError without scikit-learn.
     """
@@ -114,7 +113,7 @@ def two_sample(real: Windows, simulated: Windows, seed: int = 0,
 
 
 def area(score: np.ndarray, kind: np.ndarray) -> float:
-    """Area under the ROC curve: the share of (1, 0) pairs in which the 1 scores higher, ties half."""
+    """Area under the ROC curve: fraction of (1, 0) pairs in which the 1 scores higher; ties count half."""
     order = np.sort(score[kind == 0])
     ones = score[kind == 1]
     below = np.searchsorted(order, ones, "left") + np.searchsorted(order, ones, "right")
@@ -122,7 +121,7 @@ def area(score: np.ndarray, kind: np.ndarray) -> float:
 
 
 def area_within(score: np.ndarray, kind: np.ndarray, fold: np.ndarray) -> float:
-    """`area` over pairs of one fold: scores of models that were trained apart are not compared."""
+    """`area` over pairs within a fold, because scores of different models cannot be compared."""
     pairs, total = 0.0, 0.0
     for k in np.unique(fold):
         here = fold == k
@@ -143,9 +142,9 @@ def _boosting(seed: int) -> Any:
 
 
 def _steps(known: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """x (rows, numbers) as STEPS steps of each number's distribution in `known`: trees use no more than the order.
+    """x (rows, features) in STEPS bins of each feature's distribution in `known`; trees need the order only.
 
-    Scikit-learn would make these bins itself, but for weighted rows it takes a hundred times as long.
+    Scikit-learn's own binning takes a hundred times as long for weighted rows.
     """
     edges = np.quantile(known, np.arange(1, STEPS) / STEPS, axis=0)
     binned = [np.searchsorted(edge, column) for edge, column in zip(edges.T, x.T, strict=True)]
@@ -154,10 +153,10 @@ def _steps(known: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 def _out_of_fold(x: np.ndarray, kind: np.ndarray, flight: np.ndarray, seed: int,
                  ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
-    """(score of each window by a model that has not seen its flight, its fold, what tells most)."""
+    """Score of each window by a model trained without its flight, its fold, and the features that separate best."""
     numbers = np.random.default_rng(seed).permutation(np.unique(flight))
     kinds = {number: (kind[flight == number].min(), kind[flight == number].max()) for number in numbers}
-    ordered = sorted(numbers, key=lambda number: kinds[number])  # so that each fold has its share of both
+    ordered = sorted(numbers, key=lambda number: kinds[number])  # each fold gets flights of both kinds
     fold_of = {number: i % FOLDS for i, number in enumerate(ordered)}
     fold = np.array([fold_of[number] for number in flight])
     score, drop = np.zeros(len(x)), np.zeros(x.shape[1])
@@ -168,7 +167,7 @@ def _out_of_fold(x: np.ndarray, kind: np.ndarray, flight: np.ndarray, seed: int,
         steps = _steps(x[train], x)
         model = _boosting(seed).fit(steps[train], kind[train])
         score[test] = model.predict_proba(steps[test])[:, 1]
-    for i in range(x.shape[1]):  # which number tells most alone, of all windows
+    for i in range(x.shape[1]):  # how well each feature separates alone
         single = area(x[:, i], kind)
         drop[i] = abs(single - 0.5)
     listed = number_names()

@@ -1,11 +1,11 @@
-"""A twin beside the recorded flights in sentences and rows, for the terminal and the report alike."""
+"""Sentences and rows on the comparison of a twin with the recorded flights, for terminal and report."""
 
 from collections.abc import Sequence
 
 from airtouch.twin.compare import Gap
 from airtouch.twin.two_sample import Auroc
 
-CLOSED = 0.6  #: an AUROC below it counts as hard to tell
+CLOSED = 0.6  #: AUROC below which twin and flights count as hard to tell apart
 
 
 def answer(auroc: Sequence[Auroc]) -> str:
@@ -21,7 +21,7 @@ def answer(auroc: Sequence[Auroc]) -> str:
 
 
 def gap_row(gap: Gap) -> tuple[str, str, str, str, int]:
-    """(where, what, difference with unit, in scatters, flights) of one feature."""
+    """The row (where, what, difference with unit, difference in scatters, flights) of a feature."""
     digits = ".0f" if gap.feature.unit in ("PWM", "PWM/s") else ".2f"
     unit = "" if gap.feature.unit == "1" else f" {gap.feature.unit}"
     return (gap.feature.group, gap.feature.name, f"{gap.difference:+{digits}}{unit}", f"{gap.scatters:+.1f}",
