@@ -219,13 +219,6 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     spread = np.where(close, np.minimum(spread, COMMAND_PRIOR), spread)
     prior = np.concatenate([spread, [p for _, p in constants]])
 
-    def push(offsets: np.ndarray) -> np.ndarray:
-        """What offsets add to the spectra."""
-        out = np.zeros(len(problem.base), complex)
-        for amount, (here, column, _) in zip(offsets, problem.offsets, strict=True):
-            out[here] = amount * column
-        return out
-
     covariance = np.zeros((len(x), len(x)))
     if not mean and not constants:
         return x, offsets, covariance, problem.base
@@ -233,7 +226,9 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
     def at(x: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """What is left, the power over the floor, and minus the log of the posterior."""
         active = _active(mean, x)
-        values = (problem.values(active) if mean else problem.base) - push(offsets)
+        values = problem.values(active) if mean else problem.base.copy()
+        for amount, (here, column, _) in zip(offsets, problem.offsets, strict=True):
+            values[here] -= amount * column
         commanded, price = problem.commanded(active, wide)
         power = added + commanded
         return values, power, price + cost_of(problem, values, power, x, offsets, prior)

@@ -69,7 +69,17 @@ def newtons_per_command(row: Any) -> float:
 
 def firmware(row: Any, axis: str) -> Controller:
     """crazyflie-firmware's gains (simulation.firmware), with battery compensation where it is on."""
-    slope, loops = newtons_per_command(row), row["firmware"]["loops"]
+    return _firmware(row, axis, newtons_per_command(row))
+
+
+def firmware_of(row: Any) -> list[Controller]:
+    """`firmware` of each of AXES."""
+    slope = newtons_per_command(row)
+    return [_firmware(row, axis, slope) for axis in AXES]
+
+
+def _firmware(row: Any, axis: str, slope: float) -> Controller:
+    loops = row["firmware"]["loops"]
     release = row["firmware"]
     periods = release["periods"]
     hold, reading = 0.001 * float(periods["prediction_ms"]), 0.001 * float(periods["range_ms"])
@@ -202,10 +212,23 @@ def _difference(f: np.ndarray) -> np.ndarray:
     return 2j * np.sin(np.pi * f * PERIOD_S) / PERIOD_S
 
 
-def torque_per_command(row: Any, axis: str, f: np.ndarray) -> np.ndarray:
-    """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N."""
+def torque_per_command(row: Any, axis: str, f: np.ndarray, c: Controller | None = None) -> np.ndarray:
+    """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N. c: the firmware's by default."""
     f = np.maximum(f, 0.05)
-    return 2j * np.pi * f * loop_parts(firmware(row, axis), row, axis, f)[0]
+    return 2j * np.pi * f * _plant(firmware(row, axis) if c is None else c, row, axis, f)
+
+
+def _plant(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """Command to measured rate (climb), complex (bins,)."""
+    fixed = _fixed(c, f)
+    s = fixed.s
+    motor = _delayed(float(row["actuator_delay"]), 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
+        1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
+    lift = 4.0 * float(np.mean(row["gain"]))
+    if axis == "thrust":
+        return lift / float(row["mass"]) * motor / s
+    i = AXES.index(axis) - 1
+    return lift * _arm(row, i) / float(row["inertia"][i]) * motor / s
 
 
 def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -217,19 +240,15 @@ def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     """
     fixed = _fixed(c, f)
     s = fixed.s
-    motor = _delayed(float(row["actuator_delay"]), 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
-        1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
+    plant = _plant(c, row, axis, f)
     late = _delayed(float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
-    lift = 4.0 * float(np.mean(row["gain"]))
     renewed = fixed.renewed
     if axis == "thrust":
         k = float(row["height_gain"])
         late = late * renewed / fixed.acc
         climb = k * c.gain * (1.0 + c.integral / s) * late
         height = climb * c.angle * k * (1.0 + c.angle_integral / s) / s
-        return lift / float(row["mass"]) * motor / s, climb, height, 0.0 * s, climb + height
-    i = AXES.index(axis) - 1
-    arm = _arm(row, i)
+        return plant, climb, height, 0.0 * s, climb + height
     k = c.gain * float(row["rate_gain"])
     change = c.derivative * fixed.change
     filtered = late / fixed.lowpass / fixed.chip
@@ -238,7 +257,7 @@ def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     angle = angle * (1.0 + c.angle_integral / s)
     velocity = angle * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
     angle, velocity = angle * filtered * renewed / s, velocity * renewed * float(row["gravity"]) / s ** 2 * late
-    return (lift * arm / float(row["inertia"][i]) * motor / s, rate, angle, velocity, rate + angle + velocity)
+    return plant, rate, angle, velocity, rate + angle + velocity
 
 
 class Fixed(NamedTuple):

@@ -108,7 +108,7 @@ class Problem:
 
     def _gather(self, by_flight: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
         parts = [by_flight[i][r][chosen][:, self.keep[r]].ravel() for i, r, chosen in self.part.pieces]
-        return np.concatenate(parts).astype(complex) if parts else np.zeros(0, complex)
+        return np.concatenate(parts) if parts else np.zeros(0, complex)
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """Spectra with effects in the model, flattened."""

@@ -77,12 +77,18 @@ class Response:
         commands yet leave the loop as it is, outside: with those and outside torques, every: with all;
         change: by effects that change the loop.
         """
-        first, some, more = (x[:, :, TORQUE] for x in (nominal, driven, outside))
-        made = [np.full_like(measured, np.nan) if law is None else
-                self._rest(law, 1.0 if change is None else law.ratio(change, k), measured, first, some, more)
-                for k, law in enumerate((self.steady, self.stepped))]
+        first = nominal[:, :, TORQUE]
+        through = None if driven is nominal else driven[:, :, TORQUE] - first
+        beside = None if outside is driven else outside[:, :, TORQUE] - driven[:, :, TORQUE]
+        rest = _rest(self.steady, change, 0, measured, first, through, beside)
+        odd = np.flatnonzero(~quiet.all(axis=1))  # blocks in which a set-point stepped on some axis
+        if len(odd):
+            other = np.array(np.nan) if self.stepped is None else _rest(
+                self.stepped, change, 1, measured[odd], first[odd], None if through is None else through[odd],
+                None if beside is None else beside[odd])
+            rest[odd] = np.where(quiet[odd, None], rest[odd], other)
         out = every.copy()
-        out[:, FIRST_BIN:, TORQUE] = np.where(quiet[:, None], *made)[:, FIRST_BIN:]
+        out[:, FIRST_BIN:, TORQUE] = rest[:, FIRST_BIN:]
         return out
 
     def added(self, quiet: np.ndarray, sensed: bool) -> np.ndarray:
@@ -96,11 +102,18 @@ class Response:
         out[:, :FIRST_BIN] = 1.0
         return out
 
-    @staticmethod
-    def _rest(law: Law, ratio: np.ndarray | float, measured: np.ndarray, first: np.ndarray, some: np.ndarray,
-              more: np.ndarray) -> np.ndarray:
-        rest = measured - law.told * ratio * (measured - first)
-        return law.weight * (rest + law.changed * (some - first) + law.outside * (more - some))
+
+def _rest(law: Law, change: Change | None, which: int, measured: np.ndarray, first: np.ndarray,
+          through: np.ndarray | None, beside: np.ndarray | None) -> np.ndarray:
+    """Weighted torque (blocks, bins, 3) that a law leaves of blocks of its kind (`which`, of `Law.ratio`).
+
+    through, beside: what effects change of the model through the commands and past them; None for nothing.
+    """
+    rest = measured - law.told * (1.0 if change is None else law.ratio(change, which)) * (measured - first)
+    for share, moved in ((law.changed, through), (law.outside, beside)):
+        if moved is not None:
+            rest = rest + share * moved
+    return law.weight * rest
 
 
 def response_of(measured: Sequence[np.ndarray], left: Sequence[np.ndarray], loop: np.ndarray) -> Response | None:

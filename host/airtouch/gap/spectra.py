@@ -54,7 +54,8 @@ def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
     window = np.hanning(length + 1)[:-1]
     scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
     cut = values[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length, values.shape[1]))
-    spectrum = np.fft.rfft(cut * window[:, None], axis=1) * scale
+    spectrum = np.fft.rfft(cut * window[:, None], axis=1)
+    spectrum *= scale
     spectrum[:, 0] /= np.sqrt(2.0)
     if length % 2 == 0:
         spectrum[:, -1] /= np.sqrt(2.0)

