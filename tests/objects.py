@@ -14,11 +14,11 @@ FOLDER = Path(__file__).parents[1] / "build" / "tests"
 
 def compiled(compiler: str, flags: Sequence[str | Path], sources: Sequence[Path]) -> tuple[list[Path], str]:
     """The objects of C sources, and what the compiler said where one does not compile (then there are none)."""
-    flags = [str(flag) for flag in flags]
-    folders = [Path(flag.removeprefix("-I")) for flag in flags if flag.startswith("-I")]
+    words = [str(flag) for flag in flags]
+    folders = [Path(flag.removeprefix("-I")) for flag in words if flag.startswith("-I")]
     headers = sorted({path for folder in {*folders, *(s.parent for s in sources)} for path in folder.rglob("*.h")})
     version = subprocess.run([compiler, "--version"], capture_output=True).stdout
-    common = version + "\0".join(flags).encode() + b"".join(str(h).encode() + h.read_bytes() for h in headers)
+    common = version + "\0".join(words).encode() + b"".join(str(h).encode() + h.read_bytes() for h in headers)
     FOLDER.mkdir(parents=True, exist_ok=True)
     made = []
     with (FOLDER / "lock").open("w") as lock:
@@ -28,7 +28,7 @@ def compiled(compiler: str, flags: Sequence[str | Path], sources: Sequence[Path]
             made.append(FOLDER / f"{source.stem}-{key}.o")
             if not made[-1].exists():
                 part = made[-1].with_suffix(".part")
-                done = subprocess.run([compiler, *flags, "-c", source, "-o", part], capture_output=True, text=True)
+                done = subprocess.run([compiler, *words, "-c", source, "-o", part], capture_output=True, text=True)
                 if done.returncode:
                     return [], done.stderr
                 part.rename(made[-1])

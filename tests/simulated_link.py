@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
+from typing import Any
 
 from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.crtpstack import CRTPPacket
@@ -153,7 +154,7 @@ class SimulatedDrone(Server):
 
     def delay(self, seconds: float) -> None:
         """From now on every packet is under way for so long, there as back."""
-        always = SimpleNamespace(random=lambda: 1.0)  # as late as can be
+        always: Any = SimpleNamespace(random=lambda: 1.0)  # as late as can be
         self._up, self._down = (Line([Fault("late", amount=seconds)], always) for _ in range(2))
 
     def once_it_logs(self, action: Callable[[], None]) -> None:
@@ -183,7 +184,7 @@ class SimulatedDrone(Server):
         with self._turn:
             self.step(lambda _: None)
 
-    def send(self, packet: Packet, peer: "Link") -> None:
+    def send(self, packet: Packet, peer: Any) -> None:
         """To one of the links."""
         if not peer.closed:
             peer.inbox.put(packet)
@@ -205,7 +206,8 @@ class Link(CRTPDriver):
         self.inbox: queue.Queue[Packet] = queue.Queue()
         self.about_to_send: Callable[[], None] = lambda: None
         self.closed, self._taken = False, False
-        self._cf, self._reads = None, {}
+        self._cf: Any = None
+        self._reads: dict[threading.Thread, int] = {}
 
     @property
     def needs_resending(self) -> bool:

@@ -39,19 +39,21 @@ class Chip:
 
     def __init__(self, program: Path, *faults: str):
         self._process = subprocess.Popen([program, *faults], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._in, self._out = self._process.stdin, self._process.stdout
         self.lines: list[str] = []  #: on the console
 
     def exchange(self, records: list[bytes]) -> list[bytes]:
         """What the app sends in answer to records, and half a second later its heartbeat where it has one."""
-        self._process.stdin.write(b"".join([*records, HALF_SECOND]))
-        self._process.stdin.flush()
+        self._in.write(b"".join([*records, HALF_SECOND]))
+        self._in.flush()
         packets: list[bytes] = []
         function = -1
         while function != 0:
-            head = self._process.stdout.read(3)
+            head = self._out.read(3)
             assert len(head) == 3, f"the app has ended: {self.close()}"
             function, length = struct.unpack("<BH", head)
-            body = self._process.stdout.read(length)
+            body = self._out.read(length)
             if function == APP_FUNCTION:
                 packets.append(body)
             elif function == CONSOLE:
@@ -60,8 +62,8 @@ class Chip:
 
     def close(self) -> int:
         """Ends it: its exit status, 0 unless a sanitizer found something."""
-        self._process.stdin.close()
-        self._process.stdout.close()
+        self._in.close()
+        self._out.close()
         return self._process.wait(HANG_S)
 
 

@@ -7,6 +7,7 @@ from airtouch.gap import loop_model, measure
 from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.response import FIRST_BIN, response_of
 from airtouch.gap.spectra import AIR, blocks, frequencies, starts
+from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
 from airtouch.simulation.flight import prepare
@@ -113,13 +114,14 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
 def empirical(active: list[Active]) -> np.ndarray:
     """Angular acceleration for the torque of logged commands in simulated flights, S_yw / S_ww of roll, (bins,)."""
     vehicle, cross, power = vehicles.load("crazyflie-2.1-flow"), 0.0, 0.0
-    logs = list(batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1))
+    flown = batch.flights("diagnosis", range(8), vehicle=vehicle, effects=active, workers=1)
+    logs = [log for log in flown if isinstance(log, FlightLog)]
     for flight in measure.usable(logs, vehicle, []):
         first = starts(flight, AIR)
         turned = blocks(angular_acceleration(flight), first, AIR)[:, :, 0]
         made = turned - blocks(np.nan_to_num(residual(flight, vehicle)), first, AIR)[:, :, TORQUE.start]
         cross, power = cross + (turned * made.conj()).sum(axis=0), power + (np.abs(made) ** 2).sum(axis=0)
-    return cross / power
+    return np.asarray(cross / power)
 
 
 def test_a_late_gyro_changes_the_response_as_in_simulated_flights():

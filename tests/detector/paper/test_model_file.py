@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,7 +91,7 @@ def arrays_of(model: model_file.Model) -> dict[str, np.ndarray]:
 def test_a_wrong_array_is_named(
     model: model_file.Model, tmp_path: Path, name: str, change: Callable | None, said: str
 ) -> None:
-    arrays = arrays_of(model)
+    arrays: dict[str, Any] = dict(arrays_of(model))
     if change is None:
         del arrays[name]
     else:
