@@ -1,7 +1,7 @@
-"""What `import airtouch as at` offers: flights in, answers out, each in one call.
+"""The functions of `import airtouch as at`: read, write, detect, evaluate, simulate, diagnose, measure and adapt.
 
-Flights are given as file names, `FlightLog`s or pandas tables with the log's column names. Everything heavy is
-imported when it is first used, so `import airtouch` itself is quick.
+A flight is a file name, a `FlightLog` or a pandas table with the log's column names. Heavy modules are imported at
+their first use, so `import airtouch` is fast.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,9 +30,9 @@ DEFAULT_VEHICLE = "crazyflie-2.1-flow"
 
 
 def read(flight: "Flight") -> FlightLog:
-    """A flight log, from a file of any known format or from a pandas table; a `FlightLog` is returned as it is.
+    """The flight log in a file of any known format or in a pandas table; a `FlightLog` is returned as it is.
 
-    Raises AirTouchError with file, place and remedy.
+    Raises AirTouchError, with file, place and remedy, for a flight that cannot be read.
     """
     from airtouch import logs
 
@@ -42,14 +42,20 @@ def read(flight: "Flight") -> FlightLog:
 
 
 def write(flight: "Flight", path: str | Path, *, force: bool = False) -> None:
-    """Write a flight as the project's own CSV, gzipped or not, or Parquet, by the file's ending."""
+    """Write a flight as canonical CSV (`.csv`, `.csv.gz`) or Parquet (`.parquet`), by the ending of the name.
+
+    Raises AirTouchError for another ending and for a file that exists, without `force`.
+    """
     from airtouch import logs
 
     logs.write(read(flight), Path(path), force=force)
 
 
 def to_pandas(flight: "Flight") -> "DataFrame":
-    """The log's columns as a pandas table, one row a sample; what is known of the flight is in `attrs`."""
+    """The log's columns as a pandas table, one row for each sample, with the metadata in `attrs`.
+
+    Raises AirTouchError without the extra 'pandas'.
+    """
     pandas = _pandas()
     log = read(flight)
     table = pandas.DataFrame(dict(log.columns))
@@ -58,9 +64,9 @@ def to_pandas(flight: "Flight") -> "DataFrame":
 
 
 def from_pandas(table: "DataFrame") -> FlightLog:
-    """A flight log from a pandas table whose columns have the log's names; other columns are left out.
+    """The flight log of a pandas table. Columns with other names than the log's are left out.
 
-    Raises AirTouchError where none has.
+    Raises AirTouchError if no column has a name of the log.
     """
     names = [str(name) for name in table.columns if str(name) in COLUMNS]
     if not names:
@@ -71,10 +77,12 @@ def from_pandas(table: "DataFrame") -> FlightLog:
 
 
 def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | Path | None = None) -> "Trace":
-    """Edges felt in a flight: `.edges` (sample, kind, probability) and `.probability` (n,) of being over a platform.
+    """Detect the edges of a flight of n samples at 100 Hz.
 
-    detector: best, paper, paper-stream, baseline or an object like those of `detector.registry.Detector`; model: a
-    trained file, the shipped one for None.
+    detector: best, paper, paper-stream, baseline, or an object with the interface `detector.registry.Detector`.
+    model: file of a trained model, None for the shipped one. Returns a trace with `.edges` (sample, kind,
+    probability) and `.probability`, (n,), of being over a platform. Raises AirTouchError for a flight that lacks
+    channels or has another rate.
     """
     from airtouch.detector import registry
     from airtouch.detector.evaluation import evaluate as scoring
@@ -87,10 +95,12 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
 
 def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = "best", *,
              speed_mps: float | None = None, model: str | Path | None = None) -> dict[str, Any]:
-    """Score a detector on flights with known edges: the content of `airtouch evaluate --json`.
+    """Score a detector on flights; true edges come from their down range.
 
-    flights: files, folders (by their manifest) or logs; speed_mps: commanded speed where no manifest and no log says
-    it.
+    flights: files, folders (by their manifest) or logs. speed_mps: commanded speed, if neither manifest nor log
+    states it. model: file of a trained model, None for the shipped one. Returns the content of `airtouch evaluate
+    --json` (host/docs/scoring.md), with files that cannot be scored in `left_out`. Raises AirTouchError for a log
+    that cannot be scored, and for one with edges and without a speed.
     """
     from airtouch.detector import registry
     from airtouch.detector.evaluation import dataset
@@ -115,9 +125,10 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
 def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "Vehicle | str | Path | None" = None,
              effects: Mapping[str, Mapping[str, float]] | Sequence[tuple[str, Mapping[str, float]]] = (),
              without: Sequence[str] = (), seed: int = 0) -> list[FlightLog]:
-    """Fly a scenario and return the logs; effects: {name: {parameter: value}} to switch on. Raises AirTouchError.
+    """Simulate flights of a scenario. A flight depends on these arguments and its number only.
 
-    A flight depends on these arguments and its number alone.
+    scenario, vehicle: built-in names, .toml files or objects. effects: {name: {parameter: value}} to switch on;
+    without: names to switch off. Raises AirTouchError for an unknown name and for a flight that diverges.
     """
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
@@ -133,10 +144,11 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
 def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
              baseline: "Flight | Iterable[Flight]" = (), *, without: Iterable[str] = (),
              report: str | Path | None = None, force: bool = False) -> "Diagnosis":
-    """Name the unmodelled effect that the flights have in common, and how much of the gap it is.
+    """Find the unmodelled effect that the flights have in common, and the fraction of the gap that it explains.
 
-    vehicle: a built-in name or .toml file; the one that the first log names where left out. baseline: flights without
-    any unmodelled effect. report: HTML file to write. The result's `plain()` is the JSON of `airtouch gap diagnose`.
+    vehicle: a built-in name or .toml file; that of the first log if left out. baseline: nominal flights. without:
+    effects to exclude. report: HTML file to write. The result's `plain()` is the JSON of `airtouch gap diagnose`.
+    Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
     from airtouch.gap import diagnose as module
     from airtouch.report import gap_report
@@ -151,7 +163,7 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
 
 def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
             baseline: "Flight | Iterable[Flight]" = ()) -> "Measurement":
-    """Map where flights and the vehicle's model part, before anything is blamed for it. Arguments as `diagnose`."""
+    """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
     from airtouch.gap import measure as module
 
     logs = [read(f) for f in _several(flights)]
@@ -160,9 +172,11 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
 
 def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin: str | Path | None = None,
           speed_mps: float | None = None, seed: int = 0, hold_out: bool = True, force: bool = False) -> "Adapted":
-    """Train a detector for the drone that flew some flights and write it to `out`; the same call goes on after a stop.
+    """Train a detector for the drone of these flights, and write it to `out`. The same call continues after a stop.
 
-    twin: a folder of `airtouch twin`, the simulator as it is for None. Needs the extra 'train'.
+    twin: a folder of `airtouch twin`, None for the plain simulator. speed_mps: commanded speed, if no manifest states
+    it. hold_out: also measure the errors by cross-validation. Raises AirTouchError without the extra 'train', without
+    a flight that crosses an edge, and for an `out` that exists, without `force`.
     """
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
@@ -188,13 +202,13 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
 
 
 def _flown_speed(log: FlightLog) -> float | None:
-    """Commanded speed that a log's metadata holds (of a converted or a simulated flight), m/s."""
+    """Commanded speed, m/s, in a log's metadata (of a converted or a simulated flight); None without one."""
     drawn = log.meta.get("condition")
     return log.meta.get("speed_mps") or (drawn.get("speed") if isinstance(drawn, Mapping) else None)
 
 
 def _several(flights: Any) -> list[Any]:
-    """One flight or many as a list."""
+    """One flight or several as a list."""
     one = isinstance(flights, (str, Path, FlightLog)) or hasattr(flights, "columns")
     return [flights] if one else list(flights)
 

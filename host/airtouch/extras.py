@@ -1,4 +1,4 @@
-"""What is not in the base install, told at once and by the command that installs it."""
+"""Optional dependencies. A missing one is reported before any work, with the command that installs it."""
 
 from importlib.util import find_spec
 
@@ -12,7 +12,7 @@ EXTRAS = {"plots": ("matplotlib",), "train": ("tensorflow", "keras", "sklearn", 
 
 
 def need(extra: str, purpose: str) -> None:
-    """Raise AirTouchError, before any work, where a module of the extra is missing; purpose: what it is wanted for."""
+    """Raise AirTouchError, with the pip command, if a module of the extra is missing; purpose: who needs it."""
     missing = lacking(extra)
     if missing:
         raise AirTouchError(f"{purpose} needs {', '.join(missing)}: pip install 'airtouch[{extra}]'")
@@ -26,5 +26,5 @@ def lacking(extra: str) -> list[str]:
 def _there(name: str) -> bool:
     try:
         return find_spec(name) is not None
-    except (ModuleNotFoundError, ValueError):  # its loader is missing, or it stands as None in sys.modules
+    except (ModuleNotFoundError, ValueError):  # its loader is missing, or sys.modules has None for it
         return False

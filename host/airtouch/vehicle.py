@@ -14,11 +14,11 @@ from airtouch.errors import AirTouchError
 
 @dataclass(frozen=True)
 class Vehicle:
-    """What is declared about a nominal vehicle; SI units in the names.
+    """The declared parameters of a nominal vehicle, with SI units in the names.
 
     thrust_of_pwm_n: (c0, c1, c2), newtons per motor, c0 + c1 p + c2 p^2 for PWM p > 0.
-    nominal_voltage_v: battery voltage at which that curve holds; None where unknown.
-    Fields with a default are for the simulator and may be left out of a file; 0 in
+    nominal_voltage_v: battery voltage at which that curve holds; None if unknown.
+    Fields with a default are for the simulator and may be left out of a file. 0 in
     thrust_per_speed2, thrust_base_pwm and motor_fall_time_constant_s means "derive it".
     """
 
@@ -39,21 +39,21 @@ class Vehicle:
     voltage_exponent: float = 2.0  #: thrust at a PWM grows with (V / nominal V) to this power
     thrust_per_speed2: float = 0.0  #: N/(rad/s)^2 of one rotor
     rotor_inertia_kg_m2: float = 0.0  #: rotor and propeller
-    motor_fall_time_constant_s: float = 0.0  #: of a rotor slowing down
+    motor_fall_time_constant_s: float = 0.0  #: time constant of a rotor that slows down
     battery_cells: float = 1.0
     battery_capacity_ah: float = 0.25
     battery_resistance_ohm: float = 0.12
     power_per_thrust15: float = 85.0  #: electrical power over thrust^1.5 of one rotor, W/N^1.5
-    acc_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)  #: noise of each axis over the rms above
+    acc_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)  #: noise of each axis relative to the rms above
     gyro_noise_ratio: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    range_drift_rms: float = 0.0  #: error of the down range that comes and goes, over the distance
+    range_drift_rms: float = 0.0  #: rms of the down range's drift, as a fraction of the distance
     range_drift_time_s: float = 0.5  #: its correlation time
-    gyro_bandwidth_hz: float = 116.0  #: of the gyro chip, its noise included; 0: all
-    flow_noise_mps: tuple[float, float] = (0.02, 0.02)  #: error of optical flow forward, left at 1 m
+    gyro_bandwidth_hz: float = 116.0  #: bandwidth of the gyro chip and its noise; 0: no limit
+    flow_noise_mps: tuple[float, float] = (0.02, 0.02)  #: rms of the optical flow, forward and left, at 1 m
     flow_noise_time_s: float = 0.05  #: its correlation time
-    acc_lowpass_hz: float = 0.0  #: of the logged accelerometer; 0: none
+    acc_lowpass_hz: float = 0.0  #: corner of the logged accelerometer's low-pass; 0: none
     thrust_base_pwm: float = 0.0  #: feed-forward of the height controller
-    arm_pwm: float = 15000.0  #: the app takes it to be airborne while the mean PWM is above this
+    arm_pwm: float = 15000.0  #: mean PWM above which the app takes the vehicle to be in the air
     firmware: str = "2026.08"  #: release that flies: a file of simulation/firmwares, or a path to one
     range_module: str = "map"  #: platform, map, none, or firmware: what the release has
     platform: str = ""  #: platform of crazyflie-firmware that flies it (cf2, cf21bl, bolt); "" where unknown
@@ -65,16 +65,16 @@ class Vehicle:
         return np.where(pwm > 0, c0 + c1 * pwm + c2 * pwm * pwm, 0.0)
 
 
-TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are no number
-#: fields of so many numbers
+TEXTS = ("name", "platform", "firmware", "range_module")  #: fields that are texts
+#: field -> length, of fields that are lists of numbers
 LISTS = {"inertia_kg_m2": 3, "thrust_of_pwm_n": 3, "acc_noise_ratio": 3, "gyro_noise_ratio": 3, "flow_noise_mps": 2}
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
 def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
-    """A built-in vehicle by name, or a TOML file by path.
+    """A built-in vehicle by name, or the vehicle in a TOML file.
 
-    Raises AirTouchError that names the file and the missing or unknown key.
+    Raises AirTouchError with the file and the missing or unknown key.
     """
     path = Path(name_or_path)
     if path.suffix == ".toml":
@@ -92,7 +92,7 @@ def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
 
 
 def parse(text: str, source: str) -> Vehicle:
-    """A vehicle from TOML text; `source` names it in messages."""
+    """The vehicle in a TOML text. `source` is its name in messages. Raises AirTouchError as `load` does."""
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -110,9 +110,9 @@ def parse(text: str, source: str) -> Vehicle:
 
 
 def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Fields of a vehicle from a TOML table, as `Vehicle` takes them.
+    """The fields of a vehicle in a TOML table, as keywords of `Vehicle`.
 
-    Raises AirTouchError for a wrong name or value.
+    Raises AirTouchError for an unknown name and a wrong value.
     """
     fields = Vehicle.__dataclass_fields__
     unknown = sorted(set(table) - set(fields))
@@ -138,7 +138,7 @@ def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def check_firmware(firmware: str, range_module: str, source: str) -> None:
-    """Raise AirTouchError for a firmware or a range module that nobody knows; `source` names the file."""
+    """Raise AirTouchError for an unknown firmware or range module. `source` is the file's name in messages."""
     from airtouch.simulation.firmware import settings
 
     if range_module not in RANGE_MODULES:
