@@ -161,6 +161,7 @@ def test_halves_share_no_block_and_leave_none_out():
     many = Data(FLOOR, [made(k) for k in range(5)], slow=True)
     first, second = ({i for i, _, chosen in part.pieces if chosen.all()} for part in judging.halves(many))
     assert (first, second) == ({0, 2, 4}, {1, 3})
+    assert all(chosen.dtype == bool for part in judging.halves(many) for _, _, chosen in part.pieces)
     assert {r for _, r, _ in judging.halves(few)[0].pieces} == {AIR}
 
 

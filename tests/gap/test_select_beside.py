@@ -103,3 +103,68 @@ def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
         assert judged.strength[i] == tried.strength[i] and judged.variance[i] == tried.variance[i]
         assert np.isinf(np.delete(tried.variance, i)).all() and not np.delete(tried.strength, i).any()
     assert judged.gain < judging.FIRST_GAIN, "a nominal flight"
+
+
+PWM = 40000.0  #: of the made hovers
+LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
+
+
+def one_motor_weak(rotor, louder=1.0):
+    """A hover in which one rotor has lost a five hundredth of its lift: what is missing turns the vehicle, by hand."""
+    front, left, yaw = {1: (1, -1, 1), 2: (-1, -1, -1), 3: (-1, 1, 1), 4: (1, 1, -1)}[rotor]  # 1, 3 turn to the left
+    lost_n = 0.002 * LIFT_N
+    one = made(11, (0.0, 0.0, -lost_n / VEHICLE.mass_kg), louder, length_s=20.0)
+    arm = VEHICLE.arm_m / np.sqrt(2.0)  # it sinks on that side: x to the front, y to the left, z up
+    torque = lost_n * np.array([-left * arm, front * arm, yaw * VEHICLE.yaw_torque_over_thrust_m])
+    turning = torque / np.array(VEHICLE.inertia_kg_m2)
+    return replace(one, rates=one.rates + np.arange(len(one))[:, None] * 0.01 * turning)
+
+
+@pytest.mark.parametrize("rotor", [1, 2, 3, 4])
+def test_the_rotor_that_is_weak_is_the_one_whose_side_sinks(rotor):
+    selection, _ = found([one_motor_weak(rotor)], ("weak_motor",))
+    (step,) = selection.steps
+    assert step.terms[0].values["rotor"] == rotor
+    assert step.terms[0].values["thrust_loss"] == pytest.approx(0.002, rel=0.1)
+
+
+def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant():
+    selection, data = found([one_motor_weak(2, louder=2.0)], ("weak_motor", "imu_noise"))
+    added = {s.name: s.share for s in selection.named}
+    assert set(added) == {"weak_motor", "imu_noise"}
+    of = {t.name: t for t in selection.whole.terms}
+    assert selection.whole.gain == pytest.approx(own_gain(data, selection.whole.terms) - np.log(4.0), abs=0.3)
+    assert added["weak_motor"] == pytest.approx(selection.whole.gain - own_gain(data, [of["imu_noise"]]), abs=0.3)
+    rotor_alone = own_gain(data, [of["weak_motor"]]) - np.log(4.0)
+    assert added["imu_noise"] == pytest.approx(selection.whole.gain - rotor_alone, abs=0.3)
+
+
+def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
+    """Four flights of the same mean push: alike, or 1.0 and 0.4 m/s^2 in turns."""
+    def pushed(*amounts):
+        return [made(20 + k, (0.0, 0.0, -a), length_s=10.0) for k, a in enumerate(amounts)]
+
+    alike, apart = pushed(0.7, 0.7, 0.7, 0.7), pushed(1.0, 0.4, 1.0, 0.4)
+    (sure,), (doubted,) = (found(f, ("imu_bias",))[0].steps for f in (alike, apart))
+    unit = 0.1  # m/s^2, the parameter's step
+    assert doubted.strength[2] == pytest.approx(sure.strength[2], rel=0.02) == pytest.approx(-0.7 / unit, rel=0.02)
+    # the mean of two values that lie 0.6 apart
+    assert doubted.variance[2] == pytest.approx((0.6 / unit) ** 2 / 4.0, rel=0.05)
+    assert sure.variance[2] < 0.01 * doubted.variance[2]
+
+    (mass,) = found(alike, ("mass",))[0].steps
+    usual = scattered(mass=[abs(mass.strength[0]) / 20.0])
+    (named,), (deviation,) = (found(f, ("mass",), usual)[0].steps for f in (alike, apart))
+    # Student's density of 8 degrees of freedom, 20 deviations out; the other counts from the near end of its interval
+    assert named.evidence == pytest.approx(4.5 * np.log1p(20.0 ** 2 / 8.0), rel=0.05) and named.named
+    strong, weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (1.0, 0.4, 0.7))  # shares of the mass
+    near = 20.0 * (0.5 * (strong + weak) - 1.645 * 0.5 * (strong - weak)) / between
+    assert deviation.evidence == pytest.approx(4.5 * np.log1p(near ** 2 / 8.0), rel=0.1) and not deviation.named
+    assert deviation.gain > judging.LEAST_GAIN
+
+
+def test_a_ground_effect_that_shakes_is_found_with_its_random_part(flying):
+    shaking = {"ground_effect": {"strength": 0.8, "fade": 0.0875, "turbulence": 1.0}}
+    selection, _ = found(flown(1, 12, shaking), ("ground_effect", "mass"), flying)
+    first = selection.steps[0]
+    assert first.name == "ground_effect" and first.terms[0].values["strength"] == pytest.approx(0.8, rel=0.35)
