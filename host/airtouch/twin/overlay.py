@@ -90,7 +90,7 @@ def _response(scene: Scenario, vehicle: Vehicle, seed: int, number: int) -> Resp
         return None
     first = max(edges[0].sample - round(BEFORE_S * RATE_HZ), 0)
     last = min(edges[1].sample + round(BEHIND_S * RATE_HZ), len(over))
-    values = (_values(over) - _values(beside))[first:last]
+    values = (values_of(over) - values_of(beside))[first:last]
     fade = min(round(FADE_S * RATE_HZ), len(values))
     values[-fade:] *= np.linspace(1.0, 0.0, fade)[:, None]
     entry, leave = (replace(e, sample=e.sample - first) for e in edges)
@@ -103,7 +103,7 @@ def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:
     for log in flights:
         try:
             log.require(*GYRO, *PWM)
-            flown, values = course(log, 0.3), _values(log)
+            flown, values = course(log, 0.3), values_of(log)
         except AirTouchError:
             continue
         before = flown.entry - round(AWAY_S * RATE_HZ)
@@ -143,8 +143,8 @@ def flights(air: Sequence[FreeAir], laid: Sequence[Response],
     return out, labels
 
 
-def _values(log: FlightLog) -> np.ndarray:
-    """Values (n, 10) of COLUMNS, with gaps held."""
+def values_of(log: FlightLog) -> np.ndarray:
+    """Values (n, 10) of COLUMNS, with gaps held; AirTouchError where a column is missing."""
     return hold_finite(np.column_stack([level_acceleration(log), log.stack(GYRO), log.stack(PWM)]))[0]
 
 
