@@ -226,7 +226,7 @@ def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def runs_sparse(layer: Int8Layer) -> bool:
     """Whether blocks of four (five bytes each, two an output for their count) take less room."""
-    if not layer.weighted or layer.weights[0].size % 4:
+    if not layer.weighted or f"sparse_{layer.kind}" not in KINDS or layer.weights[0].size % 4:
         return False
     _, counts, skips = sparse_blocks(layer.weights)
     return 5 * len(skips) + 2 * len(counts) < layer.weights.size

@@ -38,7 +38,7 @@ class StreamLayer:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """(taps, inputs, outputs): the shape of its float kernel."""
+        """(taps, inputs, outputs): the shape of a kernel that has a weight for each of them."""
         return self.taps, self.inputs, self.outputs
 
 

@@ -5,6 +5,7 @@ Arrays: "<layer>.kernel" and "<layer>.bias" float32; "int8.<layer>.weights", ".b
 """
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
@@ -131,10 +132,11 @@ def parse(data: bytes, source: str) -> BestModel:
     arrays, metadata = archive.parse(data, source)
     archive.check_kind(metadata, KIND, source)
     recipe = _recipe(metadata.pop("recipe", None), source)
-    shapes: dict[str, tuple[type, tuple[int, ...]]] = {
-        name: (np.float32, shape) for name, shape in weight_shapes(recipe.graph).items()}
+    floats = weight_shapes(recipe.graph)
+    shapes: dict[str, tuple[type, tuple[int, ...]]] = {name: (np.float32, shape) for name, shape in floats.items()}
     for layer in recipe.graph:
-        sizes = {"weights": (layer.outputs, layer.taps * layer.inputs), "bias": (layer.outputs,),
+        weights = math.prod(floats[f"{layer.name}.kernel"]) // layer.outputs
+        sizes = {"weights": (layer.outputs, weights), "bias": (layer.outputs,),
                  "weight_scale": (layer.outputs,),
                  "scale": (2,), "zero_point": (2,)}
         shapes |= {f"int8.{layer.name}.{part}": (_INT8[part], size) for part, size in sizes.items()}
@@ -148,7 +150,7 @@ def parse(data: bytes, source: str) -> BestModel:
             raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
     int8 = network_of(layers, recipe)
     archive.check_range(int8.layers, source)
-    model = BestModel(recipe, {name: arrays[name] for name in weight_shapes(recipe.graph)}, int8,
+    model = BestModel(recipe, {name: arrays[name] for name in floats}, int8,
                         arrays["tflite"].tobytes(), metadata)
     _check_metadata(model, source)
     return model

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     import keras
 
 Graph = Sequence[StreamLayer]
-Weights = Mapping[str, np.ndarray]  #: "<layer>.kernel" (taps, inputs, outputs) and "<layer>.bias" (outputs,), float32
+Weights = Mapping[str, np.ndarray]  #: "<layer>.kernel" and "<layer>.bias" by `weight_shapes`, float32
 #: names of a layer's arrays, in the order of Keras' variables
 PARTS = ("kernel", "bias")
 
 
 def weight_shapes(graph: Graph) -> dict[str, tuple[int, ...]]:
-    """Name and shape of each float array: kernels (taps, inputs, outputs), then biases (outputs,)."""
-    return {f"{layer.name}.kernel": layer.shape for layer in graph} | {
-        f"{layer.name}.bias": layer.shape[-1:] for layer in graph}
+    """Name and shape of each float array: kernels as their operation has them, then biases (outputs,)."""
+    return {f"{layer.name}.kernel": OPERATIONS[layer.operation].kernel_shape(layer) for layer in graph} | {
+        f"{layer.name}.bias": (layer.outputs,) for layer in graph}
 
 
 def weight_names(graph: Graph) -> list[str]:

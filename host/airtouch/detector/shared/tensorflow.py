@@ -54,16 +54,16 @@ def read_weighted(content: bytes) -> list[dict[str, np.ndarray]]:
     model = schema.ModelT.InitFromObj(schema.Model.GetRootAs(content, 0))
     graph = model.subgraphs[0]
     layers = []
-    weighted = (schema.BuiltinOperator.CONV_2D, schema.BuiltinOperator.FULLY_CONNECTED)
     for op in graph.operators:
-        if model.operatorCodes[op.opcodeIndex].builtinCode not in weighted:
+        constant = [model.buffers[graph.tensors[i].buffer].data is not None for i in op.inputs]
+        if constant != [False, True, True]:  # input, kernel, bias
             continue
         tensors = [graph.tensors[i] for i in (*op.inputs, op.outputs[0])]
         kernel, bias = tensors[1], model.buffers[tensors[2].buffer].data
         around = [tensors[0].quantization, tensors[3].quantization]
         values = np.array(model.buffers[kernel.buffer].data, dtype=np.uint8).view(np.int8)
         layers.append({
-            "weights": values.reshape(kernel.shape),
+            "weights": np.moveaxis(values.reshape(kernel.shape), kernel.quantization.quantizedDimension, 0),
             "bias": np.frombuffer(bytes(bias), dtype="<i4").copy(),
             "weight_scale": np.broadcast_to(np.asarray(kernel.quantization.scale, dtype=np.float32),
                                             (len(bias) // 4,)).copy(),
