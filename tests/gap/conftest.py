@@ -4,9 +4,10 @@ import pytest
 
 from airtouch.gap import calibrate
 from gap_flights import VEHICLE, flown
+from shared_fixture import once
 
 
 @pytest.fixture(scope="session")
-def study():
+def study(tmp_path_factory):
     """A vehicle calibrated on five nominal flights."""
-    return calibrate.calibrated(VEHICLE, flown(5, 41))[0]
+    return once(tmp_path_factory, "study", lambda: calibrate.calibrated(VEHICLE, flown(5, 41))[0])
