@@ -117,6 +117,12 @@ def test_files_and_names_that_a_page_sends_to_are_there(name):
             assert re.search(rf"^(def |class |)?{wanted}\b|^[A-Z_, ]*\b{wanted}\b.* = ", source, re.M), (path, wanted)
 
 
+def test_every_file_of_the_diagnosis_is_named_by_a_decision():
+    text = (DOCS / "architecture.md").read_text("utf-8")
+    modules = [path.name for path in (ROOT / "host/airtouch/gap").glob("*.py") if path.name != "__init__.py"]
+    assert len(modules) > 40 and [name for name in modules if f"`gap/{name}`" not in text] == []
+
+
 @pytest.mark.parametrize("name", MAPS[1:])
 def test_a_task_has_at_most_five_files_to_open_and_shows_a_command(name):
     text = (DOCS / f"{name}.md").read_text("utf-8")
