@@ -7,7 +7,7 @@ import numpy as np
 from airtouch import vehicle as vehicles
 from airtouch.gap.channels import residual
 from airtouch.gap.data import Study
-from airtouch.gap.flight import PERIOD_S, Flight, ready
+from airtouch.gap.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.spectra import Floor
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import KINDS
@@ -22,15 +22,16 @@ def study(vehicle=VEHICLE):
     return Study(vehicle, (), None, Floor({}, {}, np.zeros(13), 0.0, 0.0))
 
 
-def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=None):
-    """A hover whose gap is `force` (n, 3) m/s^2; gyro: (n, 3) rad/s on top of none."""
+def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=None, resting_s=0.0):
+    """A hover whose gap is `force` (n, 3) m/s^2; gyro: (n, 3) rad/s on top of none; resting_s: on the ground before."""
     n = round(seconds / PERIOD_S)
-    pwm = np.full((n, 4), 40000.0)
+    resting = np.arange(n) * PERIOD_S < resting_s
+    pwm = np.where(resting[:, None], 0.0, np.full((n, 4), 40000.0))
     log = FlightLog({"t_s": np.arange(n) * PERIOD_S, **{f"m{i}_pwm": pwm[:, i - 1] for i in range(1, 5)}},
                     {"source": name})
     made = Flight(
         name, log, replay.signals_of(log, VEHICLE), np.zeros((n, 3)), np.zeros((n, 3)) + gyro, pwm,
-        np.tile(np.eye(3), (n, 1, 1)), np.broadcast_to(np.int8(phase), n).copy(), np.ones(n, bool),
+        np.tile(np.eye(3), (n, 1, 1)), np.where(resting, GROUND, phase).astype(np.int8), np.ones(n, bool),
         np.zeros(n), np.zeros(n, bool) if lost is None else lost, np.zeros(n, bool))
     return replace(made, acceleration=force - residual(made, VEHICLE)[:, :3])
 

@@ -7,11 +7,17 @@ import pytest
 
 from airtouch.gap import judging
 from airtouch.gap.candidates import every
+from airtouch.gap.channels import COUNT
 from airtouch.gap.clock import clock_gain
 from airtouch.gap.data import Data
+from airtouch.gap.fit import judge
 from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.select import MOST_EFFECTS, seconds
-from airtouch.gap.spectra import AIR
+from airtouch.gap.nominal_scatter import Scatter
+from airtouch.gap.problem import GROUPS, Part
+from airtouch.gap.select import MOST_EFFECTS, contradicted, losses, seconds
+from airtouch.gap.selection import Judged, probabilities
+from airtouch.gap.spectra import AIR, REST
+from airtouch.gap.unexplained import fails
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, chosen, found, made, own_gain, scattered
 
@@ -186,3 +192,62 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
     assert both.choice == 0.75 and [t.name for t in both.terms] == ["mass", "weak_motor"]
     gain = own_gain(data, [*again.terms, *motor], [np.append(f.scaled, 0.0) for f in again.fits])
     assert both.gain == pytest.approx(gain - 0.75, abs=0.1)
+
+
+def simulated(**rms):
+    """A study of flights that come from the models which effects are fitted with."""
+    return replace(FLOOR, scatter=Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0), exact=True))
+
+
+def pushed_in_the_air_alone(seed):
+    """At rest for 4 s, then 26 s of hover in which something pushes."""
+    push = np.where(np.arange(3000)[:, None] < 400, 0.0, [0.0, 0.0, -DOWN])
+    return made(seed, push, resting_s=4.0)
+
+
+def test_an_effect_that_says_what_the_flights_do_not_show_is_contradicted_there():
+    """A bias of the accelerometer would stand at rest as well, and a push does not: its loss there is known."""
+    selection, data = found([pushed_in_the_air_alone(7)], ("imu_bias",), scattered(imu_bias=[1e-3] * 6))
+    (step,) = selection.steps
+    on = judging.trial_of(data)
+    lost, worst = contradicted(on, selection.chosen)
+    assert step.name == "imu_bias" and "force_z" in worst and "at rest" in worst
+    resting = [Part(tuple(p for p in part.pieces if p[1] == REST)) for part in on.parts]
+    by_hand = sum(judge(data, resting[test], ()) - judge(data, resting[test], step.fits[train].terms)
+                  for train, test in ((0, 1), (1, 0)))
+    assert lost == pytest.approx(by_hand, rel=0.1) and lost > 30.0
+    assert selection.contradicted == (0.0, ""), "recorded flights are not asked"
+    weaker = replace(step, gain=100.0)
+    exact = replace(selection, simulated=True, nominal=6, contradicted=(lost, worst), steps=(weaker,), free_after=1.0)
+    assert exact.unlike == pytest.approx(lost / 12.0), "twelve nats may be chance"
+    assert not exact.explained and probabilities(exact)["unknown"] > 0.5
+    assert fails(exact, selection.singles["imu_bias"]).startswith(f"it loses {lost:.0f} nats where") \
+        and worst in fails(exact, selection.singles["imu_bias"])
+
+
+def test_a_right_effect_is_not_contradicted():
+    selection, data = found([pushed_in_the_air_alone(7)], ("mass", "thrust_coefficient"), scattered(mass=[1e-3]))
+    assert contradicted(judging.trial_of(data), selection.chosen)[0] < 2.0 < 100.0 < selection.chosen.gain
+
+
+def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gains():
+    gains = np.zeros(GROUPS)
+    lift, forward, at_rest = 2, 0, 1000
+    gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
+    gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
+    gains[at_rest + forward] = -8.0
+    lost = losses(gains)
+    assert lost[lift] == pytest.approx(30.0 - 1.0 - 0.2 * 100.0)
+    assert lost[forward] == pytest.approx(0.0 + 4.0 + 2.0) and lost[at_rest + forward] == pytest.approx(7.0)
+    assert np.count_nonzero(lost) == 3
+
+
+def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
+    exact, usual = (found([made(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
+    recorded, _ = found([made(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
+    assert recorded.free_before < 12.0 and exact.free_before > usual.free_before + 100.0
+    many = replace(exact, nominal=6, steps=(Judged("mass", (), 1000.0),))
+    assert many.allowed == replace(many, assumed=True).allowed == pytest.approx(0.1 * 1000.0)
+    assert replace(many, simulated=False, assumed=True).allowed == pytest.approx(0.2 * 1000.0)
+    few = replace(many, steps=(), usual=20.0)
+    assert few.allowed == pytest.approx(12.0) and replace(few, simulated=False).allowed == pytest.approx(20.0)

@@ -80,6 +80,8 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     if scatter:
         study = replace(study, scatter=scatter_of([apparent(Data(study, [f]), without) for f in _some(flights)],
                                                     any(_recorded(f) for f in flights), vehicle.name))
+        if study.simulated:  # where every flight has the same trim: chance is in the lowest bin already
+            study = replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)))
 

@@ -155,12 +155,13 @@ def _verdict(selection: Selection, gap: Shrink, simulated: bool) -> str:
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
     in both halves of the data, in whose common part the gap is measured. simulated: the flights are a simulator's;
-    there a flight calmer than nominal ones, which the effects named bring to the floor, has them; a recorded one had
-    calm air.
+    there a flight calmer than nominal ones, which the effects named bring to the floor, has them, and no nominal flight
+    has odd times; a recorded one had calm air or a poor link.
     """
     calmed = simulated and abs(gap.after - AT_FLOOR) < CALMED * abs(gap.before - AT_FLOOR)
+    odd_times = simulated and selection.of_times > selection.allowed
     apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if gap.before <= AT_FLOOR and not (apart or calmed):
+    if gap.before <= AT_FLOOR and not (apart or calmed or odd_times):
         return "none"
     if not selection.explained:
         return "unknown"

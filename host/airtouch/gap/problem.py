@@ -16,7 +16,7 @@ from scipy.special import exp1
 
 from airtouch.gap import random_effects
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
-from airtouch.gap.channels import COMMAND, COUNT, TORQUE
+from airtouch.gap.channels import CHANNELS, COMMAND, COUNT, TORQUE
 from airtouch.gap.data import Data, spectra
 from airtouch.gap.response import FIRST_BIN
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
@@ -28,6 +28,7 @@ OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to fl
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
+REST_VIEW, TWIN_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
 GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
 FREEDOM = 12.0  #: of the Student-like tail at most
 
@@ -97,9 +98,9 @@ class Problem:
         groups = []
         for _, regime, chosen in self.part.pieces:
             band = np.digitize(frequencies(regime), BANDS_HZ) - 1
-            table = band[:, None] * COUNT + np.arange(COUNT) + (1000 if regime == REST else 0)
+            table = band[:, None] * COUNT + np.arange(COUNT) + (1000 * REST_VIEW if regime == REST else 0)
             groups.append(np.tile(table[self.keep[regime]], int(chosen.sum())))
-        twin = np.digitize(self.twin.frequency, BANDS_HZ) * COUNT + self.twin.channel + 2000 \
+        twin = np.digitize(self.twin.frequency, BANDS_HZ) * COUNT + self.twin.channel + 1000 * TWIN_VIEW \
             if len(self.twin) else np.zeros(0)
         return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
 
@@ -205,6 +206,14 @@ class Problem:
         power = self.power + added
         tails = (self.freedom + 1.0) * np.log1p(size / power / self.tail)
         return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + tails), 0.0)
+
+
+def cell_words(group: int) -> str:
+    """The cell of a number of `Problem.groups`, in words: channel, band, and whether at rest."""
+    view, place = divmod(group, 1000)
+    band, channel = divmod(place, COUNT)
+    low, high = BANDS_HZ[max(band - (view == TWIN_VIEW), 0):][:2]
+    return f"{CHANNELS[channel].name} at {low:g} to {min(high, 50.0):g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
 def tail(freedom: np.ndarray) -> np.ndarray:

@@ -29,14 +29,15 @@ from airtouch.gap.judging import (
     strength_of,
     trial_of,
 )
-from airtouch.gap.problem import GROUPS
-from airtouch.gap.selection import TEMPERATURE, UNKNOWN_GAIN, Hypothesis, Judged, Selection
+from airtouch.gap.problem import GROUPS, cell_words
+from airtouch.gap.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1  #: and in others: no model of air is exact
 LOOP_SHARE = 0.25  #: the same of what changes the loop, beside another that does or shakes it: its model is no better
 RANDOM_SHARE = 0.25  #: the same of what is random, to be named: what the model of another is wrong by looks random
 CERTAIN = 20.0  #: evidence beyond which more says no more
+CHANCE_LOSS = 1.0  #: log likelihood that a right effect may lose in a cell by chance
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
 WORTH_AGAIN = 0.25  #: of what the first effect must gain; candidates below it are not judged again beside a deviation
@@ -59,8 +60,9 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     before = nameless(on, None)
     after = nameless(on, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
-    return Selection(singles, tuple(steps), before, after, on.parts, least, data.study.nominal, _assumes(data, last),
-                     _usual(data))
+    found = Selection(singles, tuple(steps), before, after, on.parts, least, data.study.nominal, _assumes(data, last),
+                      _usual(data), data.study.simulated, clock_left(data, [t.name for t in last]))
+    return replace(found, contradicted=contradicted(on, found.chosen)) if found.simulated else found
 
 
 def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: Mapping[str, Judged],
@@ -237,3 +239,30 @@ def _best_of(judged: Mapping[str, Judged]) -> Judged | None:
     """
     return max((j for j in judged.values() if j.full), default=None,
                key=lambda j: j.gain / TEMPERATURE + min(j.evidence, CERTAIN))
+
+
+def contradicted(on: Trial, chosen: Judged | None) -> tuple[float, str]:
+    """Held-out log likelihood that effects lose where they say what the flights do not show, and the worst cell."""
+    if chosen is None or not chosen.fits:
+        return 0.0, ""
+    gains = np.sum([cell_gains(on.data, on.parts[test], chosen.fits[train].terms) for train, test in ROUND_TRIP],
+                   axis=0)
+    lost = losses(gains)
+    return float(lost.sum()), cell_words(int(np.argmin(np.where(lost[_channel()] > 0.0, gains, np.inf))))
+
+
+def losses(gains: np.ndarray) -> np.ndarray:
+    """Log likelihood (GROUPS,) that each channel of each view loses beyond chance, from the gains (GROUPS,) of cells.
+
+    Where a hypothesis is right, the likelihood ratio of none over it has the mean 1 in every cell, so that a loss
+    beyond x nats has a chance of at most exp(-x) (Markov): one of CHANCE_LOSS is none. In a channel that it explains,
+    its detail may be wrong by a share of that.
+    """
+    lost = np.bincount(_channel(), np.maximum(-gains - CHANCE_LOSS, 0.0), GROUPS)
+    return np.maximum(lost - UNKNOWN_ASSUMED * np.bincount(_channel(), np.maximum(gains, 0.0), GROUPS), 0.0)
+
+
+def _channel() -> np.ndarray:
+    """A number (GROUPS,) of the channel and view that each cell belongs to."""
+    cell = np.arange(GROUPS)
+    return cell - cell % 1000 + cell % 1000 % COUNT

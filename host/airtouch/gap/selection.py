@@ -11,8 +11,9 @@ from airtouch.gap.problem import Part
 
 #: gain of a nameless model over the effects named, for `unknown`, where many nominal flights gave the floor, and else
 UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
-#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or
-UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2  #: changes the loop, since its spectrum is assumed, not measured
+#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
+#: the loop in recorded flights, since its spectrum is assumed, not measured
+UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
 BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
 BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
@@ -51,7 +52,9 @@ class Judged:
 class Selection:
     """singles: the best variant of every candidate; steps: effects added one after another;
 
-    free_before, free_after: gain of the nameless model over no effect and over the last step;
+    free_before, free_after: gain of the nameless model over no effect and over the last step; of_times: of the
+    latter, what the logged times hold; contradicted: log likelihood that the effects named lose in cells where they
+    say what the flights do not show, and the worst of these cells;
     parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
     assumed: whether a chosen effect is random or changes the loop.
     """
@@ -65,6 +68,9 @@ class Selection:
     nominal: int
     assumed: bool
     usual: float  #: log likelihood that a nameless model gains in nominal flights as long as these
+    simulated: bool = False  #: whether the flights come from the models that effects are fitted with
+    of_times: float = 0.0
+    contradicted: tuple[float, str] = (0.0, "")
 
     @property
     def whole(self) -> Judged | None:
@@ -92,18 +98,30 @@ class Selection:
     def allowed(self) -> float:
         """Log likelihood that a nameless model may gain on top of the effects named where they are right.
 
-        The fewer nominal flights there are, the farther off may another one lie.
+        The fewer nominal flights there are, the farther off may another one lie; of a simulator's the table knows many.
         """
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
-        share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
         gained = self.whole.gain if self.whole else 0.0
+        if self.simulated:
+            return max(UNKNOWN_GAIN, UNKNOWN_SHARE * gained)
+        share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
         return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * gained, self.usual)
 
     @property
+    def unlike(self) -> float:
+        """How much speaks against the effects named, of what may: what is left, or what they lose; 1 is the limit."""
+        return max(float(np.logaddexp(self.free_after, 0.0)) / self.allowed, self.loss)
+
+    @property
+    def loss(self) -> float:
+        """What the effects named lose where they say what is not there, of what may be chance."""
+        return self.contradicted[0] / UNKNOWN_GAIN
+
+    @property
     def explained(self) -> bool:
-        """Whether what is left is the floor, or close to it."""
-        return self.free_after < self.allowed
+        """Whether what is left is the floor, or close to it, and the effects named say nothing that is not there."""
+        return self.unlike < 1.0
 
 
 def _against_none(gain: float, least: float, many: int = 1) -> float:
@@ -134,12 +152,12 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
 
     at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
 
-    `unknown` has one half where as much is left as is allowed, and odds that grow with its square.
+    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square.
     """
     names = list(selection.singles)
     score = np.array([*_scores(selection, names), 0.0])
     weight = np.exp((score - score.max()) / TEMPERATURE)
-    odds = (np.logaddexp(selection.free_after, 0.0) / selection.allowed) ** 2
+    odds = selection.unlike ** 2
     unknown = odds / (1.0 + odds)
     if selection.chosen is not None and selection.explained:  # not above the effect that is the answer
         share = weight[names.index(selection.named[0].name)] / weight.sum()

@@ -6,7 +6,7 @@ imaginary part each) when nothing is wrong.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -19,6 +19,7 @@ AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples
 OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
 MOST_LOST = 0.1  #: of a block
+HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
 LEAST_LEFT = 0.1  #: of a value's power, once what lost rows add on average is taken off
 TRIM_HZ = 0.6  #: below it torque and rate hold the trim of a flight, which does not go with how hard it is flown
 
@@ -97,6 +98,8 @@ class Floor:
     lost: float
     slopes: Slopes | None = None  #: with how hard it is flown, of the power in the air
     least: np.ndarray | float = 0.0  #: (bins, COUNT) in the air, of the sensors alone
+    #: (COUNT,) of `offset`, what the power in the lowest bin does not give
+    offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
 
     def level(self, flight: Flight, first: np.ndarray, regime: str) -> np.ndarray:
         """Power (blocks, bins, COUNT) of the blocks of a flight that begin at samples `first`."""
@@ -133,12 +136,25 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
             power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
         else:
             power[regime] = 2.0 * sensor
-    means = np.array([r[(f.phase != GROUND) & f.usable].mean(axis=0)
-                      for f, r in zip(flights, residuals, strict=True)])
-    offset = np.nan_to_num(means.std(axis=0, ddof=1)) if len(means) > 1 else np.zeros(COUNT)
+    offset, own = _between(flights, residuals, power[AIR][0])
     clock = np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2)) if flights else 0.0
     lost = float(np.mean(np.concatenate([f.lost for f in flights]))) if flights else 0.0
-    return Floor(power, count, offset, float(clock), lost, slopes, 0.5 * sensor_power(least, AIR))
+    return Floor(power, count, offset, float(clock), lost, slopes, 0.5 * sensor_power(least, AIR), own)
+
+
+def _between(flights: Sequence[Flight], residuals: Sequence[np.ndarray], lowest: np.ndarray,
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviation (COUNT,) of flights' means in the air, and the same without what the power in the lowest bin
+
+    gives them by chance.
+    """
+    if len(flights) < 2:
+        return np.zeros(COUNT), np.zeros(COUNT)
+    air = [(f.phase != GROUND) & f.usable for f in flights]
+    means = np.array([r[a].mean(axis=0) for r, a in zip(residuals, air, strict=True)])
+    seen = np.nan_to_num(means.var(axis=0, ddof=1))
+    chance = HANN_POWER * lowest * np.mean([1.0 / max(a.sum() * PERIOD_S, PERIOD_S) for a in air])
+    return np.sqrt(seen), np.sqrt(np.maximum(seen - chance, 0.0))
 
 
 def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:

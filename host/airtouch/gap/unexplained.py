@@ -12,7 +12,7 @@ from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.motion import held
 from airtouch.gap.result import Cell
-from airtouch.gap.selection import Judged, Selection
+from airtouch.gap.selection import UNKNOWN_GAIN, Judged, Selection
 from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.simulation import signals as at
 
@@ -59,8 +59,7 @@ def fails(selection: Selection, judged: Judged) -> str:
     """Why a candidate is not the answer, in nats of held-out log likelihood."""
     least = selection.least[judged.name]
     if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
-        return (f"a model without names gains {selection.free_after:.0f} nats beside it, up to {selection.allowed:.0f} "
-                "may be left")
+        return against(selection)
     if judged.gain < least:
         return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
     if judged.evidence < least:
@@ -70,6 +69,16 @@ def fails(selection: Selection, judged: Judged) -> str:
         return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
     return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+
+
+def against(selection: Selection) -> str:
+    """What speaks against the effects named, in words, with the limit that it exceeds or keeps."""
+    lost, worst = selection.contradicted
+    if selection.loss == selection.unlike:
+        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
+                f"{UNKNOWN_GAIN:.0f} may be chance")
+    return (f"a model without names gains {max(selection.free_after, 0.0):.0f} nats beside it, up to "
+            f"{selection.allowed:.0f} may be left")
 
 
 def why_not(selection: Selection, name: str, verdict: str) -> str:
