@@ -66,8 +66,8 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     from airtouch.crazyflie.link import default_cache
 
     if recover:
-        found, unreadable = collect.recover(out)
-        lines = [f"recovered: {path}" for path in found] + unreadable
+        recovered, unreadable = collect.recover(out)
+        lines = [f"recovered: {path}" for path in recovered] + unreadable
         click.echo("\n".join(lines) or f"{out}: nothing to recover")
         sys.exit(2 if unreadable else 0)
     if not uri or not mission_name:

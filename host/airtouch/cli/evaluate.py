@@ -36,19 +36,19 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
     if not files:
         raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest")
-    said: dict[str, list[str]] = {}
+    remarks: dict[str, list[str]] = {}
     with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
         def done(result: evaluate.Result | Exception) -> None:
             if isinstance(result, Exception):
                 click.echo(f"\rairtouch: {result}", err=True)
-            elif found := evaluate.remarks(result.log):
-                said[result.score.file] = found
+            elif lines := evaluate.remarks(result.log):
+                remarks[result.score.file] = lines
             bar.update(1)
 
         scores, failures = evaluate.evaluate(files, module, trained, done)
-    _pass_on(said)
+    _pass_on(remarks)
     result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
-    result["remarks"] = said
+    result["remarks"] = remarks
     screen = show.console()
     if scores:
         screen.print(show.table({detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off"))
@@ -69,10 +69,10 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
         sys.exit(2)
 
 
-def _pass_on(said: dict[str, list[str]]) -> None:
+def _pass_on(remarks: dict[str, list[str]]) -> None:
     """Print the warnings of the quality checks on stderr, one line each."""
     files: dict[str, list[str]] = {}
-    for file, lines in said.items():
+    for file, lines in remarks.items():
         for line in lines:
             files.setdefault(line, []).append(file)
     for line, some in files.items():

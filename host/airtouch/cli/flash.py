@@ -19,7 +19,7 @@ def command(image: Path, uri: str | None, target: str | None, check: bool) -> No
     airtouch flash build/firmware/cf2.bin --uri radio://0/80/2M/E7E7E7E7E7
     airtouch flash target.board.devices.flash.img --uri radio://0/80/2M/E7E7E7E7E7
     """
-    found = flash.inspect(image, target)
-    click.echo(f"{found.path}: {found.target}, {found.size_bytes} bytes, entry 0x{found.entry:08x}")
+    firmware = flash.inspect(image, target)
+    click.echo(f"{firmware.path}: {firmware.target}, {firmware.size_bytes} bytes, entry 0x{firmware.entry:08x}")
     if not check:
-        flash.flash(found, uri)
+        flash.flash(firmware, uri)

@@ -71,19 +71,19 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     vehicle = gap_input.vehicle_of(vehicle_name, flights)
     run = on_cluster.mapper(dask) if dask else map
     with gap_show.Bar(len(flights) + bool(baseline)) as bar:
-        found = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
+        measurement = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
     failed = (*flights.failed.values(), *nominal.failed.values())
-    found = replace(found, left_out=(*failed, *found.left_out))
+    measurement = replace(measurement, left_out=(*failed, *measurement.left_out))
     if json_path:
-        scores.write_json(json_path, found.plain(), force)
+        scores.write_json(json_path, measurement.plain(), force)
     if report:
         from airtouch.gap import pictures
         from airtouch.report import gap_report
 
-        gap_report.write_measurement(report, found, pictures.of_measurement(found, flights, vehicle), force=force,
-                                     command=_line("measure", real, baseline, vehicle_name))
-    gap_show.measurement(scores.console(), found)
-    gap_show.left_out(found.left_out)
+        gap_report.write_measurement(report, measurement, pictures.of_measurement(measurement, flights, vehicle),
+                                     force=force, command=_line("measure", real, baseline, vehicle_name))
+    gap_show.measurement(scores.console(), measurement)
+    gap_show.left_out(measurement.left_out)
     _written(json_path, report)
 
 
@@ -123,15 +123,15 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         if not logs:
             raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
         with gap_show.Bar() as bar:
-            found = case(logs, progress=bar, pictures=bool(report))
+            diagnosis = case(logs, progress=bar, pictures=bool(report))
         if json_path:
-            scores.write_json(json_path, found.plain(), force)
+            scores.write_json(json_path, diagnosis.plain(), force)
         if report:
             from airtouch.report import gap_report
 
-            gap_report.write_diagnosis(report, found, command=_line("diagnose", real, baseline, vehicle_name),
+            gap_report.write_diagnosis(report, diagnosis, command=_line("diagnose", real, baseline, vehicle_name),
                                        force=force)
-        gap_show.diagnosis(scores.console(), found)
+        gap_show.diagnosis(scores.console(), diagnosis)
     gap_show.left_out([*flights.failed.values(), *nominal.failed.values()])
     _written(json_path, report)
 
@@ -141,7 +141,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
               show_default=True, help="Folder for the report and the JSON.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
 def demo_command(out: Path, force: bool) -> None:
-    """Diagnose a flight that comes with the package, whose effect is withheld, and compare with what it was.
+    """Diagnose a flight of the package whose effect is withheld, and compare the answer with the effect.
 
     Needs no drone, no network and no TensorFlow; about a minute, most of it compiling the first time.
     """
@@ -162,15 +162,15 @@ def demo_command(out: Path, force: bool) -> None:
     nominal = [read(p) for p in example.nominal()]
     with gap_show.Steps(began) as say:
         say("reading and compiling")
-        found = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
-                         pictures=True)
-    scores.write_json(json_path, found.plain(), force)
-    gap_report.write_diagnosis(report, found, command="airtouch gap demo", force=force)
-    gap_show.diagnosis(scores.console(), found)
+        diagnosis = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
+                             pictures=True)
+    scores.write_json(json_path, diagnosis.plain(), force)
+    gap_report.write_diagnosis(report, diagnosis, command="airtouch gap demo", force=force)
+    gap_show.diagnosis(scores.console(), diagnosis)
     true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
-    told = words.joined([e.name for e in found.effects]) or found.verdict
+    answer = words.joined([e.name for e in diagnosis.effects]) or diagnosis.verdict
     click.echo(f"\nSwitched on when the flight was made: {'; '.join(f'{n} ({p})' for n, p in true.items())}; found: "
-               f"{told}.")
+               f"{answer}.")
     click.echo(f"{time.monotonic() - began:.0f} s; open {report} in a browser")
 
 
@@ -203,16 +203,16 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
     with gap_show.Bar(len(flights)) as bar:
-        for found in run(partial(_alone, case), flights):
-            if isinstance(found, str):
-                gap_show.left_out([found])
+        for diagnosis in run(partial(_alone, case), flights):
+            if isinstance(diagnosis, str):
+                gap_show.left_out([diagnosis])
                 continue
-            bar(found.flights[0])
-            first = found.ranking[0]
-            table.add_row(Path(found.flights[0]).name, found.verdict,
-                          "; ".join(words.effect_in_words(e) for e in found.effects),
+            bar(diagnosis.flights[0])
+            first = diagnosis.ranking[0]
+            table.add_row(Path(diagnosis.flights[0]).name, diagnosis.verdict,
+                          "; ".join(words.effect_in_words(e) for e in diagnosis.effects),
                           f"{first.probability:.0%}")
-            rows.append(found.plain())
+            rows.append(diagnosis.plain())
     scores.console().print(table)
     if json_path:
         scores.write_json(json_path, {"cases": rows}, force)

@@ -48,7 +48,7 @@ def files_of(names: Sequence[str]) -> list[Path]:
 
     Raises AirTouchError for a name that is none of these.
     """
-    found: dict[Path, None] = {}
+    files: dict[Path, None] = {}
     for name in names:
         path = Path(name)
         if path.is_dir() and is_bag(path):
@@ -67,16 +67,16 @@ def files_of(names: Sequence[str]) -> list[Path]:
                     for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file() and Path(p).name != MANIFEST]
         if not paths:
             raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
-        found.update(dict.fromkeys(paths))
-    return list(found)
+        files.update(dict.fromkeys(paths))
+    return list(files)
 
 
 def vehicle_of(named: str | None, flights: Flights) -> Vehicle:
     """The vehicle named, else the one that the first log names, else the Crazyflie with flow deck."""
     if named:
         return vehicle.load(named)
-    said = next(iter(flights), None)
-    name = str(said.meta.get("vehicle") or "") if said is not None else ""
+    first = next(iter(flights), None)
+    name = str(first.meta.get("vehicle") or "") if first is not None else ""
     if not name:
         return vehicle.load(DEFAULT)
     try:

@@ -47,12 +47,12 @@ def info(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs info flights/*.csv.gz
     """
-    found, left_out = _each(files, lambda path: logs.summary(logs.read(path)))
+    summaries, left_out = _each(files, lambda path: logs.summary(logs.read(path)))
     if as_json:
-        _print_json(found, left_out)
+        _print_json(summaries, left_out)
     else:
-        _print_table(found)
-    _finish(len(found), left_out, "read")
+        _print_table(summaries)
+    _finish(len(summaries), left_out, "read")
 
 
 @command.command()
@@ -67,13 +67,13 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs check flights/ --json > quality.json
     """
-    found, left_out = _each(files, lambda path: logs.check(logs.read(path)).as_dict())
+    reports, left_out = _each(files, lambda path: logs.check(logs.read(path)).as_dict())
     if as_json:
-        _print_json(found, left_out)
+        _print_json(reports, left_out)
     else:
-        for report in found:
+        for report in reports:
             _print_report(report)
-    _finish(len(found), left_out, "checked")
+    _finish(len(reports), left_out, "checked")
 
 
 @command.command()
@@ -133,20 +133,20 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
         written.add(target)
         return target
 
-    found, left_out = _each(files, one)
-    _finish(len(found), left_out, f"written to {folder}")
+    written_files, left_out = _each(files, one)
+    _finish(len(written_files), left_out, f"written to {folder}")
 
 
 def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], list[dict[str, str]]]:
     """Call `act` on every file. Returns the results, and the failed files with their reasons."""
     paths = list(_expand(files))
-    found, left_out = [], []
+    results, left_out = [], []
     for path in _progress(paths):
         try:
-            found.append(act(path))
+            results.append(act(path))
         except AirTouchError as error:
             left_out.append({"file": str(path), "reason": str(error)})
-    return found, left_out
+    return results, left_out
 
 
 def _expand(files: Iterable[str]) -> Iterator[Path]:

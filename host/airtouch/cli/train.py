@@ -73,9 +73,9 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     module = registry.get(detector)
     if detector == "baseline":
         raise AirTouchError("baseline has nothing to train; --detector best or paper")
-    given = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
-             "df_lambda": df_lambda, "most_flights": labelled}
-    options: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    settings = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
+                "df_lambda": df_lambda, "most_flights": labelled}
+    options: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
     what: dict[str, Any] | None = None
     if start:
         options["start"] = module.load(start)
@@ -115,10 +115,10 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
 
 def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
     """The logs that can be trained on with at most `spare` sensors missing, and the number of the others."""
-    found, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
+    logs, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
-    chosen, failures = list(found.values()), len(left_out)
+    chosen, failures = list(logs.values()), len(left_out)
     if not chosen:
         raise AirTouchError("no flight that can be trained on")
     return chosen, failures

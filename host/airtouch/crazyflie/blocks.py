@@ -64,8 +64,8 @@ def check(block: Block, known: Collection[str]) -> None:
 
 def available(block: Block, known: Collection[str], without: Collection[str] = ()) -> Block:
     """The block with only the variables that the firmware has and that are not in `without`."""
-    kept = (v for v in block.variables if v[0] in known and v[0] not in without)
-    return replace(block, variables=tuple(kept))
+    variables = (v for v in block.variables if v[0] in known and v[0] not in without)
+    return replace(block, variables=tuple(variables))
 
 
 def motion_columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:

@@ -28,30 +28,30 @@ class Condition:
         return any(self.decks.get(deck, False) for deck in decks)
 
 
-def problems(seen: Condition, least_v: float = LEAST_V) -> list[str]:
+def problems(condition: Condition, least_v: float = LEAST_V) -> list[str]:
     """Faults that forbid take-off, one line each with its remedy; empty if there are none."""
-    found = []
-    if not seen.vbat_v >= least_v:
-        found.append(f"battery at {seen.vbat_v:.2f} V, less than {least_v:.2f} V; charge it "
+    faults = []
+    if not condition.vbat_v >= least_v:
+        faults.append(f"battery at {condition.vbat_v:.2f} V, less than {least_v:.2f} V; charge it "
                      "(--min-battery lowers the limit)")
-    if not seen.has("bcFlow2", "bcFlow"):
-        found.append("no Flow deck found (deck.bcFlow2 is 0): without it the drone cannot hold its place; "
+    if not condition.has("bcFlow2", "bcFlow"):
+        faults.append("no Flow deck found (deck.bcFlow2 is 0): without it the drone cannot hold its place; "
                      "attach it and restart the drone")
-    elif seen.zrange_m is not None and not seen.zrange_m < 0.3:
-        found.append(f"the down range reads {seen.zrange_m:.2f} m on the ground; "
+    elif condition.zrange_m is not None and not condition.zrange_m < 0.3:
+        faults.append(f"the down range reads {condition.zrange_m:.2f} m on the ground; "
                      "clean or replace the Flow deck's sensor")
-    if seen.supervisor is not None:
-        found += [f"the drone {what}; put it upright and restart it" for what, bit in CONFLICTS.items()
-                  if seen.supervisor >> bit & 1]
-    return found
+    if condition.supervisor is not None:
+        faults += [f"the drone {what}; put it upright and restart it" for what, bit in CONFLICTS.items()
+                   if condition.supervisor >> bit & 1]
+    return faults
 
 
-def notes(seen: Condition) -> list[str]:
+def notes(condition: Condition) -> list[str]:
     """Remarks that do not forbid take-off, one line each."""
-    found = []
-    if not seen.has("bcMultiranger"):
-        found.append("no Multi-ranger: landmarks are not logged; the down range alone tells the true edges")
-    return found
+    remarks = []
+    if not condition.has("bcMultiranger"):
+        remarks.append("no Multi-ranger: landmarks are not logged; the down range alone tells the true edges")
+    return remarks
 
 
 def parse_setting(text: str) -> tuple[str, str]:

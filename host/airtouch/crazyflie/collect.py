@@ -182,9 +182,9 @@ def standing_still(drone: Drone, slow: blocks.Block | None) -> Intake:
     """Packets of the drone once it has landed. Raises AirTouchError if it still flies after LANDED_S."""
     until = time.monotonic() + LANDED_S
     while True:
-        seen = listen(drone, slow, FIRST_DATA_S)
-        if seen.supervisor is None or not seen.supervisor & FLYING:
-            return seen
+        intake = listen(drone, slow, FIRST_DATA_S)
+        if intake.supervisor is None or not intake.supervisor & FLYING:
+            return intake
         if time.monotonic() > until:
             raise AirTouchError("not ready: the drone is still flying; land it, then start again")
         time.sleep(0.2)

@@ -50,16 +50,16 @@ class HostDetector:
         self._edge.append(events.edge)
         self._airborne.append(events.airborne)
         recent = (self._decoder.hold_steps + self._decoder.look_back) * STRIDE
-        found = []
+        edges = []
         for i in np.flatnonzero(events.edge):
             past = np.concatenate(self._logits[-recent:])[-(recent + len(log)):]
             upto = len(past) - len(log) + int(i)
             crossing = past[max(upto - recent, 0):upto + 1, int(events.edge[i])].max()
             kind = best.KINDS[int(events.edge[i])]
-            found.append(Detection(self.taken + int(i), kind, _sigmoid(float(crossing))))
+            edges.append(Detection(self.taken + int(i), kind, _sigmoid(float(crossing))))
         self.taken += len(log)
         over = _sigmoid(events.logits[:, 0].astype(np.float64))
-        return np.where(events.airborne, over, 0.0), found
+        return np.where(events.airborne, over, 0.0), edges
 
     def trace(self, log: FlightLog) -> Trace:
         """The trace of all rows so far. `log` holds the same rows."""

@@ -74,12 +74,12 @@ class Recorder:
         """All rows so far, sorted by time, with the gaps in the metadata."""
         times = np.concatenate([np.empty(0, np.int64), *self._times])
         table = np.concatenate([np.empty((0, len(self.names))), *self._rows])
-        kept = in_order(times)
-        missing = gaps(times[kept])
+        order = in_order(times)
+        missing = gaps(times[order])
         counted = {"lost_samples": sum(g.lost for g in missing),
                    "longest_gap_s": max((g.seconds for g in missing), default=0.0),
-                   "doubled_samples": int(len(times) - len(kept))}
-        return FlightLog({name: table[kept, i] for i, name in enumerate(self.names)},
+                   "doubled_samples": int(len(times) - len(order))}
+        return FlightLog({name: table[order, i] for i, name in enumerate(self.names)},
                          {"source": str(self.path), "format": "canonical", **self.meta, **counted, **meta})
 
     def finish(self, **meta: Any) -> FlightLog:
@@ -134,8 +134,8 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
             timed = np.flatnonzero(np.isfinite(log["t_s"]))
             if not len(timed):
                 raise AirTouchError(f"{part}: no row has a time; correct t_s")
-            kept = timed[in_order(np.round(log["t_s"][timed] * 1000.0).astype(np.int64))]
-            whole = FlightLog({name: values[kept] for name, values in log.columns.items()}, dict(log.meta))
+            order = timed[in_order(np.round(log["t_s"][timed] * 1000.0).astype(np.int64))]
+            whole = FlightLog({name: values[order] for name, values in log.columns.items()}, dict(log.meta))
             missing = gaps(np.round(whole["t_s"] * 1000.0))
             whole.meta |= {"ended": "the process was killed", "lost_samples": sum(g.lost for g in missing),
                            "longest_gap_s": max((g.seconds for g in missing), default=0.0)}

@@ -22,11 +22,11 @@ def sparkline(values: Sequence[float], width: int, low: float | None = None,
     sums = np.add.reduceat(np.where(finite, v, 0.0), bounds[:-1])
     counts = np.add.reduceat(finite.astype(int), bounds[:-1])
     means = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-    seen = means[np.isfinite(means)]
-    if not len(seen):
+    finite_means = means[np.isfinite(means)]
+    if not len(finite_means):
         return EMPTY * width
-    low = seen.min() if low is None else low
-    high = seen.max() if high is None else high
+    low = finite_means.min() if low is None else low
+    high = finite_means.max() if high is None else high
     share = np.clip((means - low) / (high - low), 0.0, 1.0) if high > low else means * 0.0
     text = "".join(EMPTY if not np.isfinite(s) else BLOCKS[int(round(s * (len(BLOCKS) - 1)))] for s in share)
     return text.rjust(width)

@@ -58,18 +58,18 @@ def stuck(log: FlightLog, flying: np.ndarray) -> list[tuple[str, int, int]]:
     period = sample_period(log)
     limits = {**dict.fromkeys(ACC + ACC_WORLD + GYRO + PWM, STUCK_S),
               **{name: 2 * STUCK_S for name in log.columns if name.startswith("rpm_")}}
-    found = []
+    intervals = []
     for name, values in log.columns.items():
         if len(values) < 2:
             continue
         if np.all(values == values[0]):
-            found.append((name, 0, len(values)))
+            intervals.append((name, 0, len(values)))
         elif name in limits:
             moves = (np.diff(values) != 0) | ~flying[1:] | ~flying[:-1]
             bounds = np.concatenate(([0], np.flatnonzero(moves) + 1, [len(values)]))
             for start in np.flatnonzero(np.diff(bounds) * period > limits[name]):
-                found.append((name, int(bounds[start]), int(bounds[start + 1])))
-    return found
+                intervals.append((name, int(bounds[start]), int(bounds[start + 1])))
+    return intervals
 
 
 def saturated(log: FlightLog) -> dict[str, int]:

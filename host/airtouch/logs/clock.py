@@ -112,8 +112,8 @@ def rising(time_s: np.ndarray) -> np.ndarray:
         length = bisect_left(ends, time)
         before[i] = last[length - 1] if length else -1
         ends[length:length + 1], last[length:length + 1] = [time], [i]
-    kept, i = [], last[-1]
+    path, i = [], last[-1]
     while i >= 0:
-        kept.append(i)
+        path.append(i)
         i = int(before[i])
-    return place[kept[::-1]]
+    return place[path[::-1]]

@@ -69,7 +69,7 @@ def check(log: FlightLog) -> Quality:
     period = true_period(clock)
     flying, phases, edges = _flight(log)
     missing = {name: int((~np.isfinite(v)).sum()) for name, v in log.columns.items()}
-    found: dict[str, Any] = {
+    faults: dict[str, Any] = {
         "gaps": lost_samples(clock, period) if period else [],
         "clock_repeats": int((steps == 0).sum()),
         "clock_backwards": int((steps < 0).sum()),
@@ -79,11 +79,11 @@ def check(log: FlightLog) -> Quality:
         "saturated": saturated(log),
         "spikes": spikes(log),
     }
-    warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, found, phases, period)
+    warnings = [str(w) for w in log.meta.get("warnings", [])] + _in_words(log, faults, phases, period)
     return Quality(
         source=log.source, format=str(log.meta.get("format", "")), samples=len(log),
         duration_s=_duration(clock, len(log), sample_period(log)), rate_hz=1.0 / period if period else None,
-        segments=phases, edges=edges, warnings=warnings, **found,
+        segments=phases, edges=edges, warnings=warnings, **faults,
     )
 
 

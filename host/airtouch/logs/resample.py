@@ -28,8 +28,8 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
         raise AirTouchError(f"{log.source}: a rate of {rate_hz:g} Hz is not possible; "
                             f"give {1 / SLOWEST_S:g} to {1 / FASTEST_S:g} Hz")
     time_s, gaps = regular_time(log) if len(log) else (np.empty(0), [])
-    kept = rising(time_s)
-    time_s = time_s[kept]
+    order = rising(time_s)
+    time_s = time_s[order]
     period = true_period(time_s)
     if period is None:
         raise AirTouchError(f"{log.source}: its clock does not run, so it cannot be resampled; "
@@ -37,12 +37,12 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
     count = _count(log, float(time_s[-1] - time_s[0]), period, rate_hz)
     new_time = time_s[0] + np.arange(count) / rate_hz
     down = rate_hz < 0.98 / period
-    columns = {name: values[kept] for name, values in log.columns.items() if name != "t_s"}
+    columns = {name: values[order] for name, values in log.columns.items() if name != "t_s"}
     columns = _columns(columns, time_s, new_time, period, rate_hz if down else None)
     low_pass = f"zero-phase Butterworth, {CUTOFF * rate_hz:g} Hz" if down else "none"
     done = {"from_hz": 1.0 / period, "to_hz": rate_hz, "low_pass": low_pass,
             "lost_samples": sum(gap.lost for gap in gaps), "longest_bridge_s": LONGEST_BRIDGE_S,
-            "left_out": len(log) - len(kept)}
+            "left_out": len(log) - len(order)}
     notes = [f"resampled from {1.0 / period:.2f} to {rate_hz:g} Hz"]
     if done["left_out"]:
         notes.append(f"{done['left_out']} of {len(log)} samples have no time, or one out of order, and were left out")

@@ -57,8 +57,8 @@ def _is_motor(topic: str) -> bool:
 def _time(message: Any, stamp: int) -> float:
     """Time of a message in s: the header's, or without one that of the recording."""
     header = getattr(message, "header", None)
-    said = header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else 0.0
-    return said or 1e-9 * stamp
+    stamped = header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else 0.0
+    return stamped or 1e-9 * stamp
 
 
 def _xyz(names: tuple[str, ...], vector: Any) -> list[tuple[str, float]]:

@@ -31,8 +31,8 @@ class Sheet(NamedTuple):
 
 def sheet(text: bytes) -> Sheet:
     """The parts of a text with LF line ends. Blank lines before the first line that is no comment are left out."""
-    found = _HEAD.match(text)
-    head = found.group() if found else b""
+    match = _HEAD.match(text)
+    head = match.group() if match else b""
     first, end, rest = text[len(head):].partition(b"\n")
     comments = [line.strip() for line in _COMMENT.findall(head)]
     if first.lstrip().startswith(b"#"):
@@ -136,7 +136,7 @@ def _is_number(cell: bytes) -> bool:
 
 
 def _without_last_line(body: bytes, first_line: int, warnings: list[str]) -> bytes:
-    kept, newline, _ = body.rstrip(b"\n").rpartition(b"\n")
-    number = first_line + kept.count(b"\n") + (1 if newline else 0)
+    rest, newline, _ = body.rstrip(b"\n").rpartition(b"\n")
+    number = first_line + rest.count(b"\n") + (1 if newline else 0)
     warnings.append(f"line {number} is cut off and was dropped")
-    return kept + newline
+    return rest + newline

@@ -118,16 +118,16 @@ def _event(name: str, declared: list[str], version: int, source: str) -> Event:
 
 def _offsets(data: bytes, place: int, end: int, events: dict[int, Event]) -> tuple[dict[int, array], int]:
     """Offsets of the whole records of each event type, and the offset at which reading stopped."""
-    found = {number: array("q") for number in events}
+    offsets = {number: array("q") for number in events}
     sizes = {number: event.dtype.itemsize for number, event in events.items()}
     while place + 2 <= end:
         number = data[place] | data[place + 1] << 8
         size = sizes.get(number)
         if size is None or place + size > end:
             break
-        found[number].append(place)
+        offsets[number].append(place)
         place += size
-    return found, place
+    return offsets, place
 
 
 def _main_event(events: dict[int, Event], offsets: dict[int, array], source: str) -> int:

@@ -33,10 +33,10 @@ def read(data: bytes, source: str) -> FlightLog:
     Blocks with a wrong checksum are left out; a truncated block gives its whole rows; both with a warning.
     Raises AirTouchError for a log without a usable row.
     """
-    found = _variables(data) if data else None
-    if found is None:
+    header = _variables(data) if data else None
+    if header is None:
         raise AirTouchError(f"{source}: no old uSD log, as it does not begin with its variables")
-    names, letters, place = found
+    names, letters, place = header
     warnings: list[str] = []
     if not _sound(data[:place], data[place:place + 4]):
         warnings.append("the checksum of the header is wrong: the log is damaged; check its values")
@@ -64,12 +64,12 @@ def _variables(data: bytes) -> tuple[list[str], list[str], int] | None:
     """The variables' names, their type letters and the offset behind them; None if the data begins differently."""
     names, letters, place = [], [], 1
     for _ in range(data[0]):
-        found = _VARIABLE.match(data, place)
-        if found is None:
+        match = _VARIABLE.match(data, place)
+        if match is None:
             return None
-        names.append(found[1].decode())
-        letters.append(found[2].decode())
-        place = found.end()
+        names.append(match[1].decode())
+        letters.append(match[2].decode())
+        place = match.end()
     return (names, letters, place) if names else None
 
 

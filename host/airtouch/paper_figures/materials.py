@@ -51,24 +51,24 @@ def _flights(scene: str, count: int, seed: int) -> list[FlightLog]:
 
 def overall(job: Job) -> Figure:
     """Performance:1b: the errors over all four pairs, edge by edge."""
-    said = SAID["material-error"]
-    found = pair_scores(job)
-    whole = {name: [s for (n, _), some in found.items() if n == name for s in some] for name in DETECTORS}
+    claim = SAID["material-error"]
+    scores = pair_scores(job)
+    whole = {name: [s for (n, _), some in scores.items() if n == name for s in some] for name in DETECTORS}
     rows = {name: summary.summarise(some) for name, some in whole.items()}
     text = "; ".join(f"{n} {words.score(r)}" for n, r in reversed(rows.items()))
-    return Figure("Errors at material interfaces", [words.table_row(n, r) for n, r in rows.items()], _caption(found),
+    return Figure("Errors at material interfaces", [words.table_row(n, r) for n, r in rows.items()], _caption(scores),
                   {"material-error": Verdict(UNTESTABLE, f"{CIRCULAR}; simulated: {text}")},
                   lambda canvas: pictures.signed_errors(
-                      canvas.subplots(), {n: each_m(s) for n, s in whole.items()}, said.values[0]))
+                      canvas.subplots(), {n: each_m(s) for n, s in whole.items()}, claim.values[0]))
 
 
 def by_pair(job: Job) -> Figure:
     """Performance:1f: the errors of each pair."""
-    found = pair_scores(job)
-    rows = {key: summary.summarise(some) for key, some in found.items()}
+    scores = pair_scores(job)
+    rows = {key: summary.summarise(some) for key, some in scores.items()}
     table = []
     for (name, scene), row in rows.items():
-        errors = np.abs(errors_m(found[name, scene]))
+        errors = np.abs(errors_m(scores[name, scene]))
         table.append(words.table_row(f"{name}, {PAIRS[scene]}", row, detector=name, pair=PAIRS[scene],
                                      median_error_m=float(np.median(errors)) if len(errors) else None,
                                      greatest_error_m=float(errors.max()) if len(errors) else None,
@@ -87,7 +87,7 @@ def by_pair(job: Job) -> Figure:
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
-            axes.boxplot([np.abs(errors_m(found[name, scene])) for scene in PAIRS], widths=0.6, whis=(0, 100),
+            axes.boxplot([np.abs(errors_m(scores[name, scene])) for scene in PAIRS], widths=0.6, whis=(0, 100),
                          medianprops={"color": pictures.colour(name)})
             axes.set_xticks(range(1, 5), [p.replace(" and ", "\n").replace("artificial ", "") for p in PAIRS.values()],
                             fontsize=7)
@@ -101,7 +101,7 @@ def by_pair(job: Job) -> Figure:
         canvas.axes[1].legend(fontsize=7, frameon=False)
         canvas.axes[0].set_ylabel("|error| of edges found, m")
 
-    return Figure("Errors by pair of materials", table, _caption(found), verdicts, draw)
+    return Figure("Errors by pair of materials", table, _caption(scores), verdicts, draw)
 
 
 def _number(value: float | None) -> str:

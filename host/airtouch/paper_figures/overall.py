@@ -19,19 +19,19 @@ def each_m(scores: list[FlightScore]) -> list[float | None]:
 
 def heights(job: Job) -> Figure:
     """Performance:1a: the errors over platforms, edge by edge."""
-    said = SAID["height-error"]
-    found = {name: recorded.scores(job, name)[0] for name in ("best", "paper")}
-    rows = {name: summary.summarise(some) for name, some in found.items()}
+    claim = SAID["height-error"]
+    scores = {name: recorded.scores(job, name)[0] for name in ("best", "paper")}
+    rows = {name: summary.summarise(some) for name, some in scores.items()}
     verdict = words.judged(
-        words.reaches(rows["paper"], said.values[0]),
+        words.reaches(rows["paper"], claim.values[0]),
         f"paper's method {words.score(rows['paper'])}; best {words.score(rows['best'])}"
-        + ("; best reaches the claim" if words.reaches(rows["best"], said.values[0]) else ""))
+        + ("; best reaches the claim" if words.reaches(rows["best"], claim.values[0]) else ""))
     caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"])
                + " Only edges that were found have an error; those that were missed are counted beside it. The paper "
                  "scores 30 flights of its own, says of no edge that it was missed, and splits windows at random.")
     return Figure("Errors at abrupt heights", [words.table_row(n, r) for n, r in rows.items()], caption,
                   {"height-error": verdict}, lambda canvas: pictures.signed_errors(
-                      canvas.subplots(), {n: each_m(s) for n, s in found.items()}, said.values[0]))
+                      canvas.subplots(), {n: each_m(s) for n, s in scores.items()}, claim.values[0]))
 
 
 def against_baseline(job: Job) -> Figure:
@@ -41,10 +41,10 @@ def against_baseline(job: Job) -> Figure:
     better = {n: 1.0 - rows[n]["mean_abs_error_m"] / rows["baseline"]["mean_abs_error_m"] for n in ("paper", "best")
               if rows[n]["mean_abs_error_m"] is not None}
     table = [words.table_row(n, r) for n, r in rows.items()]
-    found = (f"paper's method {words.score(rows['paper'])}; baseline {words.score(rows['baseline'])}; best "
-             f"{words.score(rows['best'])}. Below the baseline's error: "
-             + ", ".join(f"{n} {100 * b:.0f} %" for n, b in better.items()))
-    verdict = words.judged(words.reaches(rows["paper"], ours) and better.get("paper", 0.0) >= gain, found)
+    text = (f"paper's method {words.score(rows['paper'])}; baseline {words.score(rows['baseline'])}; best "
+            f"{words.score(rows['best'])}. Below the baseline's error: "
+            + ", ".join(f"{n} {100 * b:.0f} %" for n, b in better.items()))
+    verdict = words.judged(words.reaches(rows["paper"], ours) and better.get("paper", 0.0) >= gain, text)
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)

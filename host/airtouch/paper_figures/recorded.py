@@ -31,13 +31,13 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
 
     Results are cached while the program runs, because several figures show the same scores.
     """
-    found = files(job)
+    flights = files(job)
     options = (QUICK if job.quick else FULL)[name]
     air = free_air.read(_air(job.flights)) if job.flights and name == "best" and not job.quick else []
-    held = folds.by_fold(found)
+    held = folds.by_fold(flights)
     if job.quick:
         held = {QUICK_FOLD: held[QUICK_FOLD]} if QUICK_FOLD in held else dict(list(held.items())[:1])
-    result, entries, _ = crossval.crossval(name, found, job.work / "folds", folds=held, options=options, free_air=air,
+    result, entries, _ = crossval.crossval(name, flights, job.work / "folds", folds=held, options=options, free_air=air,
                                            tell=lambda line: job.tell(f"{name}, {line}"))
     return result, entries
 
@@ -45,20 +45,20 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
 def varied(job: Job, name: str, detector: Detector | None, options: dict[str, Any],
            ) -> tuple[list[FlightScore], list[dict[str, Any]]]:
     """As `scores`, of a variant of a detector, over ABLATION_FOLDS (in a quick run over QUICK_FOLD)."""
-    found = files(job)
-    every = folds.by_fold(found)
-    wanted = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
-    held = {k: every[k] for k in wanted if k in every} or dict(list(every.items())[:1])
+    flights = files(job)
+    by_fold = folds.by_fold(flights)
+    numbers = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
+    held = {k: by_fold[k] for k in numbers if k in by_fold} or dict(list(by_fold.items())[:1])
     shown = name if detector is None else f"variant-{name}"
-    result, entries, _ = crossval.crossval(shown, found, job.work / "folds", folds=held, options=options,
+    result, entries, _ = crossval.crossval(shown, flights, job.work / "folds", folds=held, options=options,
                                            detector=detector, tell=lambda line: job.tell(f"{name}, {line}"))
     return result, entries
 
 
 def in_float(job: Job, name: str, entries: list[dict[str, Any]]) -> list[FlightScore]:
     """Scores of the float networks of a variant, on the folds and with the models of `varied`."""
-    kept = {entry["fold"] for entry in entries}
-    return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in kept], entries,
+    numbers = {entry["fold"] for entry in entries}
+    return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in numbers], entries,
                              job.work / "folds")
 
 

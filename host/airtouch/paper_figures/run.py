@@ -65,33 +65,33 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
         write_bytes(json.dumps(entry, indent=1).encode(), out / f"{name}.json", force=True)
         page.write(out, records(out), command)
         job.tell(f"    {entry.get('missing') or 'written'}, {entry['seconds']:.0f} s")
-    found = records(out)
-    page.write(out, found, command)
-    return found
+    all_records = records(out)
+    page.write(out, all_records, command)
+    return all_records
 
 
 def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     """Make one figure: write its picture and table to `out`, and return its record."""
     module, function = FIGURES[name]
-    said: dict[str, dict[str, Any]] = {
+    verdicts: dict[str, dict[str, Any]] = {
         claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
     try:
         figure: Figure = getattr(importlib.import_module(f"airtouch.paper_figures.{module}"), function)(job)
     except AirTouchError as error:
         reason = str(error) if isinstance(error, Missing) else f"it could not be made: {error}"
-        for record in said.values():
+        for record in verdicts.values():
             record |= {"verdict": claims.UNTESTABLE, "found": reason}
-        return {"name": name, "title": name, "caption": "", "missing": reason, "claims": said, "rows": []}
-    if set(figure.verdicts) != set(said):
-        raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(said)}")
+        return {"name": name, "title": name, "caption": "", "missing": reason, "claims": verdicts, "rows": []}
+    if set(figure.verdicts) != set(verdicts):
+        raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(verdicts)}")
     for claim, verdict in figure.verdicts.items():
-        said[claim] |= {"verdict": verdict.verdict, "found": verdict.found}
+        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.found}
     png, svg = pictures.render(figure.draw)
     table = table_csv(figure.rows)
     for data, ending in ((png, "png"), (svg, "svg"), (table, "csv")):
         write_bytes(data, out / f"{name}.{ending}", force=True)
     head, *lines = page.cells(table)
-    return {"name": name, "title": figure.title, "caption": figure.caption, "claims": said,
+    return {"name": name, "title": figure.title, "caption": figure.caption, "claims": verdicts,
             "rows": [dict(zip(head, line, strict=True)) for line in lines]}
 
 

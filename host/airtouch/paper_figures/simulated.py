@@ -30,13 +30,13 @@ def flown(name: str, count: int, effects: Effects = (), seed: int = SEED) -> tup
     Raises AirTouchError if too many diverge.
     """
     chosen = [(effect, dict(values)) for effect, values in effects]
-    kept: list[FlightLog] = []
+    logs: list[FlightLog] = []
     for flight in batch.flights(name, range(SPARE * count), effects=chosen, seed=seed):
         if not isinstance(flight, Diverged):
-            kept.append(flight)
-        if len(kept) == count:
-            return tuple(kept)
-    raise AirTouchError(f"{name}: only {len(kept)} of {SPARE * count} simulated flights ended well")
+            logs.append(flight)
+        if len(logs) == count:
+            return tuple(logs)
+    raise AirTouchError(f"{name}: only {len(logs)} of {SPARE * count} simulated flights ended well")
 
 
 def scores(flights: Sequence[FlightLog], detector: str, model: Any = None) -> list[FlightScore]:

@@ -71,7 +71,7 @@ def sizes(job: Job) -> Figure:
 def _milliseconds(model: Any) -> dict[str, float]:
     """Milliseconds per window of the float and the int8 network in C on this computer; the least of three runs."""
     windows = np.random.default_rng(0).normal(size=(200, 100, 3)).astype(np.float32)
-    found = {}
+    milliseconds = {}
     for name, call in (("float", lambda: infer_float(model.float_layers, windows)),
                        ("int8", lambda: infer_int8(model, windows))):
         spent = []
@@ -79,14 +79,14 @@ def _milliseconds(model: Any) -> dict[str, float]:
             started = time.perf_counter()
             call()
             spent.append(time.perf_counter() - started)
-        found[name] = 1e3 * min(spent) / len(windows)
-    return found
+        milliseconds[name] = 1e3 * min(spent) / len(windows)
+    return milliseconds
 
 
 def _accuracies(job: Job, rows: list[dict[str, Any]]) -> str:
     """Add a row for each sparsity, with float and int8 accuracy on held-out flights. Returns them as text."""
     epochs = {"epochs": 3} if job.quick else {}
-    said = []
+    texts = []
     for zeros, options in ((0.0, {"sparsity": 0.0}), (SPARSITY, {})):
         scores, folds = recorded.varied(job, "paper", None, {**epochs, **options})
         exact = recorded.in_float(job, "paper", folds)
@@ -94,6 +94,6 @@ def _accuracies(job: Job, rows: list[dict[str, Any]]) -> str:
         rows.append({"what": f"{100 * zeros:.0f} % zeros, int8", "bytes": folds[0]["parameters"]["parameter_bytes"],
                      "zeros": zeros, "balanced_float": float_row["balanced_accuracy"],
                      "balanced_int8": row["balanced_accuracy"], "flights": row["flights"]})
-        said.append(f"{100 * zeros:.0f} % zeros: float {words.percent(float_row['balanced_accuracy'])}, int8 "
+        texts.append(f"{100 * zeros:.0f} % zeros: float {words.percent(float_row['balanced_accuracy'])}, int8 "
                     f"{words.percent(row['balanced_accuracy'], row['intervals']['balanced_accuracy'])}")
-    return f"balanced, by flight, n = {rows[-1]['flights']} flights: " + "; ".join(said)
+    return f"balanced, by flight, n = {rows[-1]['flights']} flights: " + "; ".join(texts)

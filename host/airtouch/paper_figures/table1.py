@@ -20,18 +20,18 @@ def measured(log: Path) -> Figure:
         trace = ina219.parse(log.read_text(encoding="utf-8", errors="replace"), str(log))
     except OSError as error:
         raise AirTouchError(f"{log}: cannot be read: {error.strerror}") from None
-    found = ina219.by_stage(trace, tuple(stages.PAPER_MW))
-    if not found:
+    powers = ina219.by_stage(trace, tuple(stages.PAPER_MW))
+    if not powers:
         raise AirTouchError(f"{log}: no column of stages; the sketch in tools/power writes one")
     rows = [{"what": stages.NAMES.get(name, name), "mw": mw, "low_mw": mw - half, "high_mw": mw + half,
-             "paper_mw": stages.PAPER_MW.get(name), "seconds": found[name].seconds, "lines": found[name].lines}
-            for name, (mw, half) in ina219.added(found).items()]
-    last = list(found.values())[-1]
+             "paper_mw": stages.PAPER_MW.get(name), "seconds": powers[name].seconds, "lines": powers[name].lines}
+            for name, (mw, half) in ina219.added(powers).items()]
+    last = list(powers.values())[-1]
     total, half = last.mw, last.half_mw
     verdicts = {"power": words.judged(total - half <= SAID["power"].values[0],
                                       f"total {total:.1f} mW [{total - half:.1f}, {total + half:.1f}] over "
                                       f"{last.seconds:.0f} s"),
-                "negligible": _negligible(total - next(iter(found.values())).mw, "measured")}
+                "negligible": _negligible(total - next(iter(powers.values())).mw, "measured")}
     return Figure("Power", rows, f"Measured with an INA219: {log.name}; 95 % intervals from blocks of 1 s.",
                   verdicts, lambda canvas: _draw(canvas, rows))
 
@@ -41,11 +41,11 @@ def estimated() -> Figure:
     if not stages.BUDGETS.is_dir():
         raise Missing("the counted instructions are in a checkout alone (tests/emulation); clone the repository, or "
                       "measure and give --power-log")
-    found = stages.estimate(*(stages.counts(stages.BUDGETS / f"{n}.toml") for n in ("budget", "gap8_budget")))
+    estimates = stages.estimate(*(stages.counts(stages.BUDGETS / f"{n}.toml") for n in ("budget", "gap8_budget")))
     rows = [{"what": stages.NAMES.get(name, name), "mw": (e.low_mw + e.high_mw) / 2, "low_mw": e.low_mw,
              "high_mw": e.high_mw, "instructions_a_step": e.instructions,
-             "paper_mw": stages.PAPER_MW.get(name.split(",")[0])} for name, e in found.items()]
-    parts = [found[n] for n in ("FC-FE", "CCS-FF", "filter", "network, paper on the GAP8")]
+             "paper_mw": stages.PAPER_MW.get(name.split(",")[0])} for name, e in estimates.items()]
+    parts = [estimates[n] for n in ("FC-FE", "CCS-FF", "filter", "network, paper on the GAP8")]
     low, high = sum(p.low_mw for p in parts), sum(p.high_mw for p in parts)
     verdicts = {"power": Verdict(UNTESTABLE, f"no meter here; the work itself is estimated at {low:.1f} to {high:.1f} "
                                              "mW for the paper's stages (43 mW there), from counted instructions, "

@@ -127,8 +127,8 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
     if not air:
         flown, what = simulated.training_flights(SIMULATED, scene, vehicle=vehicle, seed=seed, progress=progress)
         return Flown(flown, [None] * len(flown)), what
-    told = (lambda done, total: progress("simulated edges", done, total, "")) if progress else (lambda *_: None)
-    weak = overlay.responses(scene, vehicle, SIMULATED, seed, told)
+    report = (lambda done, total: progress("simulated edges", done, total, "")) if progress else (lambda *_: None)
+    weak = overlay.responses(scene, vehicle, SIMULATED, seed, report)
     factors = edge_strength.strengths([f.log for f in flights if f.labelled], weak)
     laid, edges = overlay.flights(air, [edge_strength.as_strong(r, factors) for r in weak], seed)
     what = {"scenario": scene.name, "flights": len(laid), "seed": seed, "free_air_of": len(air),

@@ -58,12 +58,12 @@ def flown(chosen: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], v
     """Fly each course `repeats` times with the levers' values. Returns the flights, and the number that diverged."""
     out, lost, total = [], 0, repeats * len(chosen)
     for k in range(total):
-        wanted = chosen[k % len(chosen)]
-        log = fly.fly(wanted, vehicle, levers, values, seed, FIRST + k, fixed)
+        course = chosen[k % len(chosen)]
+        log = fly.fly(course, vehicle, levers, values, seed, FIRST + k, fixed)
         try:
             if isinstance(log, Diverged):
                 raise AirTouchError(str(log))
-            real = fly.simulated_course(log, wanted)
+            real = fly.simulated_course(log, course)
             out.append(Flown(real, k % len(chosen), channels(log), features(log, real)))
         except AirTouchError:
             lost += 1

@@ -98,8 +98,8 @@ def key(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], *, flights: int 
         fixed: Mapping[str, Any] | None = None) -> str:
     """Hash, of twelve digits, of everything that a round depends on; the number of rounds does not enter."""
     courses = [replace(course, source="") for course in aim.courses]
-    said = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
-    return hashlib.sha256(said.encode() + np.ascontiguousarray(aim.features).tobytes()).hexdigest()[:12]
+    text = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
+    return hashlib.sha256(text.encode() + np.ascontiguousarray(aim.features).tobytes()).hexdigest()[:12]
 
 
 def best(state: State) -> np.ndarray:

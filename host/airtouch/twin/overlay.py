@@ -64,9 +64,9 @@ def responses(scene: Scenario, vehicle: Vehicle, count: int, seed: int = 0,
     for number in range(SPARE * count):
         if len(out) == count:
             break
-        found = _response(scene, vehicle, seed, number)
-        if found is not None:
-            out.append(found)
+        response = _response(scene, vehicle, seed, number)
+        if response is not None:
+            out.append(response)
             progress(len(out), count)
     if len(out) < count:
         raise AirTouchError(f"{scene.name}: only {len(out)} of {SPARE * count} flights ended well and crossed one "
