@@ -63,7 +63,7 @@ class LazyGroup(Suggesting):
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="airtouch")
 def airtouch() -> None:
-    """AirTouch feels edges below a nano-quadcopter with the air under its rotors.
+    """AirTouch detects edges below a nano-quadcopter, and finds what a simulator of it gets wrong.
 
     Start with `airtouch demo`, or `airtouch logs info FLIGHT.csv`.
     """

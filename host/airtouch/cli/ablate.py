@@ -23,9 +23,9 @@ def _names() -> str:
               help="Run this one; may be given several times. All of them if left out.")
 @click.option("--steps", type=click.IntRange(1), help="Training steps of `best`; its own number if left out.")
 @click.option("--epochs", type=click.IntRange(1), help="Training epochs of `paper`; its own number if left out.")
-@click.option("--seed", default=0, show_default=True, help="Of training.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/ablate"), show_default=True,
-              help="Where finished folds are kept; a second run goes on from there.")
+              help="Folder for finished folds; a second run continues from it.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
 @click.option("--force", is_flag=True, help="Replace the JSON file.")
 def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epochs: int | None, seed: int, out: Path,

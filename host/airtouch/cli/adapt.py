@@ -32,7 +32,7 @@ MORE = 5  #: further flights whose benefit is estimated
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
 @click.option("--withhold-range", is_flag=True,
-              help="Take no labels from the flights in the last stage: what unlabelled flights bring.")
+              help="Use no labels in the last stage, to measure the benefit of unlabelled flights.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
               help="Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")

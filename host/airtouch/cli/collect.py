@@ -30,7 +30,7 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
               help="Folder for the logs.")
 @click.option("--name", help="Of the files; the mission's if left out.")
 @click.option("--flights", "-n", default=1, show_default=True,
-              help="How many; numbers go on from those that are there.")
+              help="Number of flights; they are numbered after those in the folder.")
 @click.option("--number", type=click.IntRange(min=1),
               help="Number of the first flight, instead of the next free one.")
 @click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Written into the log.")

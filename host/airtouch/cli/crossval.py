@@ -30,19 +30,19 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--without", metavar="GROUP", help="One split only: the flights of the folder or day GROUP are scored by "
               "a model of all others.")
 @click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
-              help="best: take this sensor from the flights that are scored.")
-@click.option("--silence-training", is_flag=True, help="With --silence: from the flights trained on, too.")
+              help="best: remove this sensor from the scored flights.")
+@click.option("--silence-training", is_flag=True, help="With --silence: remove it from the training flights too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
-              help="best: train on the flights of this folder too; nothing there is an edge. May be repeated.")
+              help="best: also train on the flights of this folder, which have no edges. May be repeated.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of flights whose manifest does not say.")
-@click.option("--seed", default=0, show_default=True, help="Of training.")
+              help="Commanded speed of flights without one in their manifest.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")
 @click.option("--random-epochs", type=click.IntRange(1), default=60, show_default=True,
               help="Training epochs of that split.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/crossval"), show_default=True,
-              help="Where finished folds are kept; a second run goes on from there.")
+              help="Folder for finished folds; a second run continues from it.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
 @click.option("--force", is_flag=True, help="Replace the JSON file.")
 @click.option("--ledger", type=click.Path(path_type=Path),

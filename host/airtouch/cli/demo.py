@@ -26,14 +26,14 @@ SHOWN = 4  #: flights plotted in the report
 @click.option("--flights", type=click.Path(path_type=Path),
               help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else simulated.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of flights whose manifest does not say.")
+              help="Commanded speed of flights without one in their manifest.")
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
 def command(out: Path, flights: Path | None, speed: float | None, epochs: int, force: bool) -> None:
-    """Train, prune, export, detect through the C kernels and the C int8 network, and report.
+    """Train, prune, quantise, export to C, detect with the C code, and report.
 
-    Takes under five minutes on two cores. You will see a score table of the paper's detector
-    beside its baseline on flights that neither has seen, and get an HTML report with plots.
+    Takes about two minutes on two cores. You will see a score table of three detectors on held-out flights, and
+    get an HTML report with plots.
     """
     need("train", "the demo trains a detector (airtouch gap demo needs nothing more), which")
     from airtouch.report.write import write_report

@@ -18,7 +18,7 @@ from airtouch.logs.files import check_free
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained model (.npz); the shipped one if left out.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of flights whose manifest does not say.")
+              help="Commanded speed of flights without one in their manifest.")
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
@@ -27,8 +27,8 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
             folds: tuple[int, ...], json_path: Path | None, force: bool) -> None:
     """Score a detector on FLIGHTS: files, or folders (the clean flights of its manifest.csv, else all).
 
-    Errors are detection distances: time error times speed, delay included, positive when early.
-    Truth is the step of the down range; it is never an input. Exit code 2 when a flight was left out.
+    True edges are steps of the down range, which no detector reads. An error in metres is the error in time times
+    the speed, positive when early. The exit code is 2 if a flight was left out.
     """
     check_free(json_path, force)
     module = registry.get(detector)

@@ -59,9 +59,9 @@ def _shared(function: Callable) -> Callable:
 @_shared
 def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
                     report: Path | None, json_path: Path | None, dask: str | None, force: bool) -> None:
-    """Map where REAL flights and the model part: channel, band, phase, regime.
+    """Map the gap between REAL flights and the model, by channel, band, phase and regime.
 
-    REAL and --baseline are log files, folders or patterns; REAL comes first.
+    REAL and --baseline are log files, folders or patterns; give REAL first.
     """
     from airtouch.cli import gap_input, gap_show
     from airtouch.gap import measure, on_cluster
@@ -89,16 +89,16 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
 
 @command.command("diagnose", cls=Greedy)
 @_shared
-@click.option("--without", multiple=True, metavar="EFFECT", help="Leave a candidate out; may be given again.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Exclude a candidate; may be repeated.")
 @click.option("--effects-file", "--effect-file", "effect_files", multiple=True, metavar="FILE",
-              help="Python file with effects of your own; may be given again.")
-@click.option("--each", is_flag=True, help="Every flight is a case of its own.")
+              help="Python file with effects of your own; may be repeated.")
+@click.option("--each", is_flag=True, help="Diagnose each flight alone.")
 def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
                      report: Path | None, json_path: Path | None, dask: str | None, force: bool,
                      without: tuple[str, ...], effect_files: tuple[str, ...], each: bool) -> None:
-    """Name the unmodelled effect that REAL flights have in common, and how much of the gap it is.
+    """Find the unmodelled effect that REAL flights have in common, and the part of the gap that it explains.
 
-    REAL and --baseline are log files, folders or patterns, REAL first; one flight is enough. The exit
+    REAL and --baseline are log files, folders or patterns; give REAL first. One flight is enough. The exit
     code is 0 for any verdict.
     """
     from airtouch.cli import gap_input, gap_show

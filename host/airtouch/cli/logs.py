@@ -83,7 +83,7 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
 @click.option("--format", "ending", type=click.Choice([e[1:] for e in (*ENDINGS, RERUN)]), default="csv.gz",
               show_default=True, help="Kind of file to write.")
 @click.option("--columns", "mapping", type=click.Path(), metavar="MAP.toml",
-              help="Read CSVs of someone else's by this file, which says which of their columns is which of ours.")
+              help="TOML file that maps the columns of other programs' CSV files to the schema.")
 @click.option("--plain", is_flag=True,
               help="With csv: a header and numbers alone, as PlotJuggler and spreadsheets want it.")
 @click.option("--rate", type=float, help="Resample to exactly this rate in Hz (else samples stay as logged).")

@@ -15,7 +15,7 @@ from airtouch.errors import AirTouchError
 @click.option("--speed", default=0.0, show_default="as fast as it goes", metavar="X",
               type=click.FloatRange(0, 1000), help="Times real time; 1 is as it was flown.")
 @click.option("--flown-at", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of a flight whose manifest does not say; turns seconds into metres.")
+              help="Commanded speed of a flight without one in its manifest; needed for errors in metres.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained `best` model (.npz); the shipped one if left out.")
 def command(flight: Path, speed: float, flown_at: float | None, model: Path | None) -> None:

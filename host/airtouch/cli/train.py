@@ -28,16 +28,16 @@ from airtouch.logs.flight_log import FlightLog
               help="Which detector to train: best, paper or paper-stream.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
               help="Model file to write.")
-@click.option("--epochs", type=click.IntRange(1), help="paper: at most so many; its own number if left out.")
+@click.option("--epochs", type=click.IntRange(1), help="paper: most training epochs; its own number if left out.")
 @click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
 @click.option("--start", type=click.Path(path_type=Path), metavar="MODEL.npz",
-              help="best: go on from this model instead of from nothing; 300 steps unless --steps says otherwise.")
+              help="best: train this model further; 300 steps if --steps is left out.")
 @click.option("--labelled", type=click.IntRange(1), metavar="K",
               help="best: train on K of the flights only, drawn by --seed.")
 @click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
-              help="best: take this sensor from the flights, for a network that never has it.")
+              help="best: remove this sensor from the flights, for logs that lack it.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
-              help="best: the flights of this folder too; nothing there is an edge. May be repeated.")
+              help="best: also train on the flights of this folder, which have no edges. May be repeated.")
 @click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
               help="Share of zeros: paper, in the first dense layer; best, in the dilated layers.")
 @click.option("--block", type=click.Choice(["1", "4"]),
@@ -57,10 +57,10 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
             scenario: str | None, without: tuple[str, ...], seed: int, force: bool) -> None:
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
 
-    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights; with --simulated N, flights of the simulator.
-    Flights that cannot be used are named and left out, and the exit code is 2. `paper` holds a share of the
-    flights out, to stop in time and to choose its decoding; `best` trains on all of them, and the same command goes on
-    after a stop: where it stands is kept beside --out, in a folder that ends in .training.
+    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights; with --simulated N, simulated flights. Flights that
+    cannot be used are listed and left out, and the exit code is 2. `paper` holds out 15 % of the flights, to stop
+    early and to choose its thresholds. `best` trains on all flights; its state is stored beside --out, in a folder
+    that ends in .training, and the same command continues after a stop.
     """
     if simulated and flights:
         raise click.UsageError("either FLIGHTS or --simulated, not both")

@@ -31,7 +31,7 @@ SUMMARY, REPORT = "twin.json", "report.html"
 @click.option("--batch", type=click.IntRange(40), default=240, show_default=True, help="Simulated flights a round.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes the result.")
 @click.option("--workers", type=click.IntRange(1), help="Threads; default one a core.")
-@click.option("--resume", is_flag=True, help="Go on with a fit that stopped.")
+@click.option("--resume", is_flag=True, help="Continue a fit that stopped.")
 @click.option("--force", is_flag=True, help="Replace the twin in --out.")
 def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | None, folds: tuple[int, ...],
             rounds: int, batch: int, seed: int, workers: int | None, resume: bool, force: bool) -> None:
@@ -42,14 +42,13 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     airtouch simulate twin/scenario.toml --vehicle twin/vehicle.toml --flights 100 --out simulated
     airtouch gap diagnose my-flights --vehicle twin/vehicle.toml
 
-    What to fly: take off, hover 5 s or more, then fly straight over a table or a box and on, and land. Four
-    flights at least, better twenty, at two or three heights over the box (2 to 10 cm). Log acceleration, gyro,
-    motor commands and the down range at 100 Hz. Nothing else is needed: heights, times and speeds
-    come from the logs.
+    What to fly: take off, hover for at least 5 s, fly straight over a table or a box and half a metre further, and
+    land. Fly at least four flights, better twenty, at two or three heights over the box (2 to 10 cm). Log
+    acceleration, gyro, motor commands and the down range at 100 Hz. Heights, times and speeds come from the logs.
 
     \b
-    report.html    recorded and simulated signals overlaid; medians around edges; how well a classifier tells
-                   the two apart, phase by phase (AUROC, 0.5 is closed); what stays different, largest first
+    report.html    recorded and simulated signals overlaid; medians around edges; AUROC of a classifier of the
+                   two, by phase (0.5: indistinguishable); the remaining differences, largest first
     vehicle.toml   and scenario.toml: the twin, for simulate, gap and train
     """
     from airtouch.extras import need

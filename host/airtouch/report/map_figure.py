@@ -91,11 +91,10 @@ def _ends(ax: Axes, xy: np.ndarray) -> None:
 
 def _scale_bar(ax: Axes) -> None:
     """Draw a scale bar of a round length at the lower left."""
-    ax.autoscale(False)
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * (x1 - x0)), 0.05)
     x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
-    ax.plot([x, x + length], [y, y], color="black", lw=3, solid_capstyle="butt")
+    ax.plot([x, x + length], [y, y], color="black", lw=3, solid_capstyle="butt", scalex=False, scaley=False)
     ax.text(x + length / 2, y, f"{length:g} m", ha="center", va="bottom", fontsize=8)
 
 
