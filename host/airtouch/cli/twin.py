@@ -48,7 +48,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
 
     \b
     report.html    recorded and simulated signals overlaid; medians around edges; AUROC of a classifier of the
-                   two, by phase (0.5: indistinguishable); the remaining differences, largest first
+                   two, by phase (0.5 is closed); the remaining differences, largest first
     vehicle.toml   and scenario.toml: the twin, for simulate, gap and train
     """
     from airtouch.extras import need
