@@ -183,7 +183,7 @@ def test_a_setting_that_is_never_answered_is_told(serve, hop, cache, tmp_path):
     with serve() as virtual:
         drone = Drone(virtual.uri, cache)
         try:
-            virtual.clock.wait_for(lambda: drone._cf.param.is_updated)
+            virtual.clock.wait_for(lambda: drone.crazyflie.param.is_updated)
             virtual.script = lambda packet, answers: []
             with pytest.raises(AirTouchError, match="airtouch.pFa: the drone did not answer; is the link good"):
                 drone.set_parameter("airtouch.pFa", "0.1")

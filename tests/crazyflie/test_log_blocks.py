@@ -90,7 +90,7 @@ def test_blocks_are_asked_for_again_however_often_the_drone_forgets_them(far, dr
     for _ in range(20):  # cflib counts 16 blocks and 128 variables at most
         far.firmware.log.reset()
         drone.revive()
-        far.clock.wait_for(lambda: not drone._reviving.is_alive())
+        far.clock.wait_for(lambda: not drone.reviving)
         assert len(far.firmware.log.blocks) == 2
     drain(drone.samples)
     far.clock.sleep(0.2)
@@ -101,7 +101,7 @@ def test_the_link_may_go_while_a_command_is_sent(far, drone):
     closed = threading.Event()
 
     def close():
-        disconnect(drone._cf)
+        disconnect(drone.crazyflie)
         closed.set()
 
     def break_off():
@@ -111,10 +111,10 @@ def test_the_link_may_go_while_a_command_is_sent(far, drone):
 
     (link,) = far.links
     link.about_to_send = break_off
-    drone._cf.log.reset()
+    drone.crazyflie.log.reset()
     assert closed.is_set()
     drone.ping()  # nobody holds the sender's lock
-    assert drone._cf.link.receive_packet(0) is None  # as a receiver that saw the link before it went
+    assert drone.crazyflie.link.receive_packet(0) is None  # as a receiver that saw the link before it went
 
 
 def test_answers_come_while_their_packet_is_repeated():
@@ -130,6 +130,6 @@ def test_answers_come_while_their_packet_is_repeated():
 
 
 def test_a_block_on_a_dead_link_is_told_in_plain_words(far, drone):
-    disconnect(drone._cf)
+    disconnect(drone.crazyflie)
     with pytest.raises(AirTouchError, match="log block motion: the link is closed"):
         drone.start(blocks.MOTION)

@@ -138,7 +138,7 @@ def counts_of_flow(x, distance, top):
     """Forward counts of the optical flow, sum of 0.2 s at 0.3 m/s, so far above what lies below x."""
     plan = draw_flight(height.mission(height.CASES[0]), 1, 0)
     plant = Plant(plan, vehicles.load("crazyflie-2.1-flow"), 1, 0, [])
-    drone = plant._stepper.plant[0]
+    drone = plant.stepper.plant[0]
     drone["flow_noise"] = 0.0
     total = 0.0
     for _ in range(300):

@@ -27,8 +27,8 @@ def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind") / "set"
     patch = pytest.MonkeyPatch()
     patch.setattr(blind, "strengths", lambda *_: CLEAR)
-    calibrated, study_in = [], blind_run._study_in
-    patch.setattr(blind_run, "_study_in", lambda of: calibrated.append(study_in(of)) or calibrated[-1])
+    calibrated, study_in = [], blind_run.study_in
+    patch.setattr(blind_run, "study_in", lambda of: calibrated.append(study_in(of)) or calibrated[-1])
     found = blind_run.run(folder, 10, seed=3, workers=2, unknown=2)
     patch.undo()
     assert len(calibrated) == 1, "a set is calibrated once"
@@ -62,7 +62,7 @@ def test_a_process_that_dies_loses_nothing(checked, tmp_path, monkeypatch):
     folder, *_ = checked
     monkeypatch.setenv("DIED", str(tmp_path / "died"))
     monkeypatch.setenv("ANSWERS", str(folder / "answers"))
-    monkeypatch.setattr(blind_run, "_with_study", dying)
+    monkeypatch.setattr(blind_run, "with_study", dying)
     names, said = [f"flight_{i:04d}" for i in range(3)], []
     blind_run.answer(folder, tmp_path / "answers", [(n, ()) for n in names], 2, said.append, object())
     assert (tmp_path / "died").exists() and any("died" in s for s in said)
@@ -71,7 +71,7 @@ def test_a_process_that_dies_loses_nothing(checked, tmp_path, monkeypatch):
 
 
 def test_processes_that_die_again_and_again_are_told(checked, tmp_path, monkeypatch):
-    monkeypatch.setattr(blind_run, "_with_study", always_dying)
+    monkeypatch.setattr(blind_run, "with_study", always_dying)
     with pytest.raises(AirTouchError, match="4 processes died"):
         blind_run.answer(checked[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
                          study=object())

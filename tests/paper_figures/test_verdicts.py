@@ -166,9 +166,9 @@ def seen(monkeypatch, camera_m, felt_m):
 
     ways = ("classical", "fusion", *vision_figures.weights.SIZES)
     there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in vision_figures.LUX}
-    monkeypatch.setattr(vision_figures, "_everything",
+    monkeypatch.setattr(vision_figures, "everything",
                         lambda _: (films, there, {n: crossed(felt_m) for n in ("best", "paper")}))
-    monkeypatch.setattr(vision_figures, "_scores", lambda films, found: [
+    monkeypatch.setattr(vision_figures, "film_scores", lambda films, found: [
         FlightScore("f", Condition(speed_mps=0.3), tuple(EdgeScore(
             e.kind, e.sample, d.sample, "edge", (e.sample - d.sample) * 0.01, (e.sample - d.sample) * 0.003)
             for e, d in zip(film.edges, some, strict=True)), (), 2, 10.0) for film,

@@ -139,8 +139,8 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     scored = []
     monkeypatch.setattr(adapt, "together",
                         lambda start, twin, flights, *_: frozenset(str(f.file.path) for f in flights))
-    monkeypatch.setattr(adapt, "_model", lambda path, make: make())
-    monkeypatch.setattr(adapt, "_scores", lambda path, flights, model: scored.append(
+    monkeypatch.setattr(adapt, "kept_model", lambda path, make: make())
+    monkeypatch.setattr(adapt, "kept_scores", lambda path, flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
     flights = flights_of(made, 8)
     held, half = adapt.held_out_scores(flights, flights, [], None, None, tmp_path, "key", 0, None, "")

@@ -23,7 +23,7 @@ class Plant:
     """
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: list) -> None:
-        self._stepper = s = Stepper(plan, vehicle, seed, flight, active)
+        self.stepper = s = Stepper(plan, vehicle, seed, flight, active)
         s.plant["firmware"]["filters"]["acc_hz"] = 0.0  # the real firmware has its own
         s.plant["gyro_lowpass"] = 0.0
         # The simulator's flow is that of recorded flights, whose firmware was corrected for the platform: it follows
@@ -36,12 +36,12 @@ class Plant:
     def step(self, pwm: np.ndarray) -> int:
         """Two milliseconds under this PWM (4,): loop.OK or how it ended; `readings` as of their beginning."""
         self.state["motors"]["pwm"] = pwm
-        return _step(self._stepper.flight, self.readings)
+        return _step(self.stepper.flight, self.readings)
 
     @property
     def place(self) -> np.ndarray:
         """Position (3,) of the down range sensor over the floor, m."""
-        return self.state["body"]["state"][:3] - [0.0, 0.0, float(self._stepper.plant[0]["range_below_rotors"])]
+        return self.state["body"]["state"][:3] - [0.0, 0.0, float(self.stepper.plant[0]["range_below_rotors"])]
 
     @property
     def top(self) -> float:

@@ -38,13 +38,13 @@ class Drone:
         self.round_trip_s = float("nan")
         self._log = LogBlocks(self.samples)
         self._reviving: threading.Thread | None = None
-        self._cf: Any = None
+        self.crazyflie: Any = None  #: cflib's, while there is a link
         self._listen(connect(uri, cache, patience_s, self._console.put))
 
     # connection
 
     def _listen(self, cf: Any) -> None:
-        self._cf = cf
+        self.crazyflie = cf
         self.lost.clear()
         cf.connection_lost.add_callback(lambda *_: self.lost.set())
         cf.add_port_callback(8, self._on_answer)
@@ -57,25 +57,25 @@ class Drone:
 
         Raises AirTouchError if nobody answers for `patience_s`.
         """
-        disconnect(self._cf)
+        disconnect(self.crazyflie)
         self._listen(connect(self.uri, self.cache, patience_s, self._console.put))
         for block in self.blocks:
             self.start(block)
 
     def close(self) -> None:
         """Close the link. The drone must be on the ground."""
-        disconnect(self._cf)
+        disconnect(self.crazyflie)
 
     # variables and parameters
 
     @property
     def variables(self) -> set[str]:
         """Names of its log variables."""
-        return {f"{group}.{name}" for group, names in self._cf.log.toc.toc.items() for name in names}
+        return {f"{group}.{name}" for group, names in self.crazyflie.log.toc.toc.items() for name in names}
 
     def has_parameter(self, name: str) -> bool:
         """True if the firmware has the parameter."""
-        return self._cf.param.toc.get_element(*name.split(".", 1)) is not None
+        return self.crazyflie.param.toc.get_element(*name.split(".", 1)) is not None
 
     def parameter(self, name: str, patience_s: float = 10.0) -> float | None:
         """A parameter's value; None if the firmware does not have it, or it does not arrive for `patience_s`."""
@@ -84,7 +84,7 @@ class Drone:
         group, short = name.split(".", 1)
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
-            value = self._cf.param.values.get(group, {}).get(short)
+            value = self.crazyflie.param.values.get(group, {}).get(short)
             if value is not None:
                 return float(value)
             time.sleep(0.02)
@@ -92,7 +92,7 @@ class Drone:
 
     def set_parameter(self, name: str, text: str, patience_s: float = 10.0) -> None:
         """Set a parameter and read it back. Raises AirTouchError if the drone does not have it or keep the value."""
-        element = self._cf.param.toc.get_element(*name.split(".", 1))
+        element = self.crazyflie.param.toc.get_element(*name.split(".", 1))
         if element is None:
             raise AirTouchError(f"{name}: this firmware has no such parameter")
         if element.get_readable_access() == "RO":
@@ -106,16 +106,16 @@ class Drone:
             updates.append(float(text))
 
         group, short = name.split(".", 1)
-        self._cf.param.add_update_callback(group, short, update)
+        self.crazyflie.param.add_update_callback(group, short, update)
         deadline = time.monotonic() + patience_s
         try:
-            while not self._cf.param.is_updated and time.monotonic() < deadline:
+            while not self.crazyflie.param.is_updated and time.monotonic() < deadline:
                 time.sleep(0.02)
-            _next(updates, deadline, lambda: self._cf.param.set_value(name, value))
+            _next(updates, deadline, lambda: self.crazyflie.param.set_value(name, value))
             time.sleep(TAKEN_S)  # the first answer repeats the request; the app may still change the value
-            stored = _next(updates, deadline, lambda: self._cf.param.request_param_update(name))
+            stored = _next(updates, deadline, lambda: self.crazyflie.param.request_param_update(name))
         finally:
-            self._cf.param.remove_update_callback(group, short, update)
+            self.crazyflie.param.remove_update_callback(group, short, update)
         if stored is None:
             raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
         if abs(stored - value) > 1e-6 * max(abs(value), 1.0):
@@ -124,7 +124,7 @@ class Drone:
     @property
     def protocol(self) -> int:
         """Version of the drone's CRTP protocol."""
-        return int(self._cf.platform.get_protocol_version())
+        return int(self.crazyflie.platform.get_protocol_version())
 
     # log blocks
 
@@ -136,9 +136,14 @@ class Drone:
 
     def revive(self) -> None:
         """Request the log blocks again, in a thread: the firmware deletes them when the link is down."""
-        if self._reviving is None or not self._reviving.is_alive():
+        if not self.reviving:
             self._reviving = threading.Thread(target=self._revive, name="airtouch-revive", daemon=True)
             self._reviving.start()
+
+    @property
+    def reviving(self) -> bool:
+        """Whether the log blocks are being requested again."""
+        return self._reviving is not None and self._reviving.is_alive()
 
     def _revive(self) -> None:
         for block in list(self.blocks):
@@ -150,7 +155,7 @@ class Drone:
     def ping(self) -> None:
         """Request an echo. `round_trip_s` is the time that the last echo took."""
         if not self.lost.is_set():
-            self._cf.link_statistics.latency.ping()
+            self.crazyflie.link_statistics.latency.ping()
 
     def said(self) -> list[str]:
         """The complete lines of its console since the last call."""
@@ -165,7 +170,7 @@ class Drone:
         """Send commands to the high-level commander; the answers go to `answers`. Without a link nothing is sent."""
         if self.lost.is_set():
             return
-        high = self._cf.high_level_commander
+        high = self.crazyflie.high_level_commander
         for c in commands:
             if c.kind == "take-off":
                 high.takeoff(c.z_m, c.seconds, yaw=c.yaw_rad)
@@ -178,7 +183,7 @@ class Drone:
 
     def arm(self) -> None:
         """Request arming. Brushless drones need it; others arm themselves."""
-        self._cf.supervisor.send_arming_request(True)
+        self.crazyflie.supervisor.send_arming_request(True)
 
     def _on_answer(self, packet: Any) -> None:
         if len(packet.data) >= 4 and packet.data[0] in KINDS:

@@ -46,7 +46,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
         blind.make(out, flights, seed, kinds=list(kinds) if kinds else None, progress=progress)
     answers = out / "answers"
     names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
-    study = _study_in(out)
+    study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
     first = sorted(answers.glob("flight_????.json"))
     # the key is opened for the answers above; effects can be withheld only when they are known
@@ -71,7 +71,7 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
         todo = [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
         if not todo:
             return
-        study = study or _study_in(folder)
+        study = study or study_in(folder)
         logs = ((name, without, read(folder / f"{name}.csv.gz")) for name, without in todo)
         try:
             for name, without, text in _answers(study, logs, min(workers, len(todo)), spread):
@@ -88,14 +88,15 @@ def _answers(study: Study, logs: Iterable[Case], workers: int, spread: Mapper | 
         yield from (spread or map)(partial(_diagnosed, study), logs)
         return
     with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
-        yield from in_order(lambda case: pool.submit(_with_study, case), logs, AHEAD * workers)
+        yield from in_order(lambda case: pool.submit(with_study, case), logs, AHEAD * workers)
 
 
 def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
     return answers / ".".join([name, *(["without", *without] if without else []), "json"])
 
 
-def _study_in(folder: Path) -> Study:
+def study_in(folder: Path) -> Study:
+    """The study that a sealed set's own vehicle and nominal flights give."""
     return blind.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
 
 
@@ -105,8 +106,9 @@ def _begin(study: Study | None) -> None:
     _study = study
 
 
-def _with_study(case: Case) -> Answer:
-    assert _study is not None  # which `_begin` has set in this process
+def with_study(case: Case) -> Answer:
+    """The answer to one case, in a process that `_begin` has given the study."""
+    assert _study is not None
     return _diagnosed(_study, case)
 
 

@@ -33,13 +33,13 @@ LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate mov
 
 def light(job: Job) -> Figure:
     """Performance:3b: errors of the camera and of AirTouch from 500 to 5 lux."""
-    films, seen, felt = _everything(job)
+    films, seen, felt = everything(job)
     table, rows = [], {}
     for lux in _lux(job):
         for name in ("classical", "teed"):
-            rows[name, lux] = row = summary.summarise(_scores(films, seen[name, lux]))
+            rows[name, lux] = row = summary.summarise(film_scores(films, seen[name, lux]))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux))
-    ours = {name: summary.summarise(_scores(films, felt[name])) for name in FELT}
+    ours = {name: summary.summarise(film_scores(films, felt[name])) for name in FELT}
     table += [words.table_row(f"{name}, any light", row, detector=name) for name, row in ours.items()]
 
     def text(lux: float) -> str:
@@ -83,15 +83,15 @@ def light(job: Job) -> Figure:
 
 def network_size(job: Job) -> Figure:
     """Performance:3c: the camera's errors against the size of its network, AirTouch's against the size of its own."""
-    films, seen, felt = _everything(job)
+    films, seen, felt = everything(job)
     lux = SIZE_LUX
-    rows = {name: summary.summarise(_scores(films, seen[name, lux])) for name in weights.SIZES}
+    rows = {name: summary.summarise(film_scores(films, seen[name, lux])) for name in weights.SIZES}
     table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux)
              for name, r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
     text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
                      for n, r in rows.items())
-    ours = {name: summary.summarise(_scores(films, felt[name])) for name in FELT}
+    ours = {name: summary.summarise(film_scores(films, felt[name])) for name in FELT}
     verdicts = {"network-vision": words.judged(words.worse(full, least), f"at 100 lux {text}"),
                 "network-airtouch": _airtouch_sizes(job, table)}
 
@@ -129,13 +129,13 @@ def _airtouch_sizes(job: Job, table: list[dict[str, Any]]) -> Verdict:
 
 def fusion(job: Job) -> Figure:
     """Late fusion of camera and AirTouch: the timed F1 of each and of both at every illuminance."""
-    films, seen, felt = _everything(job)
+    films, seen, felt = everything(job)
     table, scores = [], {}
     for lux in _lux(job):
         found = {"camera": seen["teed", lux], "AirTouch": felt["best"], "both": seen["fusion", lux]}
         for name, some in found.items():
             scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(films, some, strict=True)])
-            row = summary.summarise(_scores(films, some))
+            row = summary.summarise(film_scores(films, some))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux,
                                          timed_f1=scores[name, lux]))
         table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(films, found)
@@ -184,7 +184,7 @@ def _loss(films: Sequence[Any], found: dict[str, Any], draws: int = 2000) -> tup
     return float(f1(better, whole) - f1("both", whole)), float(low), float(high)
 
 
-def _everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dict[str, list]]:
+def everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dict[str, list]]:
     """The films to score, (method, lux) -> crossings of each film, and detector -> crossings of each.
 
     Results are stored in the work folder.
@@ -249,7 +249,8 @@ def _labelled(canvas: Any, left: Any, right: Any) -> None:
     canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
 
 
-def _scores(films: list[Any], found: list[Any]) -> list[FlightScore]:
+def film_scores(films: list[Any], found: list[Any]) -> list[FlightScore]:
+    """A score a film, of the crossings found in each."""
     from airtouch.vision import compare
 
     return compare.scored(films, found)

@@ -97,18 +97,18 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     key = _key(flights, scene, vehicle, start, seed)
     flown, what = simulated_flights(flights, scene, vehicle, seed, progress)
     flown = replace(flown, logs=[sensors.without(log, absent) for log in flown.logs])
-    twin = _model(work / f"twin_{key}.npz", lambda: best.fit(
+    twin = kept_model(work / f"twin_{key}.npz", lambda: best.fit(
         flown.logs, seed, start=start, pseudo_labels=flown.edges, decoder=None if start else DECODER,
         steps=TWIN_STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"),
         command=command))
     labelled = [f for f in flights if f.labelled]
-    twin_only = _scores(work / f"twin_{key}.json", labelled, twin)
+    twin_only = kept_scores(work / f"twin_{key}.json", labelled, twin)
     held, half = [], []
     if hold_out and len(labelled) >= FEWEST:
         held, half = held_out_scores(flights, labelled, flown, start, twin, work, key, seed, progress, command)
     last = [_without_range(f) for f in flights] if withhold else flights
     name = "unlabelled" if withhold else "all"
-    model = _model(work / f"{name}_{key}.npz",
+    model = kept_model(work / f"{name}_{key}.npz",
                    lambda: together(start, twin, last, flown, seed, _named(progress, "all flights"), command))
     own = sum(f.labelled for f in last)
     known = {"twin": what, "labelled": own, "pseudo_labelled": len(flights) - own}
@@ -179,8 +179,8 @@ def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown
             path = work / f"fold{k}_{share}_{key}"
             name = f"hold-out {k + 1}/{folds}" + (" (half)" if share == 2 else "")
             learn = partial(together, start, twin, [*some, *others], flown, seed, _named(progress, name), command)
-            model = _model(path.with_suffix(".npz"), learn)
-            into += _scores(path.with_suffix(".json"), test, model)
+            model = kept_model(path.with_suffix(".npz"), learn)
+            into += kept_scores(path.with_suffix(".json"), test, model)
     return held, half
 
 
@@ -206,7 +206,8 @@ def _without_range(flight: Flight) -> Flight:
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
 
-def _model(path: Path, make: Callable[[], BestModel]) -> BestModel:
+def kept_model(path: Path, make: Callable[[], BestModel]) -> BestModel:
+    """The model in a file; where there is none it is made and saved there."""
     if path.is_file():
         return best.load(path)
     model = make()
@@ -214,7 +215,8 @@ def _model(path: Path, make: Callable[[], BestModel]) -> BestModel:
     return model
 
 
-def _scores(path: Path, flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
+def kept_scores(path: Path, flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
+    """Scores of flights in a JSON file; where there is none the flights are scored and it is written."""
     if path.is_file():
         return [FlightScore.from_dict(s) for s in json.loads(path.read_text())]
     scores = [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]

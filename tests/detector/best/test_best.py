@@ -34,7 +34,7 @@ def test_the_same_arguments_give_the_same_bits(small):
 
 def test_what_is_compiled_is_known_by_all_that_it_reads():
     """A field that the compiled step read and COMPILED lacked would be taken from another recipe."""
-    read = {name for part in (training._compiled.__wrapped__, *(o.weight for o in OUTPUTS), Recipe.graph.fget)
+    read = {name for part in (training.compiled_step.__wrapped__, *(o.weight for o in OUTPUTS), Recipe.graph.fget)
             for name in re.findall(r"(?:recipe|self)\.(\w+)", inspect.getsource(part))}
     assert read - {"graph"} == set(training.COMPILED)
 

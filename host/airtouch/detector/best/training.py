@@ -65,7 +65,8 @@ def fit(flights: Sequence[Flight], recipe: Recipe, seed: int,
 
 def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
     """(model with these weights, optimizer, masks, learn(x, y) -> loss), before the first step."""
-    model, optimizer, untouched, masks, learn = _compiled(Recipe(**{name: getattr(recipe, name) for name in COMPILED}))
+    alike = Recipe(**{name: getattr(recipe, name) for name in COMPILED})
+    model, optimizer, untouched, masks, learn = compiled_step(alike)
     model.set_weights(weights)
     for variable, value in zip(optimizer.variables, untouched, strict=True):
         variable.assign(value)
@@ -74,7 +75,7 @@ def _learner(recipe: Recipe, weights: list[np.ndarray]) -> tuple:
 
 # all folds of a cross-validation, and most ablations, share one: compiling takes as long as 100 steps
 @lru_cache(maxsize=4)
-def _compiled(recipe: Recipe) -> tuple:
+def compiled_step(recipe: Recipe) -> tuple:
     """Model, optimizer, the values of its variables before the first step, masks, one compiled step of learning.
 
     recipe: with nothing of its own but COMPILED.
