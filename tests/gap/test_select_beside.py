@@ -109,27 +109,53 @@ PWM = 40000.0  #: of the made hovers
 LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
 
 
-def one_motor_weak(rotor, louder=1.0):
-    """A hover in which one rotor has lost a five hundredth of its lift: what is missing turns the vehicle, by hand."""
-    front, left, yaw = {1: (1, -1, 1), 2: (-1, -1, -1), 3: (-1, 1, 1), 4: (1, 1, -1)}[rotor]  # 1, 3 turn to the left
-    lost_n = 0.002 * LIFT_N
-    one = made(11, (0.0, 0.0, -lost_n / VEHICLE.mass_kg), louder, length_s=20.0)
+#: front and left (+1) of each rotor; 1 and 3 turn to the left, and without their drag the vehicle yaws that way
+PLACE = {1: (1, -1, 1), 2: (-1, -1, -1), 3: (-1, 1, 1), 4: (1, 1, -1)}
+
+
+def weak(louder=1.0, **losses):
+    """A hover in which rotors (`r1` to `r4`) have lost a share of their lift: what is missing turns it, by hand."""
+    lost_n = {int(name[1]): share * LIFT_N for name, share in losses.items()}
+    one = made(11, (0.0, 0.0, -sum(lost_n.values()) / VEHICLE.mass_kg), louder, length_s=20.0)
     arm = VEHICLE.arm_m / np.sqrt(2.0)  # it sinks on that side: x to the front, y to the left, z up
-    torque = lost_n * np.array([-left * arm, front * arm, yaw * VEHICLE.yaw_torque_over_thrust_m])
+    torque = sum(n * np.array([-left * arm, front * arm, yaw * VEHICLE.yaw_torque_over_thrust_m])
+                 for n, (front, left, yaw) in ((n, PLACE[r]) for r, n in lost_n.items()))
     turning = torque / np.array(VEHICLE.inertia_kg_m2)
     return replace(one, rates=one.rates + np.arange(len(one))[:, None] * 0.01 * turning)
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_the_rotor_that_is_weak_is_the_one_whose_side_sinks(rotor):
-    selection, _ = found([one_motor_weak(rotor)], ("weak_motor",))
+    selection, _ = found([weak(**{f"r{rotor}": 0.002})], ("weak_motor",))
     (step,) = selection.steps
     assert step.terms[0].values["rotor"] == rotor
     assert step.terms[0].values["thrust_loss"] == pytest.approx(0.002, rel=0.1)
 
 
+def test_two_weak_rotors_have_a_strength_each():
+    selection, _ = found([weak(r1=0.002, r2=0.005)], ("weak_motor",))
+    first, second = selection.steps
+    losses = {t.values["rotor"]: t.values["thrust_loss"] for t in selection.whole.terms}
+    assert losses == {2.0: pytest.approx(0.005, rel=0.1), 1.0: pytest.approx(0.002, rel=0.1)}
+    assert first.terms[0].values["rotor"] == 2.0
+    unit = losses[1.0] / second.terms[1].scaled(second.terms[1].values)[0]
+    assert second.strength[0] * unit == pytest.approx(0.002, rel=0.1), "its own, not the first one's"
+
+
+def test_what_the_log_has_lost_makes_no_model_less_exact():
+    """Of a tenth that another effect must gain in recorded flights, lost rows count for nothing."""
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    one = replace(made(2, (0.0, 0.0, -0.1), louder=1.25), lost=lost)
+    said, names = [], ("mass", "imu_noise", "packet_loss")
+    selection, _ = found([one], names, scattered(), progress=said.append)
+    assert [s.name for s in selection.steps] == ["packet_loss", "mass", "imu_noise"]
+    gained = gains(selection)
+    assert 0.1 * gained["mass"] < gained["imu_noise"] < 0.1 * (gained["mass"] + gained["packet_loss"])
+    assert said.count("imu_noise") >= 3, "told in every round"
+
+
 def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant():
-    selection, data = found([one_motor_weak(2, louder=2.0)], ("weak_motor", "imu_noise"))
+    selection, data = found([weak(louder=2.0, r2=0.002)], ("weak_motor", "imu_noise"))
     added = {s.name: s.share for s in selection.named}
     assert set(added) == {"weak_motor", "imu_noise"}
     of = {t.name: t for t in selection.whole.terms}
