@@ -98,15 +98,20 @@ class Selection:
     def allowed(self) -> float:
         """Log likelihood that a nameless model may gain on top of the effects named where they are right.
 
-        The fewer nominal flights there are, the farther off may another one lie; of a simulator's the table knows many.
+        The fewer nominal flights there are, the farther off may another one lie.
         """
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         gained = self.whole.gain if self.whole else 0.0
         if self.simulated:
-            return max(UNKNOWN_GAIN, UNKNOWN_SHARE * gained)
+            return max(self.least_left, UNKNOWN_SHARE * gained)
         share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
-        return max(UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1), share * gained, self.usual)
+        return max(self.least_left, share * gained, self.usual)
+
+    @property
+    def least_left(self) -> float:
+        """Log likelihood that is no news however little the effects named gain, with two nominal flights or more."""
+        return UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1)
 
     @property
     def unlike(self) -> float:
@@ -116,7 +121,7 @@ class Selection:
     @property
     def loss(self) -> float:
         """What the effects named lose where they say what is not there, of what may be chance."""
-        return self.contradicted[0] / UNKNOWN_GAIN
+        return self.contradicted[0] / self.least_left if self.contradicted[0] else 0.0
 
     @property
     def explained(self) -> bool:

@@ -12,7 +12,7 @@ from airtouch.gap.data import Study
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.motion import held
 from airtouch.gap.result import Cell
-from airtouch.gap.selection import UNKNOWN_GAIN, Judged, Selection
+from airtouch.gap.selection import Judged, Selection
 from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies, starts
 from airtouch.simulation import signals as at
 
@@ -76,7 +76,7 @@ def against(selection: Selection) -> str:
     lost, worst = selection.contradicted
     if selection.loss == selection.unlike:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
-                f"{UNKNOWN_GAIN:.0f} may be chance")
+                f"{selection.least_left:.0f} may be chance")
     return (f"a model without names gains {max(selection.free_after, 0.0):.0f} nats beside it, up to "
             f"{selection.allowed:.0f} may be left")
 
