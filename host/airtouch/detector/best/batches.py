@@ -1,6 +1,5 @@
 """Training batches of `best`: crops of flights, augmented."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -17,7 +16,6 @@ from airtouch.reference.motion_channels import CHANNEL_TABLE, NAMES, MotionConfi
 #: Sign of each column in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
 MIRROR = np.array([*(channel.mirror for channel in CHANNEL_TABLE), 1], dtype=np.float32)
 FORWARD, LEFT, EMPTY = (NAMES.index(name) for name in ("ax", "ay", "zero"))
-SHORTEST, JOINT = 50.0, 20.0  #: samples: what is left of a shortened pass at least, over which its parts are blended
 AHEAD, BEHIND = 300, 150  #: samples before take-off where a crop may start, and after the last one where it may end
 
 
@@ -102,38 +100,11 @@ def _crop(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[np.
     speed = 1.0 + recipe.warp * rng.uniform(-1, 1)
     last = len(flight.x) - 1
     start = crop_start(flight, recipe, speed, rng)
-    t = start + speed * np.arange(recipe.crop)
-    joint, cut = _shortened(flight, recipe, rng) if recipe.short_passes else (0.0, 0.0)
-    if not cut:
-        return _rows(flight.x, t), flight.goals[np.round(np.clip(t[::STRIDE], 0, last)).astype(int)]
-    t -= cut * (joint < t[-1])  # the end of the crop stays where it was
-    later = np.clip((t - joint) / JOINT + 0.5, 0.0, 1.0).astype(np.float32)[:, None]
-    x = _rows(flight.x, t) * (1 - later) + _rows(flight.x, t + cut) * later
-    shown = t + cut * (t >= joint)
-    return x, flight.goals[np.round(np.clip(shown[::STRIDE], 0, last)).astype(int)]
-
-
-def _rows(x: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """The channels at times t, samples, between two rows by straight lines; before and after them the ends repeat."""
-    t = np.clip(t, 0, len(x) - 1)
-    low = np.minimum(t.astype(int), len(x) - 2)
+    t = np.clip(start + speed * np.arange(recipe.crop), 0, last)
+    low = np.minimum(t.astype(int), last - 1)
     part = (t - low)[:, None].astype(np.float32)
-    return x[low] * (1 - part) + x[low + 1] * part
-
-
-def _shortened(flight: Flight, recipe: Recipe, rng: np.random.Generator) -> tuple[float, float]:
-    """(sample, length) of a stretch over one platform to leave out; length 0: none.
-
-    SHORTEST or more of the pass stays, most of it before the joint: what the entry starts there takes longer to die out
-    than what announces the exit.
-    """
-    passes = [(a, b) for a, b in itertools.pairwise(flight.edges)
-              if flight.goals[(a + b) // 2, 0] > 0.5 and b - a > SHORTEST]
-    if not passes or rng.random() >= recipe.short_passes:
-        return 0.0, 0.0
-    entry, leave = passes[int(rng.integers(len(passes)))]
-    left = rng.uniform(SHORTEST, leave - entry)
-    return float(entry + rng.uniform(0.5, 0.8) * left), float(leave - entry - left)
+    x = flight.x[low] * (1 - part) + flight.x[low + 1] * part
+    return x, flight.goals[np.round(t[::STRIDE]).astype(int)]
 
 
 def crop_start(flight: Flight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:

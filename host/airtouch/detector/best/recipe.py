@@ -48,7 +48,6 @@ class Recipe:
     yaw_deg: float = 20.0  #: largest turn about the vertical, degrees
     warp: float = 0.08  #: largest stretch of time, share
     mirror: float = 0.5  #: share of the crops that are mirrored left to right
-    short_passes: float = 0.0  #: share of the crops over a platform that lose the middle of it
     # Missing sensors, phases and free air
     silent_acceleration: float = 0.15  #: share of the crops without acceleration, so that the network runs without it
     silent_rates: float = 0.05  #: share of the crops without rates
