@@ -121,6 +121,9 @@ def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[
     lost = [bridging_power(f, vehicle, calibration, s[AIR], q, answer)
             for f, s, q in zip(flights, first, quiet, strict=True)]
     floor = floor_of(flights, left, first, made, least, lost)
+    if law is not None and answer is not None and answer.stepped is not None:
+        over = answer.stepped.power / np.maximum(answer.steady.power, 1e-30)
+        law = law.with_steps(answer.stepped.told, over, frequencies(AIR))
     return Study(vehicle, calibration, law, floor, answer, nominal=len(flights))
 
 

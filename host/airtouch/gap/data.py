@@ -10,7 +10,7 @@ from airtouch.gap.channels import TORQUE, angular_acceleration
 from airtouch.gap.flight import Flight
 from airtouch.gap.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.nominal_scatter import Scatter
-from airtouch.gap.response import Response
+from airtouch.gap.response import FIRST_BIN, Response
 from airtouch.gap.spectra import AIR, REST, Floor, blocks, frequencies, starts
 from airtouch.gap.twin import COMMAND_ONLY, Twin
 from airtouch.simulation.effects import Active
@@ -100,6 +100,25 @@ def _applied(data: Data, response: Response, active: Sequence[Active], replayed:
     sets = zip(data.flights, data.quiet, data.turning, *replays, every, strict=True)
     return [e if f.rates is None else {**e, AIR: response.applied(q, m, n[AIR], d[AIR], o[AIR], e[AIR], change)}
             for f, q, m, n, d, o, e in sets]
+
+
+def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
+    """Power that the gap may have by flight and regime, as `spectra`, where effects change what is cut of a step.
+
+    None where they change nothing of it.
+    """
+    response, law = data.study.response, data.study.controller
+    change = law.torque_change(active, frequencies(AIR)) if response is not None and law is not None else None
+    if response is None or change is None or not change.cut.any():
+        return None
+    out = []
+    for f, q, turned, nominal in zip(data.flights, data.quiet, data.turning, _replayed(data, ()), strict=True):
+        power = {r: np.zeros(x.shape) for r, x in nominal.items()}
+        if f.rates is not None:
+            doubt = response.doubt(q, turned - nominal[AIR][:, :, TORQUE], change)
+            power[AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
+        out.append(power)
+    return out
 
 
 def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, np.ndarray]],

@@ -19,9 +19,15 @@ from airtouch.simulation.firmware import battery_compensation, settings
 DEGREES = 180.0 / np.pi
 FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequency (500 Hz controller)
 AXES = ("thrust", "roll", "pitch")
+FLOW_HZ = 1.5  #: above it the estimated velocity's error falls by its square; errors of optical flow last 0.1 s
 YAW_HZ = 1.0  #: usual bandwidth of a yaw loop, which AXES leave out
 OUTER_S = 0.01  #: period of the firmware's position loop and of its estimator's predictions
 IMU_S = 0.001  #: between samples of the IMU
+KICKS = np.linspace(1.0, 0.0, 21)  #: shares that are tried of a step's first sample
+STEP_HZ = (1.5, 14.0)  #: where they are fitted
+UNCUT = 0.95  #: share of a kick from which the command's limits do not cut it
+#: of the gains, with which what is left of a cut kick falls: so it does in ten pairs of simulated flights each with
+CUT_POWER = 0.6  #: attitude gains of 0.5 to 1.5 and rate gains of 0.8 to 1.3
 CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1
 
 
@@ -142,9 +148,10 @@ def _arm(row: Any, i: int) -> float:
 def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
 
-    Sources, roll and pitch: white rate, white angle, velocity falling with the frequency,
-    torque; thrust: white climb, climb falling with the frequency, its square, force, white error of the down
-    range, the same drifting from reading to reading.
+    Sources, roll and pitch: white rate; with the firmware's controller velocity flat up to FLOW_HZ and falling with
+    the frequency's square beyond, with another one white angle and velocity falling with the frequency; velocity and
+    angle falling with its square; torque. Thrust: white climb, climb falling with the frequency, its square, force,
+    white error of the down range, the same drifting from reading to reading.
     row: plant row of `simulation.flight.prepare`, effects in it.
     """
     return _with_aliases(_sources(c, row, axis, f), _aliases(c, row, axis, f))
@@ -188,23 +195,83 @@ def sensitivity(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> n
     return np.stack([*out, s / (s + 2.0 * np.pi * YAW_HZ)], axis=1)
 
 
+class Step(NamedTuple):
+    """Steps of a velocity set-point in a block.
+
+    power: of the steps, over that of noise of unit strength; kick: share of the derivative at the first sample that is
+    left by the limits of the command, which are 16 bits and what the motors take.
+    """
+
+    power: float = 0.0
+    kick: float = 1.0
+
+
+NO_STEP = Step()
+
+
 def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray,
-                        width: float = 0.0) -> np.ndarray:
+                        width: float = 0.0, step: Step = NO_STEP) -> np.ndarray:
     """Angular acceleration (..., bins) to be expected for a logged command, rad/s^2 per N: S_yu / S_uu of roll or pitch
 
-    for noise of given strengths (..., sources); width: of neighbouring bins of f that are
+    for noise of given strengths (..., sources) and steps; width: of neighbouring bins of f that are
     smoothed over, standard deviation.
     """
+    cross, power = _spectra_of_turning(c, row, axis, f)
+    cross, power = strengths @ cross, strengths @ power
+    if step.power:
+        logged, turned = _stepped(c, row, axis, np.maximum(f, 0.05), step.kick)
+        cross, power = cross + step.power * turned * logged.conj(), power + step.power * np.abs(logged) ** 2
+    if width > 0.0:
+        cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))
+    return cross / power
+
+
+def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """S_yu and S_uu (sources, bins) of the angular acceleration and the logged command for noise of unit power."""
     logged, turned = _transfers(c, row, axis, np.maximum(f, 0.05))
     cross, aliases = turned * logged.conj(), _aliases(c, row, axis, f)
     for k, folded in zip(FOLDS[1:], aliases, strict=False):  # noise of the gyro folds into log and command alike
         beyond = f + k / PERIOD_S
         both = folded.conj() / _butterworth(2j * np.pi * np.abs(beyond), c.chip_hz)
         cross[0] += _difference(f) * np.where(beyond < 0.0, both.conj(), both)
-    cross, power = strengths @ cross, strengths @ _with_aliases(np.abs(logged) ** 2, aliases)
-    if width > 0.0:
-        cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))
-    return cross / power
+    return cross, _with_aliases(np.abs(logged) ** 2, aliases)
+
+
+def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, over: np.ndarray,
+            turning: np.ndarray) -> Step:
+    """The steps that explain blocks of nominal flights best, by least squares.
+
+    strengths (sources,): of the noise; over (bins,): power of their commands over that of blocks without a step;
+    turning (bins,): measured S_yu / S_uu, 0 where it is not known.
+    """
+    known = (turning != 0.0) & (f > STEP_HZ[0]) & (f < STEP_HZ[1])
+    if not known.any():
+        return NO_STEP
+    noise = strengths @ _spectra_of_turning(c, row, axis, f)[1]
+    best, least = NO_STEP, np.inf
+    for kick in KICKS:
+        logged, _ = _stepped(c, row, axis, np.maximum(f, 0.05), kick)
+        step = Step(float(np.median(((over - 1.0) * noise / np.abs(logged) ** 2)[known])), float(kick))
+        if step.power > 0.0:
+            made = turning_per_command(c, row, axis, strengths, f, step=step)
+            misfit = float((np.abs(made[known] / turning[known] - 1.0) ** 2).sum())
+            if misfit < least:
+                best, least = step, misfit
+    return best
+
+
+def step_under(step: Step, c: Controller, before: Any, row: Any) -> Step:
+    """Steps of the same set-point under another plant row; step: those under `before`.
+
+    What the limits leave of the first sample of a large step has one size however high the gains; smaller steps are
+    not cut: together it falls by CUT_POWER of the gains.
+    """
+    if step.kick >= UNCUT or not c.on_error:
+        return step
+    ahead = c.derivative / c.period_s
+    gains = [float(r["rate_gain"]) * float(r["attitude_gain"]) * float(r["position_gain"]) for r in (before, row)]
+    kick = ((1.0 + ahead * step.kick) * (gains[0] / gains[1]) ** CUT_POWER - 1.0) / ahead
+    return step._replace(kick=float(np.clip(kick, 0.0, 1.0)))
 
 
 def _difference(f: np.ndarray) -> np.ndarray:
@@ -319,16 +386,11 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     s, low = 2j * np.pi * f, np.maximum(f, 0.3)
     plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
     size = 1.0 / (1.0 + plant * whole)
-    k = c.gain * float(row["rate_gain"])
-    tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])
     fixed = _fixed(c, f)
     kick = _kick(c, fixed)
-    if c.on_error:
-        tilt = tilt * (1.0 + c.integral / s + c.derivative * fixed.change) / (1.0 + c.integral / s)
-    speed = tilt * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
-    tilt = tilt * (1.0 + c.angle_integral / s)
-    seen = [] if c.lowpass_hz else [tilt]
-    outer = [*seen, speed / low, speed / low ** 2, tilt / low ** 2]
+    tilt, speed = _paths(c, row, fixed)
+    wandering = [speed / (low ** 2 + FLOW_HZ ** 2)] if c.lowpass_hz else [tilt, speed / low]
+    outer = [*wandering, speed / low ** 2, tilt / low ** 2]
     direct = np.array([-(rate + angle), *outer, 0.0 * s])
     stepped = np.array([-(rate + kick * angle), *(kick * np.array(outer)), 0.0 * s])
     turned = plant * direct * size  # rate
@@ -339,15 +401,38 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     return logged, turned
 
 
-def _kick(c: Controller, fixed: Fixed) -> np.ndarray | float:
+def _stepped(c: Controller, row: Any, axis: str, f: np.ndarray, passed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of roll or pitch, (bins,) each: steps of the velocity's set-point to logged command and angular acceleration.
+
+    passed: share of the first sample's derivative that the command's limits leave; what follows is too small for them.
+    """
+    fixed = _fixed(c, f)
+    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
+    step = _paths(c, row, fixed)[1] / np.maximum(f, 0.3)
+    turned = plant * step / (1.0 + plant * whole)
+    return _kick(c, fixed, passed) * step - (rate + _kick(c, fixed) * (angle + velocity)) * turned, fixed.s * turned
+
+
+def _paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray]:
+    """Command (bins,) for an angle and for a velocity of 1 that the controller is asked for."""
+    s = fixed.s
+    k = c.gain * float(row["rate_gain"])
+    tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])
+    if c.on_error:
+        tilt = tilt * (1.0 + c.integral / s + c.derivative * fixed.change) / (1.0 + c.integral / s)
+    speed = tilt * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
+    return tilt * (1.0 + c.angle_integral / s), speed
+
+
+def _kick(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | float:
     """Angle path in the log over that in the loop: set-points of the outer loop and attitudes come as steps, and the
 
-    log takes the sample on which they do.
+    log takes the sample on which they do. passed: share of that sample's derivative that the command's limits leave.
     """
     if not c.on_error:
         return 1.0
     plain = 1.0 + c.integral / fixed.s
-    return (plain + c.derivative * fixed.outer) / (plain + c.derivative * fixed.change)
+    return (plain + passed * c.derivative * fixed.outer) / (plain + c.derivative * fixed.change)
 
 
 def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
@@ -401,7 +486,11 @@ def _delayed(delay: float, step: float, shape: tuple[int, ...], frequencies: byt
 
 
 def _butterworth(s: np.ndarray, cutoff: float) -> np.ndarray | float:
-    if cutoff <= 0.0:
+    """By what a second-order low-pass at the IMU's rate divides at s = 2 pi i f; 1 for a cutoff (Hz) that passes all.
+
+    As in `simulation.filters`: bilinear, so that it takes more than its analogue towards half of that rate.
+    """
+    if cutoff <= 0.0 or cutoff >= 0.49 / IMU_S:
         return 1.0
-    x = s / (2.0 * np.pi * cutoff)
+    x = 1j * np.tan(0.5 * IMU_S * s.imag) / np.tan(np.pi * cutoff * IMU_S)
     return 1.0 + np.sqrt(2.0) * x + x * x

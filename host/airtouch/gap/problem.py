@@ -17,7 +17,7 @@ from scipy.special import exp1
 from airtouch.gap import random_effects
 from airtouch.gap.candidates import MEAN, SPECTRUM, Term
 from airtouch.gap.channels import CHANNELS, COMMAND, COUNT, TORQUE
-from airtouch.gap.data import Data, spectra
+from airtouch.gap.data import Data, spectra, step_doubt
 from airtouch.gap.response import FIRST_BIN
 from airtouch.gap.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
 from airtouch.gap.twin import COMMAND_ONLY
@@ -139,7 +139,8 @@ class Problem:
         if not self.own or not loop or not law.changes_loop(loop):
             return np.zeros(self.own)
         change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
-        return DOUBT ** 2 * squared(change) * self.torque
+        steps = step_doubt(self.data, loop)
+        return DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else self._gather(steps).real)
 
     def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
         """Whether the loops of roll and pitch differ between two hypotheses."""

@@ -18,13 +18,17 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.channels import TORQUE
+from airtouch.gap.spectra import squared
 from airtouch.gap.twin import Change
 
 FIRST_BIN = 2  #: below it lie the means, which the window spreads over two bins: there q is 1
 QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows
-STEPPED = 3.0  #: times the usual power of the commanded torque
+STEPPED = 2.0  #: times the usual power of the commanded torque, from which a set-point stepped
+CALM = 0.25  #: share of a flight's blocks that no step is in
 FEWEST = 8  #: blocks of nominal flights
 SMOOTH = 1.5  #: bins
+#: what the model may be wrong by, of that change of the share which the command's limits make: so far off are pairs of
+CUT_DOUBT = 0.3  #: simulated flights with attitude gains of 0.5, 1.4 and 2 (ten flights each)
 NOISE = 0.2  #: coherence up to which it is the noise of the gyro that both have, not believed
 
 
@@ -33,13 +37,14 @@ class Law:
     """For torque channels, complex (bins, 3): told, measured over modelled; changed, the same for what a hypothesis
 
     changes of the model, never above 1 in size; outside, for a torque that no command makes. weight (bins, 3):
-    floor of quiet blocks over that of these, rms.
+    floor of quiet blocks over that of these, rms; power (bins, 3): of the modelled torque.
     """
 
     told: np.ndarray
     changed: np.ndarray
     outside: np.ndarray
     weight: np.ndarray
+    power: np.ndarray
 
     def ratio(self, change: Change, which: int) -> np.ndarray:
         """By what effects that change the loop multiply `told`, (bins, 3).
@@ -55,18 +60,20 @@ class Law:
 
 @dataclass(frozen=True)
 class Response:
-    """usual (bins, 3): power of the modelled torque in nominal flights; the laws of quiet and of stepped blocks,
+    """usual (bins, 3): power of the modelled torque in nominal flights, whose quietest quarter of blocks has no more
 
-    the latter None where nominal flights have too few of them.
+    than a share calm (3,) of it; the laws of quiet and of stepped blocks, the latter None where nominal flights have
+    too few of them.
     """
 
     usual: np.ndarray
+    calm: np.ndarray
     steady: Law
     stepped: Law | None
 
     def quiet(self, modelled: np.ndarray) -> np.ndarray:
         """Whether no set-point stepped, bool (blocks, 3), from the modelled torque (blocks, bins, 3)."""
-        return _quiet(modelled, self.usual)
+        return _quiet(modelled, self.usual, self.calm)
 
     def applied(self, quiet: np.ndarray, measured: np.ndarray, nominal: np.ndarray, driven: np.ndarray,
                 outside: np.ndarray, every: np.ndarray, change: Change | None = None) -> np.ndarray:
@@ -90,6 +97,17 @@ class Response:
         out = every.copy()
         out[:, FIRST_BIN:, TORQUE] = rest[:, FIRST_BIN:]
         return out
+
+    def doubt(self, quiet: np.ndarray, modelled: np.ndarray, change: Change) -> np.ndarray:
+        """Power (blocks, bins, 3) that the gap may have as steps differ in size, and so in what the command's limits
+
+        leave of them. quiet (blocks, 3): see there; modelled: torque of the commands (blocks, bins, 3).
+        """
+        law = self.stepped
+        if law is None:
+            return np.zeros(modelled.shape)
+        doubt = (CUT_DOUBT * law.weight * np.abs(law.told) * change.cut) ** 2
+        return np.where(quiet[:, None], 0.0, np.nan_to_num(doubt) * squared(modelled))
 
     def added(self, quiet: np.ndarray, sensed: bool) -> np.ndarray:
         """Power (blocks, bins, 3) that a random torque of unit power adds; 1 in the means.
@@ -126,12 +144,14 @@ def response_of(measured: Sequence[np.ndarray], left: Sequence[np.ndarray], loop
     if len(y) < FEWEST:
         return None
     usual = np.median(np.abs(w) ** 2, axis=0) / np.log(2.0)
-    quiet = np.concatenate([_quiet(m - rest, usual) for m, rest in zip(measured, left, strict=True)])
+    made = [m - rest for m, rest in zip(measured, left, strict=True)]
+    calm = np.median([np.quantile(_sizes(m, usual), CALM, axis=0) for m in made if len(m)], axis=0)
+    quiet = np.concatenate([_quiet(m, usual, calm) for m in made])
     steady, floor = _law(y, w, quiet, loop, None)
     stepped = None
     if (~quiet).any(axis=1).sum() >= FEWEST:
         stepped, _ = _law(y, w, ~quiet, loop, floor)
-    return Response(_smooth(usual), steady, stepped)
+    return Response(_smooth(usual), calm, steady, stepped)
 
 
 def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: np.ndarray, floor: np.ndarray | None,
@@ -146,13 +166,22 @@ def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: np.ndarray, flo
     known = chosen.sum(axis=0) >= FEWEST
     weight = np.ones(rest.shape) if floor is None else np.where(known, np.sqrt(floor / rest), np.nan)
     changed = told / np.maximum(np.abs(told), 1.0)
-    return Law(told, changed, loop + changed * (1.0 - loop), weight), rest
+    return Law(told, changed, loop + changed * (1.0 - loop), weight, _smooth(power)), rest
 
 
-def _quiet(modelled: np.ndarray, usual: np.ndarray) -> np.ndarray:
-    """Blocks whose modelled torque (blocks, bins, 3) is as strong as usual, for nominal flights or for this one."""
-    size = (np.abs(modelled) ** 2 / np.maximum(usual, 1e-30))[:, QUIET_BINS].mean(axis=1)
-    return size < STEPPED * np.maximum(np.quantile(size, 0.25, axis=0), 1.0) if len(size) else np.zeros((0, 3), bool)
+def _quiet(modelled: np.ndarray, usual: np.ndarray, calm: np.ndarray) -> np.ndarray:
+    """Blocks without a step, bool (blocks, 3): their modelled torque (blocks, bins, 3) is as strong as in the quietest
+
+    quarter of this flight's, which in nominal flights has a share calm (3,) of what is usual. A gain that is lower
+    makes both the noise and the steps weaker, so that a limit fixed by nominal flights would take steps for noise.
+    """
+    size = _sizes(modelled, usual)
+    return size < STEPPED * np.quantile(size, CALM, axis=0) / calm if len(size) else np.zeros((0, 3), bool)
+
+
+def _sizes(modelled: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """Power (blocks, 3) of the modelled torque (blocks, bins, 3) over the usual one, where a step shows."""
+    return (np.abs(modelled) ** 2 / np.maximum(usual, 1e-30))[:, QUIET_BINS].mean(axis=1)
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

@@ -21,12 +21,16 @@ from airtouch.gap.flight import PERIOD_S, Flight
 from airtouch.gap.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.loop_model import (
     AXES,
+    NO_STEP,
     Controller,
+    Step,
     excess_phase,
     firmware,
     firmware_of,
     of_loop,
     spectra,
+    step_of,
+    step_under,
     torque_per_command,
     turning_per_command,
 )
@@ -65,11 +69,13 @@ class Change(NamedTuple):
     """By what effects multiply the torque of a command, complex (bins, 1), and by what the share of the commanded
 
     torque that turns the vehicle, (2, bins, 3), which the loop model had at `before`: level, and stepped.
+    cut (bins, 3): size of that part of the change of stepped blocks which the limits of the command make.
     """
 
     motors: np.ndarray
     share: np.ndarray
     before: np.ndarray
+    cut: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,7 @@ class Twin:
     """The nominal loops: a controller, noise strengths (sources,) and floor (bins,) for each of AXES.
 
     floor: PSD of the commands, N^2/Hz, of `blocks` blocks as hard as nominal ones; slopes: of its power with how
-    hard the vehicle is flown.
+    hard the vehicle is flown; steps: of roll and pitch, in blocks in which a set-point stepped.
     """
 
     vehicle: Vehicle
@@ -89,6 +95,7 @@ class Twin:
     blocks: int
     slopes: Slopes
     edges: EdgeFloor | None = None
+    steps: tuple[Step, Step] = (NO_STEP, NO_STEP)
 
     def spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
         """First samples and spectra (blocks, bins, AXES) of a flight's commands as if flown as hard as nominal ones."""
@@ -117,7 +124,8 @@ class Twin:
         after, before = self._shares(row, f), self._shares(first, f)
         share = after / before if self.by_firmware else np.ones_like(before)
         motors = self._torque(row, AXES[1], f) / self._torque(first, AXES[1], f)
-        return Change(motors[:, None], share / np.maximum(np.abs(share) / MOST_CHANGE, 1.0), before)
+        share /= np.maximum(np.abs(share) / MOST_CHANGE, 1.0)
+        return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]))
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
@@ -148,19 +156,34 @@ class Twin:
         return cache[key]
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
-        """Share of the commanded torque that turns the vehicle, complex (2, bins, 3): level, and stepped; 1 in yaw."""
-        shares = np.ones((2, len(f), 3), complex)
+        """Share of the commanded torque that turns the vehicle, complex (3, bins, 3); 1 in yaw.
+
+        Level, stepped, and stepped if the limits of the command cut as much as in nominal flights.
+        """
+        shares = np.ones((3, len(f), 3), complex)
         for i, axis in enumerate(AXES[1:]):
             shares[:, :, i] = self._of_axis("share", row, axis, f, partial(self._share, row, i + 1, f))
         return shares
 
     def _share(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
-        """`_shares` of axis i, complex (2, bins)."""
-        level = self.strengths[i]
-        stepped = np.full(len(level), 1e-30)
-        stepped[-4:-1] = level[-4:-1]  # of the velocity and angle paths
-        turning = turning_per_command(controller, row, AXES[i], np.stack([level, stepped]), f, SMOOTH)
-        return turning / self._torque(row, AXES[i], f)
+        """`_shares` of axis i, complex (3, bins)."""
+        usual = self.steps[i - 1]
+        step = step_under(usual, controller, self._plain, row)
+        each = {x: turning_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, x)
+                for x in {NO_STEP, step, usual}}
+        return np.stack([each[x] for x in (NO_STEP, step, usual)]) / self._torque(row, AXES[i], f)
+
+    def with_steps(self, told: np.ndarray, over: np.ndarray, f: np.ndarray) -> "Twin":
+        """The same with `steps`, from blocks of nominal flights in which a set-point stepped.
+
+        told (bins, 3): share of the commanded torque that turned the vehicle, 0 where it is not known; over (bins, 3):
+        power of these torques over that of other blocks.
+        """
+        row = self._plain
+        roll, pitch = [step_of(firmware(row, axis), row, axis, self.strengths[i], f, over[:, i - 1],
+                               told[:, i - 1] * self._torque(row, axis, f))
+                       for i, axis in enumerate(AXES) if i] if self.by_firmware else self.steps
+        return replace(self, steps=(roll, pitch))
 
     def _torque(self, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         """`loop_model.torque_per_command`."""

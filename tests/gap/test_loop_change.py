@@ -1,0 +1,101 @@
+"""What effects change in the loop: the modelled share of torque against pairs of flights, same random numbers."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import gap_flights
+from airtouch import vehicle as vehicles
+from airtouch.gap import diagnose, loop_model, measure, twin
+from airtouch.gap.calibrate import declared
+from airtouch.gap.channels import TORQUE, angular_acceleration, residual
+from airtouch.gap.edge_response import calm
+from airtouch.gap.spectra import AIR, blocks, frequencies, starts
+from airtouch.simulation import batch
+from airtouch.simulation.effects import Active, get
+from airtouch.simulation.flight import prepare
+
+BASELINE, PAIRED = range(6), range(100, 112)  #: numbers of flights
+VEHICLE = "crazyflie-2.1-flow"
+#: effect, values
+CHANGES = {
+    "higher attitude gain": ("controller_gain", {"attitude": 1.5}),
+    "lower attitude gain": ("controller_gain", {"attitude": 0.6}),
+    "higher rate gain": ("controller_gain", {"rate": 1.3}),
+    "lower rate gain": ("controller_gain", {"rate": 0.8}),
+    "more inertia": ("inertia", {"fraction": 0.25}),
+    "slower motors": ("motor_lag", {"factor": 1.3}),
+    "late commands": ("actuator_delay", {"delay": 0.003}),
+}
+
+
+def flown(active, numbers, vehicle=None):
+    vehicle = vehicle or vehicles.load(VEHICLE)
+    logs = list(batch.flights("diagnosis", numbers, vehicle=vehicle, effects=active, workers=1))
+    return list(measure.usable(logs, vehicle, []))
+
+
+def changed(name):
+    effect, values = get(CHANGES[name][0]), CHANGES[name][1]
+    return [Active(effect, effect.scaled(effect.values(), 0.0) | values)]
+
+
+@cache
+def nominal():
+    return declared(vehicles.load(VEHICLE), flown([], BASELINE))
+
+
+@cache
+def shares(name):
+    """S_yw / S_ww of pitch in blocks without and with a step of the set-point, (2, bins)."""
+    cross, power = np.zeros((2, len(frequencies(AIR))), complex), np.zeros((2, len(frequencies(AIR))))
+    for flight in flown(changed(name) if name else [], PAIRED):
+        first = starts(flight, AIR)
+        turned = blocks(angular_acceleration(flight), first, AIR)
+        made = turned - blocks(np.nan_to_num(residual(flight, nominal().vehicle)), first, AIR)[:, :, TORQUE]
+        quiet = nominal().response.quiet(made)[:, 1]
+        for k, chosen in enumerate((quiet, ~quiet)):
+            y, w = turned[chosen, :, 1], made[chosen, :, 1]
+            cross[k] += (y * w.conj()).sum(axis=0)
+            power[k] += (np.abs(w) ** 2).sum(axis=0)
+    return cross / power
+
+
+@pytest.mark.parametrize(("stepped", "low", "high"), [(0, 2.0, 25.0), (1, 2.0, 14.0)], ids=["quiet", "stepped"])
+@pytest.mark.parametrize("name", CHANGES)
+def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, high):
+    f = frequencies(AIR)
+    law = (nominal().response.steady, nominal().response.stepped)[stepped]
+    told = law.ratio(nominal().controller.torque_change(changed(name), f), stepped)[:, 1]
+    seen = shares(name)[stepped] / shares(None)[stepped]
+    judged = (f > low) & (f < high)
+    count = judged.sum() // 6 * 6
+    told, seen = (x[judged][:count].reshape(-1, 6).mean(axis=1) for x in (told, seen))
+    np.testing.assert_allclose(told, seen, atol=0.15)
+
+
+def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
+    """Share of the roll commands' power that noise of the gyro makes: flights with that noise alone."""
+    vehicle = vehicles.load(VEHICLE)
+    alone = replace(calm(vehicle), gyro_noise_rms_radps=vehicle.gyro_noise_rms_radps)
+    spectra = [np.concatenate([twin.block_spectra(f, vehicle)[1] for f in flown([], BASELINE, v)])
+               for v in (vehicle, alone)]
+    every, gyro = (twin.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
+    law, row = nominal().controller, prepare(vehicle, ())[0][0]
+    controller = loop_model.firmware(row, "roll")
+    made = twin.through_window(loop_model.spectra(controller, row, "roll", twin.fine_frequencies()))
+    told = law.strengths[1][0] * made[0] / (law.strengths[1] @ made)
+    f = twin.frequencies()
+    for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):
+        band = (f > low) & (f < high)
+        np.testing.assert_allclose(told[band].mean(), (gyro / every)[band].mean(), atol=0.12)
+
+
+def test_an_attitude_gain_is_named_with_its_strength(study):
+    """Once called more inertia: at half the gain steps turn the vehicle less for what the log shows of them."""
+    found = diagnose.brief(study, gap_flights.flown(1, 97, {"controller_gain": {"attitude": 0.55}}))
+    assert [e.name for e in found.effects] == ["controller_gain"]
+    gain = found.effects[0].parameters["attitude"]
+    assert gain.low < 0.55 < gain.high < 0.8
