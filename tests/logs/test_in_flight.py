@@ -1,0 +1,43 @@
+"""Whether the drone flies, on logs of a few rows worked out by hand."""
+
+import numpy as np
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import PWM, FlightLog
+from airtouch.logs.in_flight import airborne
+
+
+def log(**columns):
+    return FlightLog({name: np.asarray(values, float) for name, values in columns.items()}, {"source": "made"})
+
+
+def test_the_mean_of_four_motors_decides():
+    motors = np.array([[0, 0, 0, 0], [60000, 0, 0, 1], [60000, 0, 0, 0], [15001] * 4, [15000] * 4])
+    assert airborne(log(**dict(zip(PWM, motors.T, strict=True)))).tolist() == [False, True, False, True, False]
+
+
+def test_a_lost_row_flies_as_the_last_one_that_was_not():
+    power = np.array([0.0, np.nan, 40000.0, np.nan, np.nan, 0.0, np.nan])
+    assert airborne(log(**dict.fromkeys(PWM, power))).tolist() == [False, False, True, True, True, False, False]
+
+
+def test_rows_lost_from_the_beginning_do_not_fly():
+    power = np.array([np.nan, np.nan, 40000.0])
+    assert airborne(log(**dict.fromkeys(PWM, power))).tolist() == [False, False, True]
+
+
+def test_without_motors_the_range_says_from_where_to_where():
+    flying = airborne(log(zrange_m=[0.02, 0.3, 0.05, np.nan, 0.2, 0.03]))
+    assert flying.tolist() == [False, True, True, True, True, False]
+    assert airborne(log(z_m=[0.0, 0.5, 0.0])).tolist() == [False, True, False]
+    assert not airborne(log(zrange_m=[0.02, 0.1, np.nan])).any()
+
+
+def test_the_down_range_comes_before_the_height():
+    assert airborne(log(z_m=[1.0, 1.0], zrange_m=[0.0, 1.0])).tolist() == [False, True]
+
+
+def test_a_log_with_neither_is_refused():
+    with pytest.raises(AirTouchError):
+        airborne(log(gyro_x_radps=[0.0, 0.0]))
