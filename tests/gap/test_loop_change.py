@@ -8,7 +8,7 @@ import pytest
 
 import gap_flights
 from airtouch import vehicle as vehicles
-from airtouch.gap import diagnose, loop_model, measure, twin
+from airtouch.gap import controller, diagnose, loop_model, measure, twin
 from airtouch.gap.calibrate import declared
 from airtouch.gap.channels import TORQUE, angular_acceleration, residual
 from airtouch.gap.edge_response import calm
@@ -84,8 +84,8 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
                for v in (vehicle, alone)]
     every, gyro = (twin.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
     law, row = nominal().controller, prepare(vehicle, ())[0][0]
-    controller = loop_model.firmware(row, "roll")
-    made = twin.through_window(loop_model.spectra(controller, row, "roll", twin.fine_frequencies()))
+    roll = controller.firmware(row, "roll")
+    made = twin.through_window(loop_model.spectra(roll, row, "roll", twin.fine_frequencies()))
     told = law.strengths[1][0] * made[0] / (law.strengths[1] @ made)
     f = twin.frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import loop_model, measure
+from airtouch.gap import controller, loop_model, measure
 from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.response import FIRST_BIN, response_of
 from airtouch.gap.spectra import AIR, blocks, frequencies, starts
@@ -88,7 +88,7 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
 def test_turning_under_an_outside_torque_is_the_closed_loop_s():
     """No gyro noise, no steps, no folds: u = -(whole / s) d / (1 + L), the vehicle turns by d / (1 + L)."""
     row = prepare(vehicles.load("crazyflie-2.1-flow"), ())[0][0]
-    c = loop_model.Controller(0.01, 6.0, 0.4)
+    c = controller.Controller(0.01, 6.0, 0.4)
     f = np.geomspace(0.8, 20.0, 12)
     s = 2j * np.pi * f
     plant, *_, whole = loop_model.loop_parts(c, row, "roll", f)
@@ -105,7 +105,7 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
     axes = {}
     for name, active in (("usual", ()), ("heavy", (heavy,))):
         row = prepare(vehicle, active)[0][0]
-        axes[name] = np.abs(loop_model.sensitivity([loop_model.firmware(row, a) for a in loop_model.AXES], row, f))
+        axes[name] = np.abs(loop_model.sensitivity([controller.firmware(row, a) for a in controller.AXES], row, f))
     low = (f > 0.5) & (f < 3.0)
     assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
     assert np.all(axes["usual"][f > 40.0] > 0.9)
@@ -133,7 +133,7 @@ def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
     told = []
     for active in ((), (late,)):
         row = prepare(vehicle, active)[0][0]
-        told.append(loop_model.turning_per_command(loop_model.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
+        told.append(loop_model.turning_per_command(controller.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
     judged = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
     ratio = (seen / (told[1] / told[0]))[judged].reshape(-1, 8).mean(axis=1)
     np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)

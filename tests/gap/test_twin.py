@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, edge_response, fit, flight, judging, loop_model, twin
+from airtouch.gap import calibrate, controller, edge_response, fit, flight, judging, loop_model, twin
 from airtouch.gap.candidates import terms
 from airtouch.gap.data import Data
 from airtouch.simulation import scenario
@@ -72,12 +72,12 @@ def spectrum(effects):
 def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     row, changed = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
     seen = spectrum(effects)
-    for i, axis in enumerate(loop_model.AXES):
-        strengths, _, _ = twin.noise_strengths(loop_model.firmware(row, axis), row, axis, nominal[:, i])
+    for i, axis in enumerate(controller.AXES):
+        strengths, _, _ = twin.noise_strengths(controller.firmware(row, axis), row, axis, nominal[:, i])
         f, fine = twin.frequencies(), twin.fine_frequencies()
         expected = twin.through_window(
-            strengths @ loop_model.spectra(loop_model.firmware(changed, axis), changed, axis, fine))
-        expected /= twin.through_window(strengths @ loop_model.spectra(loop_model.firmware(row, axis), row, axis, fine))
+            strengths @ loop_model.spectra(controller.firmware(changed, axis), changed, axis, fine))
+        expected /= twin.through_window(strengths @ loop_model.spectra(controller.firmware(row, axis), row, axis, fine))
         error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
         assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
@@ -130,8 +130,8 @@ def test_the_controller_of_the_firmware_is_recognised(study):
 def test_a_loop_that_would_not_fly_is_recognised():
     slow = prepare(VEHICLE, activate({"sensor_latency": {"delay": 0.03}}))[0][0]
     row = prepare(VEHICLE, ())[0][0]
-    assert loop_model.excess_phase(loop_model.firmware(row, "roll"), row, "roll") < 0.0
-    assert loop_model.excess_phase(loop_model.firmware(slow, "roll"), slow, "roll") > 0.0
+    assert loop_model.excess_phase(controller.firmware(row, "roll"), row, "roll") < 0.0
+    assert loop_model.excess_phase(controller.firmware(slow, "roll"), slow, "roll") > 0.0
 
 
 @pytest.mark.parametrize("field", ["gyro_lowpass", "rate_scale", "gravity", "thrust_scale", "rotor_y"])
@@ -165,14 +165,14 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
     row, strengths = plant[0], np.ones(5)
 
     def seen(axis):
-        c = loop_model.firmware(row, axis)
+        c = controller.firmware(row, axis)
         whole = [loop_model.spectra(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
         if axis != "thrust":
             whole += [loop_model.turning_per_command(c, row, axis, strengths, f),
                       loop_model.torque_per_command(row, axis, f)]
         return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in whole])
 
-    before, others = {axis: seen(axis) for axis in loop_model.AXES}, 0
+    before, others = {axis: seen(axis) for axis in controller.AXES}, 0
     for number in leaves(plant):
         kept = number.copy()
         number[...] = ~kept if number.dtype == bool else (1.07 * kept + 1e-3 if number.dtype.kind == "f" else kept + 1)

@@ -8,8 +8,8 @@ Where each decision is made:
 - A log made ready: `flight`, `motion`; what is compared: `channels`, `spectra`, `data`.
 - Where the gap lies: `measure`, with `band_sums`, `cell_tables`, `gap_map`, `summary`.
 - What is normal: `calibrate` (the vehicle), `response`, `hardness` and `lost_rows` (the floor), `twin`, `twin_view`,
-  `loop_model` and `edge_response` (the closed loop), `nominal_scatter` and `apparent` (how strong effects seem to
-  be where there are none).
+  `controller`, `loop_model` and `edge_response` (the closed loop), `nominal_scatter` and `apparent` (how strong
+  effects seem to be where there are none).
 - Which effect: `diagnose` calls `select`, which adds effects one by one. `candidates` says how each effect is
   fitted, `screen` takes a first look, `judging` fits on one half and judges on the other by `fit`, `problem`,
   `least_squares`, `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the

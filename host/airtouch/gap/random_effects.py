@@ -12,8 +12,9 @@ import numpy as np
 from scipy.signal import freqz
 
 from airtouch.gap.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
+from airtouch.gap.controller import AXES
 from airtouch.gap.flight import GROUND, PERIOD_S, Flight
-from airtouch.gap.loop_model import AXES, spectra
+from airtouch.gap.loop_model import spectra
 from airtouch.gap.spectra import AIR, LENGTH, blocks, frequencies
 from airtouch.gap.vibration_lines import lines
 from airtouch.simulation import filters, rigid_body

@@ -16,17 +16,14 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 from scipy.signal import butter, sosfiltfilt
 
+from airtouch.gap.controller import AXES, Controller, firmware, firmware_of
 from airtouch.gap.edge_response import EdgeFloor, floor_of
 from airtouch.gap.flight import PERIOD_S, Flight
 from airtouch.gap.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.loop_model import (
-    AXES,
     NO_STEP,
-    Controller,
     Step,
     excess_phase,
-    firmware,
-    firmware_of,
     of_loop,
     spectra,
     step_of,
