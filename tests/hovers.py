@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from airtouch.gap import calibrate, judging
-from airtouch.gap.candidates import every
-from airtouch.gap.data import Data
-from airtouch.gap.fit import fit, judge
-from airtouch.gap.nominal_scatter import Scatter
-from airtouch.gap.select import select
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import fit, judge
+from airtouch.gap.naming import judging
+from airtouch.gap.naming.select import select
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.nominal_scatter import Scatter
 from gap_flights import VEHICLE, flight, noise
 
 ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and goes

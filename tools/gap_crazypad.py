@@ -22,9 +22,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from airtouch import vehicle
-from airtouch.gap import hover_balance
+from airtouch.gap.balance import hover_balance
 from airtouch.gap.diagnose import diagnose
-from airtouch.gap.flight import ready
+from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 
 FAMILIES = ("normal", "rotor damage", "added weight", "slung load")

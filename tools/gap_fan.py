@@ -14,10 +14,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, measure
-from airtouch.gap.data import Data
-from airtouch.gap.flight import GROUND, PERIOD_S
-from airtouch.gap.spectra import AIR, frequencies
+from airtouch.gap import measure
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import GROUND, PERIOD_S
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.logs import read
 from airtouch.simulation import rigid_body
 from gap_authors import VEHICLE, questions

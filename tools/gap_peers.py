@@ -14,9 +14,9 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
-from airtouch.gap.blind import alike
-from airtouch.gap.blind_score import wilson
 from airtouch.gap.diagnose import diagnose
+from airtouch.gap.sealed.blind import alike
+from airtouch.gap.sealed.blind_score import wilson
 from airtouch.logs import read
 
 NAMES = {"latency": "sensor_latency", "act_delay": "actuator_delay", "thrust_coeff": "thrust_coefficient"}

@@ -28,10 +28,10 @@ import gap_crazypad
 import gap_lift
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
-from airtouch.gap.blind import alike
-from airtouch.gap.blind_score import wilson
 from airtouch.gap.diagnose import diagnose
 from airtouch.gap.result import Diagnosis
+from airtouch.gap.sealed.blind import alike
+from airtouch.gap.sealed.blind_score import wilson
 from airtouch.logs import read
 from gap_authors import questions
 from gap_peers import NAMES

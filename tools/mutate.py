@@ -19,7 +19,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from airtouch.gap.blind_score import wilson
+from airtouch.gap.sealed.blind_score import wilson
 
 ROOT = Path(__file__).parents[1]
 BUILD = ROOT / "build" / "mutate"
@@ -42,7 +42,8 @@ GROUPS = {
         "reference/test_multiplications.py", "kernels/test_network.py", "kernels/test_stream.py",
         "gap8/test_requantise.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
-    "selection": Group(("gap/select.py", "gap/judging.py"), ("gap/test_select.py", "gap/test_select_beside.py")),
+    "selection": Group(("gap/naming/select.py", "gap/naming/judging.py"),
+                       ("gap/test_select.py", "gap/test_select_beside.py")),
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)

@@ -1,4 +1,4 @@
-"""How strong every effect seems to be in recorded flights that have none: makes gap/nominal_scatter.toml.
+"""How strong every effect seems to be in recorded flights that have none: makes gap/signatures/nominal_scatter.toml.
 
     python tools/nominal_scatter.py [FLIGHTS] [--out nominal_scatter.toml] [--keep cases.jsonl]
 
@@ -25,11 +25,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import blind, calibrate, measure, nominal_scatter
-from airtouch.gap.apparent import apparent
-from airtouch.gap.data import Data
-from airtouch.gap.flight import Flight
-from airtouch.gap.nominal_scatter import Apparent, Scatter, measured
+from airtouch.gap import measure
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import Flight
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.nominal.apparent import apparent
+from airtouch.gap.sealed import blind
+from airtouch.gap.signatures import nominal_scatter
+from airtouch.gap.signatures.nominal_scatter import Apparent, Scatter, measured
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle

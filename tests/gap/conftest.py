@@ -2,7 +2,7 @@
 
 import pytest
 
-from airtouch.gap import calibrate
+from airtouch.gap.nominal import calibrate
 from gap_flights import VEHICLE, flown
 from shared_fixture import once
 

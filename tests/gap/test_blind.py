@@ -13,9 +13,9 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.errors import AirTouchError
-from airtouch.gap import blind, blind_run, blind_score
-from airtouch.gap.blind_draw import KINDS
-from airtouch.gap.blind_severity import severities
+from airtouch.gap.sealed import blind, blind_run, blind_score
+from airtouch.gap.sealed.blind_draw import KINDS
+from airtouch.gap.sealed.blind_severity import severities
 
 CLEAR = {"weak_motor": (0.02, 0.04, 0.08), "imu_noise": (0.5, 1.0, 2.0), "com_offset": (5e-4, 1e-3, 2e-3),
          "rotor_drag": (0.004, 0.008, 0.016), "time_jitter": (0.002, 0.004, 0.006)}

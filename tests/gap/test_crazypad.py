@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
+from airtouch.gap.balance.hover_balance import BELIEFS, MIX, Reference, evidence, hypotheses
 from airtouch.gap.diagnose import diagnose
-from airtouch.gap.hover_balance import BELIEFS, MIX, Reference, evidence, hypotheses
 from airtouch.logs import read
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, candidates, fit, flight
-from airtouch.gap.blind import SCENARIO
-from airtouch.gap.data import Data
-from airtouch.gap.problem import whole_of
+from airtouch.gap.evidence import fit
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights import flight
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.sealed.blind import SCENARIO
+from airtouch.gap.signatures import candidates
 from airtouch.simulation import replay, scenario
 from airtouch.simulation import signals as at
 from airtouch.simulation.batch import flights as simulated

@@ -5,15 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap import candidates, flight, gates
-from airtouch.gap.channels import inside, residual
-from airtouch.gap.data import Data
+from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.diagnose import brief
-from airtouch.gap.fit import judge
-from airtouch.gap.problem import whole_of
+from airtouch.gap.evidence import gates
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.flights import flight
+from airtouch.gap.naming.select import select
 from airtouch.gap.result import Cell
-from airtouch.gap.select import select
-from airtouch.gap.unexplained import unexplained
+from airtouch.gap.signals.channels import inside, residual
+from airtouch.gap.signatures import candidates
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active
@@ -149,7 +151,7 @@ def test_what_stays_open_is_shown_with_its_seconds(study, quiet):
 
 
 def test_words_say_when_and_what_is_open():
-    from airtouch.gap import words
+    from airtouch.gap.answer import words
     from airtouch.gap.result import Found, Quantity
     assert words.effect_in_words(Found("wind", {"x": Quantity(0.3, unit="m/s")}, (("a/b.csv", 2.0, 5.04),))) \
         == "wind: x 0.3 m/s; acts from 2.0 to 5.0 s of b.csv"

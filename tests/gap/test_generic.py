@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap import candidates, clock, fit, generic
-from airtouch.gap.data import Data
 from airtouch.gap.diagnose import brief
-from airtouch.gap.judging import halves
+from airtouch.gap.evidence import clock, fit, generic
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.judging import halves
+from airtouch.gap.signatures import candidates
 from airtouch.simulation import effects
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Effect, Parameter, wrench

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap import measure
-from airtouch.gap.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
+from airtouch.gap.flights.hardness import BANDS_HZ, CALMER, HARDER, Slopes, hardness_of, slopes_of
 
 FIRST = np.array([0, 128, 256])
 FREQUENCY = np.fft.rfftfreq(256, 0.01)

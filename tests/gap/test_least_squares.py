@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from airtouch.gap.least_squares import bounded_step
+from airtouch.gap.evidence.least_squares import bounded_step
 
 NOTHING = (np.zeros(3), np.zeros((3, 3)))
 

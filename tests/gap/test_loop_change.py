@@ -8,11 +8,12 @@ import pytest
 
 import gap_flights
 from airtouch import vehicle as vehicles
-from airtouch.gap import controller, diagnose, loop_model, measure, twin
-from airtouch.gap.calibrate import declared
-from airtouch.gap.channels import TORQUE, angular_acceleration, residual
-from airtouch.gap.edge_response import calm
-from airtouch.gap.spectra import AIR, blocks, frequencies, starts
+from airtouch.gap import diagnose, measure
+from airtouch.gap.loop import controller, loop_model, twin
+from airtouch.gap.loop.edge_response import calm
+from airtouch.gap.nominal.calibrate import declared
+from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
+from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
 from airtouch.simulation.flight import prepare

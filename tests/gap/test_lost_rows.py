@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.candidates import every
-from airtouch.gap.data import Data
-from airtouch.gap.lost_rows import bridging_power
-from airtouch.gap.select import select
-from airtouch.gap.spectra import AIR, frequencies
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.select import select
+from airtouch.gap.signals.lost_rows import bridging_power
+from airtouch.gap.signals.spectra import AIR, frequencies
+from airtouch.gap.signatures.candidates import every
 from gap_flights import VEHICLE, flown
 
 PITCH = 4  #: channel of the pitch torque

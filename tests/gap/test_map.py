@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airtouch.gap import gap_map as maps
-from airtouch.gap.band_sums import BANDS_HZ, REGIMES, filtered, gains, sensor_rms, stretches, sums
-from airtouch.gap.candidates import terms
+from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.where import gap_map as maps
+from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, filtered, gains, sensor_rms, stretches, sums
 from airtouch.simulation.flight import prepare
 from gap_flights import HOVER, TAKE_OFF, VEHICLE, flight, noise, study
 

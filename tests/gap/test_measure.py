@@ -7,9 +7,9 @@ import pytest
 
 import short_flights
 from airtouch import logs, vehicle
-from airtouch.gap.flight import ready
-from airtouch.gap.gap_map import significant
+from airtouch.gap.flights.flight import ready
 from airtouch.gap.measure import measure
+from airtouch.gap.where.gap_map import significant
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, RPM, FlightLog
 from airtouch.logs.segments import KINDS
 
@@ -118,7 +118,7 @@ def test_recorded_flights_of_every_kind(flights, name):
 @pytest.mark.slow
 def test_a_cluster_gives_the_same(flown):
     distributed = pytest.importorskip("dask.distributed")
-    from airtouch.gap.on_cluster import mapper
+    from airtouch.gap.sealed.on_cluster import mapper
 
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         found = measure(flown, VEHICLE, run=mapper(cluster.scheduler_address))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.motion import GRAVITY, MARKER_M, attitude, held, rotor_heights, standing_z
+from airtouch.gap.flights.motion import GRAVITY, MARKER_M, attitude, held, rotor_heights, standing_z
 from airtouch.logs.flight_log import FlightLog
 
 PERIOD_S = 0.01

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from airtouch.gap.candidates import TWINS
-from airtouch.gap.nominal_scatter import LEAST_RECORDED, Apparent, Scatter, measured, scatter_of, table
+from airtouch.gap.signatures.candidates import TWINS
+from airtouch.gap.signatures.nominal_scatter import LEAST_RECORDED, Apparent, Scatter, measured, scatter_of, table
 from airtouch.simulation.effects import EFFECTS
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from airtouch.gap import diagnose
-from airtouch.gap.candidates import every
-from airtouch.gap.data import Data
+from airtouch.gap.answer.shrink import Shrink
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.select import select
 from airtouch.gap.result import Quantity
-from airtouch.gap.select import select
-from airtouch.gap.shrink import Shrink
+from airtouch.gap.signatures.candidates import every
 from gap_flights import flown
 
 #: those that were taken for one of a pair, and the pairs' own

@@ -7,12 +7,14 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, flight, random_effects, vibration_lines
-from airtouch.gap.candidates import every, terms
-from airtouch.gap.data import Data
 from airtouch.gap.diagnose import chosen_effects
-from airtouch.gap.select import select
-from airtouch.gap.spectra import AIR, REST, frequencies
+from airtouch.gap.evidence import random_effects, vibration_lines
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights import flight
+from airtouch.gap.naming.select import select
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signatures.candidates import every, terms
 from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import activate
 from airtouch.simulation.flight import prepare

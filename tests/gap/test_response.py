@@ -3,10 +3,11 @@
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import controller, loop_model, measure
-from airtouch.gap.channels import COUNT, TORQUE, angular_acceleration, residual
-from airtouch.gap.response import FIRST_BIN, response_of
-from airtouch.gap.spectra import AIR, blocks, frequencies, starts
+from airtouch.gap import measure
+from airtouch.gap.loop import controller, loop_model
+from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
+from airtouch.gap.signals.response import FIRST_BIN, response_of
+from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap import judging
-from airtouch.gap.candidates import every
-from airtouch.gap.channels import COUNT
-from airtouch.gap.clock import clock_gain
-from airtouch.gap.data import Data
-from airtouch.gap.fit import judge
-from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.nominal_scatter import Scatter
-from airtouch.gap.problem import GROUPS, Part
-from airtouch.gap.select import MOST_EFFECTS, contradicted, losses, seconds
-from airtouch.gap.selection import Judged, probabilities
-from airtouch.gap.spectra import AIR, REST
-from airtouch.gap.unexplained import fails
+from airtouch.gap.answer.unexplained import fails
+from airtouch.gap.evidence.clock import clock_gain
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.problem import GROUPS, Part
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.naming import judging
+from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
+from airtouch.gap.naming.selection import Judged, probabilities
+from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.signals.spectra import AIR, REST
+from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.nominal_scatter import Scatter
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, chosen, found, made, own_gain, scattered
 
@@ -124,7 +124,7 @@ def test_noise_is_measured_and_lost_rows_are_counted_and_each_has_its_share():
 
 def test_no_more_than_so_many_effects_are_named(monkeypatch):
     assert MOST_EFFECTS == 3
-    monkeypatch.setattr("airtouch.gap.select.MOST_EFFECTS", 2)
+    monkeypatch.setattr("airtouch.gap.naming.select.MOST_EFFECTS", 2)
     lost = np.random.default_rng(0).random(3000) < 0.1
     selection, _ = found([replace(made(4, (0.0, 0.0, -DOWN), louder=2.0), lost=lost)],
                          ("mass", "imu_noise", "packet_loss"))

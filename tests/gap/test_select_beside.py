@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from airtouch.gap import calibrate, judging
-from airtouch.gap.candidates import every
-from airtouch.gap.data import Data
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming import judging
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.signatures.candidates import every
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, flown, noise
 from hovers import DOWN, STIFF, chosen, found, made, own_gain, scattered

@@ -2,10 +2,10 @@
 
 import pytest
 
-from airtouch.gap import candidates
-from airtouch.gap.data import Data
 from airtouch.gap.diagnose import best_shape
-from airtouch.gap.problem import whole_of
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.signatures import candidates
 from gap_flights import flown
 
 

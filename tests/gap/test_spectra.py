@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.channels import COUNT
-from airtouch.gap.flight import PERIOD_S
-from airtouch.gap.spectra import AIR, LENGTH, REST, blocks, floor_of, starts
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.signals.spectra import AIR, LENGTH, REST, blocks, floor_of, starts
 from gap_flights import flight
 
 

@@ -7,9 +7,13 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap import calibrate, controller, edge_response, fit, flight, judging, loop_model, twin
-from airtouch.gap.candidates import terms
-from airtouch.gap.data import Data
+from airtouch.gap.evidence import fit
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights import flight
+from airtouch.gap.loop import controller, edge_response, loop_model, twin
+from airtouch.gap.naming import judging
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.signatures.candidates import terms
 from airtouch.simulation import scenario
 from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import Active, activate

@@ -5,8 +5,10 @@ import pytest
 
 from airtouch.reference.int8_network import Int8Layer, Int8Network, multiplications, rolling_multiplications
 
+NO_WEIGHTS = np.zeros(0, np.int8)
 
-def layer(kind, shape_in, shape_out, kernel=(1, 1), weights=np.zeros(0, np.int8)):
+
+def layer(kind, shape_in, shape_out, kernel=(1, 1), weights=NO_WEIGHTS):
     return Int8Layer(kind, shape_in, shape_out, kernel, 0.1, 0, 0.1, 0, weights=weights)
 
 

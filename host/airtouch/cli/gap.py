@@ -64,7 +64,8 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     REAL and --baseline are log files, folders or patterns; give REAL first.
     """
     from airtouch.cli import gap_input, gap_show
-    from airtouch.gap import measure, on_cluster
+    from airtouch.gap import measure
+    from airtouch.gap.sealed import on_cluster
 
     _check_free(report, json_path, force)
     flights, nominal = gap_input.Flights(real), gap_input.Flights(baseline)
@@ -77,7 +78,7 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     if json_path:
         scores.write_json(json_path, measurement.plain(), force)
     if report:
-        from airtouch.gap import pictures
+        from airtouch.gap.answer import pictures
         from airtouch.report import gap_report
 
         gap_report.write_measurement(report, measurement, pictures.of_measurement(measurement, flights, vehicle),
@@ -148,7 +149,8 @@ def demo_command(out: Path, force: bool) -> None:
     import time
 
     from airtouch.cli import gap_show
-    from airtouch.gap import example, words
+    from airtouch.gap import example
+    from airtouch.gap.answer import words
     from airtouch.gap.diagnose import diagnose
     from airtouch.logs import read
     from airtouch.report import gap_report
@@ -186,7 +188,7 @@ def _case(vehicle: Any, nominal: list, without: tuple[str, ...]) -> Callable:
 def _runner(dask: str | None, effect_files: tuple[str, ...]) -> Callable:
     if not dask:
         return map
-    from airtouch.gap import on_cluster
+    from airtouch.gap.sealed import on_cluster
 
     return on_cluster.mapper(dask, [Path(p).read_text(encoding="utf-8") for p in effect_files])
 
@@ -198,7 +200,7 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
     from rich.table import Table
 
     from airtouch.cli import gap_show
-    from airtouch.gap import words
+    from airtouch.gap.answer import words
 
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
@@ -241,7 +243,7 @@ def blind() -> None:
 def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool) -> None:
     """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart."""
     from airtouch.cli import gap_show
-    from airtouch.gap import blind as sealed
+    from airtouch.gap.sealed import blind as sealed
 
     with gap_show.Bar() as bar:
         written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
@@ -261,7 +263,7 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
                 force: bool) -> None:
     """Open the key of the set in FOLDER and score the diagnoses in ANSWERS, a folder or a file."""
     from airtouch.extras import need
-    from airtouch.gap import blind as sealed
+    from airtouch.gap.sealed import blind as sealed
 
     need("plots", "scoring a sealed set")
     _check_free(json_path, plot, force)
@@ -285,7 +287,7 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     """
     from airtouch.cli import gap_show
     from airtouch.extras import need
-    from airtouch.gap import blind_run as check
+    from airtouch.gap.sealed import blind_run as check
 
     need("plots", "scoring a sealed set")
     spread = _runner(dask, ()) if dask else None

@@ -9,10 +9,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from airtouch.gap import summary, words
-from airtouch.gap.gap_map import CHANNEL_WORDS, interval, ratio, short
+from airtouch.gap.answer import words
 from airtouch.gap.measure import Measurement
 from airtouch.gap.result import Cell, Diagnosis
+from airtouch.gap.where import summary
+from airtouch.gap.where.gap_map import CHANNEL_WORDS, interval, ratio, short
 
 PATIENCE_S = 2.0
 MOST_CELLS = 16

@@ -3,23 +3,25 @@
 `airtouch.gap.diagnose(flights, vehicle, baseline)` and `airtouch.gap.measure(...)` take files, logs or tables, as
 `airtouch.api` says. Both are modules as well, whose functions take logs alone.
 
-Where each decision is made:
+Where each decision is made; a folder imports only those above it:
 
-- A log made ready: `flight`, `motion`; what is compared: `channels`, `spectra`, `data`.
-- Where the gap lies: `measure`, with `band_sums`, `cell_tables`, `gap_map`, `summary`.
-- What is normal: `calibrate` (the vehicle), `response`, `hardness` and `lost_rows` (the floor), `twin`, `twin_view`,
-  `controller`, `loop_model` and `edge_response` (the closed loop), `nominal_scatter` and `apparent` (how strong
-  effects seem to be where there are none).
-- Which effect: `diagnose` calls `select`, which adds effects one by one. `candidates` says how each effect is
-  fitted, `screen` takes a first look, `judging` fits on one half and judges on the other by `fit`, `problem`,
-  `least_squares`, `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the
-  log's times show, `generic` with `basis` what has no name. `selection` holds what was found, with its
-  probabilities.
-- How far: `shrink`. What stays open: `unexplained`. What to fly next: `advice`.
-- Flights without a gyro: `hover_balance`, `balance_result`.
-- The answer: `result`, `words`, `pictures`.
-- Withheld effects: `blind`, with `blind_draw`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
+- `flights`, a log made ready: `flight`, `motion`; how hard it is flown: `hardness`.
+- `signatures`, what is known of each effect: `candidates` says how it is fitted, `nominal_scatter` how strong it seems
+  where there is none.
+- `loop`, the closed loop: `controller`, `loop_model`, `twin`; at edges: `edge_response`.
+- `signals`, what is compared: `channels`, `spectra`, `twin_view`; what raises the floor: `response`, `lost_rows`.
+- `evidence`, how likely the flights are under an effect: `data`, `problem`, `fit` with `least_squares`,
+  `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show,
+  `generic` with `basis` what has no name.
+- `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `select` adds
+  effects one by one; `selection` holds what was found, with its probabilities.
+- `nominal`, what the baseline flights say: `calibrate` (vehicle, floors), `apparent` (strengths where there is none).
+- `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
+- `answer`: how far: `shrink`; what stays open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.
+- `balance`, flights without a gyro: `hover_balance`, `balance_result`.
+- `sealed`, withheld effects: `blind`, `blind_draw`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.
+- `diagnose` calls them all and fills a `result`.
 """
 
 import importlib

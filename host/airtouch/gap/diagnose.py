@@ -6,23 +6,27 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap import advice as advices
-from airtouch.gap import balance_result, calibrate, callable_module, candidates, measure, summary
-from airtouch.gap import pictures as picture
-from airtouch.gap.candidates import CLOCK, Term
-from airtouch.gap.data import Data, Study
-from airtouch.gap.fit import Fit, fit, judge, strength_variance
-from airtouch.gap.flight import Flight
-from airtouch.gap.gap_map import gap_map, where
-from airtouch.gap.judging import FIRST_GAIN, halves
-from airtouch.gap.problem import LOOP, Part, whole_of
+from airtouch.gap import callable_module, measure
+from airtouch.gap.answer import advice as advices
+from airtouch.gap.answer import pictures as picture
+from airtouch.gap.answer.shrink import Cells, Shrink, cells_of, shrink_of
+from airtouch.gap.answer.unexplained import unexplained, why_not
+from airtouch.gap.balance import balance_result
+from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.fit import Fit, fit, judge, strength_variance
+from airtouch.gap.evidence.problem import LOOP, Part, whole_of
+from airtouch.gap.flights.flight import Flight
+from airtouch.gap.loop.twin import Twin
+from airtouch.gap.naming.judging import FIRST_GAIN, halves
+from airtouch.gap.naming.select import LOOP_SHARE, select
+from airtouch.gap.naming.selection import Judged, Selection, probabilities
+from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Diagnosis, Found, Quantity, Ranked
-from airtouch.gap.select import LOOP_SHARE, select
-from airtouch.gap.selection import Judged, Selection, probabilities
-from airtouch.gap.shrink import Cells, Shrink, cells_of, shrink_of
-from airtouch.gap.spectra import AIR
-from airtouch.gap.twin import Twin
-from airtouch.gap.unexplained import unexplained, why_not
+from airtouch.gap.signals.spectra import AIR
+from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.candidates import CLOCK, Term
+from airtouch.gap.where import summary
+from airtouch.gap.where.gap_map import gap_map, where
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap import calibrate, callable_module, summary, twin
-from airtouch.gap.channels import residual
-from airtouch.gap.data import Study
-from airtouch.gap.flight import GROUND, Flight, ready
-from airtouch.gap.gap_map import CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of, where
-from airtouch.gap.hardness import STILL_RAD, hardness_of
-from airtouch.gap.motion import held
+from airtouch.gap import callable_module
+from airtouch.gap.evidence.data import Study
+from airtouch.gap.flights.flight import GROUND, Flight, ready
+from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
+from airtouch.gap.flights.motion import held
+from airtouch.gap.loop import twin
+from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
-from airtouch.gap.spectra import AIR, LENGTH, starts
+from airtouch.gap.signals.channels import residual
+from airtouch.gap.signals.spectra import AIR, LENGTH, starts
+from airtouch.gap.where import summary
+from airtouch.gap.where.gap_map import CHANNEL_WORDS, GapMap, Part, assemble, in_words, overall, part_of, where
 from airtouch.logs.flight_log import RPM, FlightLog
 from airtouch.simulation import replay
 from airtouch.vehicle import Vehicle

@@ -125,7 +125,7 @@ class Diagnosis:
     vehicle: str = ""
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
-    #: `gap.pictures.Pictures`, where they were asked for
+    #: `gap.answer.pictures.Pictures`, where they were asked for
     pictures: Any = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
     held: Any = field(default=None, repr=False, compare=False)

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from airtouch.gap.gap_map import CHANNEL_WORDS
-from airtouch.gap.pictures import Signal, Spectrum
+from airtouch.gap.answer.pictures import Signal, Spectrum
+from airtouch.gap.where.gap_map import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE
 

@@ -9,11 +9,12 @@ import jinja2
 
 from airtouch import __version__
 from airtouch.extras import lacking
-from airtouch.gap import summary, words
-from airtouch.gap.advice import ADD_AN_EFFECT
+from airtouch.gap.answer import words
+from airtouch.gap.answer.advice import ADD_AN_EFFECT
+from airtouch.gap.answer.pictures import Pictures
 from airtouch.gap.measure import Measurement
-from airtouch.gap.pictures import Pictures
 from airtouch.gap.result import Cell, Diagnosis
+from airtouch.gap.where import summary
 from airtouch.logs.files import write_bytes
 from airtouch.report import gap_tables
 from airtouch.report.write import embed

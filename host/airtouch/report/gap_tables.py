@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from airtouch.gap import summary
-from airtouch.gap.channels import CHANNELS
-from airtouch.gap.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, interval, ratio, short, significant
+from airtouch.gap.answer.words import quantity, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
-from airtouch.gap.words import quantity, seconds_in_words
+from airtouch.gap.signals.channels import CHANNELS
+from airtouch.gap.where import summary
+from airtouch.gap.where.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, interval, ratio, short, significant
 
 #: (least ratio of gap to floor, background colour, text colour)
 SHADES = ((20.0, "#7f1d1d", "#ffffff"), (10.0, "#b3261e", "#ffffff"), (5.0, "#dd6b4d", "#ffffff"),

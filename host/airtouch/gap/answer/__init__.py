@@ -1,0 +1,1 @@
+"""What is said: how far it closes, what stays open, what to fly next, words and pictures."""

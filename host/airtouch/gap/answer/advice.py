@@ -1,0 +1,104 @@
+"""What to fly or log next: the manoeuvre or channel that would settle what these logs leave open, with its command."""
+
+import shlex
+from collections.abc import Sequence
+
+from airtouch.gap.flights.flight import Flight
+from airtouch.gap.result import Cell, Found, Step
+from airtouch.gap.signatures import candidates
+from airtouch.simulation.effects import EFFECTS, source_of
+
+ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
+URI = "radio://0/80/2M/E7E7E7E7E7"
+#: what separates pairs that logs like these confuse, and the mission that shows it, "" where no ready one does
+SEPARATES = {
+    frozenset({"motor_lag", "actuator_delay"}): ("command steps in hover at two step sizes, or log rpm: a lag "
+                                                 "rounds the response, a delay shifts it", ""),
+    frozenset({"motor_lag", "inertia"}): ("log rpm, or add quick yaw turns: inertia scales every response alike", ""),
+    frozenset({"wind", "imu_bias"}): ("stand still with motors off for five seconds, and turn the vehicle by 90 "
+                                      "degrees in hover: wind turns in body axes and is gone on the ground, a bias is "
+                                      "neither", ""),
+    frozenset({"weak_motor", "com_offset"}): ("add yaw turns: a weak rotor leaves yaw torque, an offset does not", ""),
+    frozenset({"rotor_drag", "blade_flapping"}): ("fly faster than 1 m/s: flapping tilts the vehicle as well", ""),
+    frozenset({"sensor_latency", "controller_gain"}): ("log the attitude set-points, or fly steps of attitude: a sweep "
+                                                       "has them where it starts and stops", "there-and-back"),
+    frozenset({"battery_sag", "thrust_coefficient"}): ("log the battery voltage over a whole flight", "hover"),
+}
+#: mission with most of a phase; take-off and landing are in every one
+MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
+
+
+def advice(steps: Sequence[Step]) -> str:
+    """The steps as text."""
+    return " ".join(s.text for s in steps)
+
+
+def steps(verdict: str, effects: Sequence[Found], alike: Sequence[tuple[str, ...]], headline: Cell | None,
+          flights: Sequence[Flight], baseline: bool, vehicle: str) -> tuple[Step, ...]:
+    """What to do next, most useful first."""
+    said = [_apart(group) for group in alike]
+    if verdict == "unknown":
+        said += _open(headline, vehicle)
+    if verdict == "effect":
+        named = " and ".join(e.name for e in effects)
+        said.append(Step(f"Switch on {named} with these parameters in the simulator, and fly it again.",
+                         switched_on(effects, vehicle)))
+    if verdict == "none":
+        said.append(Step("Nothing to add; longer flights would lower the floor."))
+    if not baseline:
+        said.append(Step("Give flights that are known to be nominal with --baseline: they lower the floor and show "
+                         "delays and gains of the controller.", "airtouch gap diagnose REAL --baseline NOMINAL..."))
+    if "no gyro" in {c.split(":")[0] for f in flights for c in f.cannot}:
+        said.append(Step("Log the gyro: it shows torque at every frequency."))
+    return tuple(said)
+
+
+def switched_on(effects: Sequence[Found], vehicle: str) -> str:
+    """The command that flies the named effects in the simulator."""
+    words = ["airtouch", "simulate", "diagnosis", "-n", "5", "--out", "with-effect", "--vehicle", vehicle]
+    for e in effects:
+        given = [f"{k}={_value(e.name, k, q.value)}{q.unit.replace(' ', '').removeprefix('1')}"
+                 for k, q in e.parameters.items()]
+        words += [*(("--effect-file", file) if (file := source_of(e.name)) else ()),
+                  "--effect", e.name + (":" + ",".join(given) if given else "")]
+    return shlex.join(words)
+
+
+def _value(effect: str, parameter: str, value: float) -> str:
+    """Four digits, and within the parameter's bounds, which rounding may leave."""
+    bounds = {p.name: p for p in EFFECTS[effect].parameters}.get(parameter) if effect in EFFECTS else None
+    text = f"{value:.4g}"
+    if bounds is not None and not bounds.low <= float(text) <= bounds.high:
+        text = f"{min(max(value, bounds.low), bounds.high):.17g}"
+    return text
+
+
+def collect(mission: str) -> str:
+    """The command that flies a mission three times."""
+    return f"airtouch collect --uri {URI} --mission {mission} -n 3 --out more"
+
+
+def _apart(group: tuple[str, ...]) -> Step:
+    """What tells the effects of a group from one another."""
+    twins = candidates.twins_of(group[0])
+    if twins and twins[0] <= frozenset(group):
+        return Step(f"To tell {' from '.join(sorted(twins[0]))}: {twins[1]}.")
+    tell, mission = next((t for k, t in SEPARATES.items() if k <= frozenset(group)),
+                         ("repeat the flight with other speeds and heights", "there-and-back"))
+    return Step(f"To tell {' from '.join(group)}: {tell}.", collect(mission) if mission else "")
+
+
+def _open(headline: Cell | None, vehicle: str) -> list[Step]:
+    """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
+    said = []
+    if headline is not None and headline.phase in MISSIONS:
+        said.append(Step(f"Repeat the flight with more of {headline.phase}, where most of the gap is.",
+                         collect(MISSIONS[headline.phase])))
+    elif headline is not None:
+        said.append(Step("Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
+    said.append(Step("Write the effect that you suspect in a file of your own, and diagnose again with it among the "
+                     "candidates.",
+                     f"airtouch gap diagnose REAL --vehicle {shlex.quote(vehicle)} --baseline NOMINAL... "
+                     "--effects-file mine.py",
+                     ADD_AN_EFFECT))
+    return said

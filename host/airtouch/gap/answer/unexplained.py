@@ -1,0 +1,165 @@
+"""What a diagnosis leaves open: where and when it is left, what it follows, and why the nearest effects fail."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import spearmanr
+
+from airtouch.gap.evidence.data import Study
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.motion import held
+from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.result import Cell
+from airtouch.gap.signals.channels import CHANNELS, residual
+from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
+from airtouch.gap.signatures.candidates import MEAN
+from airtouch.simulation import signals as at
+
+MOST_CELLS = 5
+NEAREST = 3
+FEWEST = 8  #: blocks in which a relation can be seen
+CHANCE = 0.01  #: of any relation that is not there, all signals together
+PLACE = {c.name: i for i, c in enumerate(CHANNELS)}
+
+
+def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
+                ) -> list[dict[str, Any]]:
+    """The largest cells of the map that the named effects leave, JSON-ready (GAP.md, `unexplained`).
+
+    cells: largest first. Each entry has the stretch of time in which most of it is (of the flight in which it is
+    largest), how far it is over the floor there, signals that the cell's power follows from block to block, and
+    the effects that gain most with the reason why they were not named.
+    """
+    terms = selection.whole.fits[0].terms if selection.whole and selection.whole.fits else ()
+    active = tuple(t.active() for t in terms if t.kind == MEAN)
+    near = nearest(selection)
+    out = []
+    for cell in [c for c in cells if c.phase != "ground" and c.regime == "all"][:MOST_CELLS]:
+        over = [(f, o) for f in flights if len(o := _over(study, f, active, cell))]
+        if not over:
+            continue
+        flight, ratio = max(over, key=lambda x: float(x[1].max()))
+        first, last = _stretch(ratio)
+        begin = starts(flight, AIR)
+        out.append({"channel": cell.channel, "band_hz": list(cell.band_hz), "phase": cell.phase, "flight": flight.name,
+                    "from_s": float(begin[first] * PERIOD_S), "to_s": float((begin[last] + LENGTH[AIR]) * PERIOD_S),
+                    "over_floor": float(ratio[first:last + 1].max()), "follows": _follows(study, over),
+                    "nearest": near})
+    return out
+
+
+def nearest(selection: Selection) -> list[dict[str, str]]:
+    """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
+    most = sorted((j for j in selection.singles.values() if j.gain > 0.0), key=lambda j: -j.gain)
+    return [{"name": j.name, "fails": fails(selection, j)} for j in most[:NEAREST]]
+
+
+def fails(selection: Selection, judged: Judged) -> str:
+    """Why a candidate is not the answer, in nats of held-out log likelihood."""
+    least = selection.least[judged.name]
+    if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
+        return against(selection)
+    if judged.gain < least:
+        return f"held-out data gain {judged.gain:.1f} nats by it, {least:.0f} are needed"
+    if judged.evidence < least:
+        return (f"as strong as it often seems to be in nominal flights: {judged.gain:.0f} nats, of which "
+                f"{max(judged.evidence, 0.0):.1f} beyond that scatter, {least:.0f} are needed")
+    if selection.chosen:
+        return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
+                f"{selection.chosen.gain:.0f}")
+    return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+
+
+def against(selection: Selection) -> str:
+    """What speaks against the effects named, in words, with the limit that it exceeds or keeps."""
+    lost, worst = selection.contradicted
+    if selection.loss == selection.unlike:
+        return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
+                f"{selection.least_left:.0f} may be chance")
+    return (f"a model without names gains {max(selection.free_after, 0.0):.0f} nats beside it, up to "
+            f"{selection.allowed:.0f} may be left")
+
+
+def why_not(selection: Selection, name: str, verdict: str) -> str:
+    """Why a candidate of the ranking is not the answer, "" for the answer."""
+    first = selection.named[0].name if selection.named else ""
+    step = next((s for s in selection.named[1:] if s.name == name), None)
+    if name == verdict or (verdict == "effect" and name == first):
+        return ""
+    if step is not None and verdict == "effect":
+        before = selection.steps[selection.steps.index(step) - 1].gain
+        return f"named beside {first}: adds {step.gain - before:.0f} nats to it; the probability is that it acts alone"
+    if name == "unknown":
+        return (f"a model without names adds {max(selection.free_after, 0.0):.0f} nats, up to {selection.allowed:.0f} "
+                "may be left"
+                if selection.explained else "the gap as a whole is at its floor")
+    if name == "none":
+        return (f"{first} gains {selection.chosen.gain:.0f} nats over it" if selection.chosen else
+                f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
+                "left")
+    return fails(selection, selection.singles[name])
+
+
+def _over(study: Study, flight: Flight, active: Sequence[Any], cell: Cell) -> np.ndarray:
+    """Root mean square of a cell's channel and band over its floor in every block (b,) in the air."""
+    begin, c = starts(flight, AIR), PLACE[cell.channel]
+    if not len(begin):
+        return np.zeros(0)
+    left = held(residual(flight, study.vehicle, (*study.calibration, *active), study.controller)[:, c:c + 1])
+    f = frequencies(AIR)
+    band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
+    power = (np.abs(blocks(left, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
+    return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), 1e-300))
+
+
+def _stretch(ratio: np.ndarray) -> tuple[int, int]:
+    """First and last block around the largest that stay above the middle between it and the median."""
+    peak = int(np.argmax(ratio))
+    limit = 0.5 * (ratio[peak] + float(np.median(ratio)))
+    first = last = peak
+    while first > 0 and ratio[first - 1] >= limit:
+        first -= 1
+    while last + 1 < len(ratio) and ratio[last + 1] >= limit:
+        last += 1
+    return first, last
+
+
+def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
+    """Signals (n,) of a flight that a gap may follow."""
+    s, log = flight.signals, flight.log
+    thrust = study.vehicle.thrust(flight.pwm).sum(axis=1)
+    out = {"thrust": thrust, "tilt": np.hypot(flight.turn[:, 2, 0], flight.turn[:, 2, 1]),
+           "time": np.arange(len(flight)) * PERIOD_S}
+    if log.has("zrange_m") or log.has("z_m"):
+        out["height"] = s[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1)
+    if log.has("vx_mps", "vy_mps"):
+        out["speed"] = np.hypot(s[:, at.VELOCITY], s[:, at.VELOCITY + 1])
+    if log.has("vbat_V"):
+        out["battery voltage"] = held(log["vbat_V"])
+    return out
+
+
+def _follows(study: Study, over: Sequence[tuple[Flight, np.ndarray]]) -> list[str]:
+    """Names of signals whose mean over a block ranks like the cell's power (Spearman, CHANCE over all signals)."""
+    table: dict[str, list[np.ndarray]] = {}
+    power = []
+    for flight, ratio in over:
+        begin = starts(flight, AIR)
+        power.append(np.log(np.maximum(ratio, 1e-9)))
+        air = np.where(flight.phase == GROUND, np.nan, 1.0)
+        for name, values in _signals(study, flight).items():
+            cut = (values * air)[begin[:, None] + np.arange(LENGTH[AIR])]
+            table.setdefault(name, []).append(np.nanmean(cut, axis=1))
+    level = np.concatenate(power)[::2]  # every other block: they overlap by half
+    if len(level) < FEWEST:
+        return []
+    found = []
+    for name, parts in table.items():
+        values = np.concatenate(parts)
+        if len(values) != sum(len(p) for p in power) or np.ptp(values) == 0.0:
+            continue
+        told = spearmanr(values[::2], level)
+        if told.pvalue < CHANCE / len(table):
+            found.append((abs(told.statistic), name))
+    return [name for _, name in sorted(found, reverse=True)]

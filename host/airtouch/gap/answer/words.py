@@ -1,0 +1,152 @@
+"""A diagnosis in sentences, for the terminal, the report and the JSON alike."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from airtouch.gap.result import Cell, Diagnosis, Found, Quantity
+from airtouch.gap.where import summary
+from airtouch.gap.where.gap_map import CHANNEL_WORDS, PHASE_WORDS, in_words, ratio, short
+
+
+def answer(diagnosis: Diagnosis) -> str:
+    """The answer in three sentences: where, which, how far."""
+    return " ".join(sentences(diagnosis))
+
+
+def sentences(diagnosis: Diagnosis) -> tuple[str, str, str]:
+    """Where the gap lies, which effect it is and how probable that is, how far it closes."""
+    return _where(diagnosis), _which(diagnosis), _how_far(diagnosis)
+
+
+def _where(diagnosis: Diagnosis) -> str:
+    one = diagnosis.headline
+    if one is None:
+        return "Nowhere does the gap stand out of its floor."
+    cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
+    spread = len({c.phase for c in summary.same_place(cells, one)})
+    flown = len({c.phase for c in cells if c.phase != summary.GROUND})
+    return (f"The gap lies mostly in {CHANNEL_WORDS[one.channel]} at {band_in_words(one)}: {PHASE_WORDS[one.phase]} it "
+            "is "
+            f"{short(one.gap)} {one.unit}, {short(ratio(one))} times the floor"
+            + (f", and it stands out in {spread} of {flown} phases in the air." if flown > 1 else "."))
+
+
+def _which(diagnosis: Diagnosis) -> str:
+    chance = f"{diagnosis.ranking[0].probability:.0%}" if diagnosis.ranking else "not known"
+    if diagnosis.verdict == "none":
+        return f"No unmodelled effect stands out (probability {chance})."
+    if diagnosis.verdict == "unknown":
+        near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")), None)
+        return (f"No known effect explains it (probability {chance})"
+                + (f"; the nearest is {plain(near.name)} with {near.probability:.1%}." if near else "."))
+    first, *others = (_named(e) for e in diagnosis.effects)
+    cell = diagnosis.headline
+    if cell is not None and cell.after is not None and not summary.closes(cell):
+        said = f"The effect named, {first} (probability {chance}), does not close this cell"
+        return said + (f", nor does {joined(others)} beside it." if others else ".")
+    return f"Its cause is {first} (probability {chance})" + (f", with {joined(others)} beside it." if others else ".")
+
+
+def _named(effect: Found) -> str:
+    """The effect's name, and of which rotor."""
+    rotor = effect.parameters.get("rotor")
+    return plain(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
+
+
+def _how_far(diagnosis: Diagnosis) -> str:
+    before, after = (diagnosis.gap.get(k) for k in ("before", "after"))
+    if before is None or after is None:
+        return "How far it would close is not known."
+    if diagnosis.verdict != "effect" or diagnosis.shrink is None:
+        if diagnosis.verdict == "none":
+            return f"Over all it is {short(before)} times the floor, so there is nothing to close."
+        return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
+    added = "it" if len(diagnosis.effects) == 1 else "them"
+    cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
+    left, bad = summary.remaining(cells), summary.worse(cells)
+    over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
+    more = ""
+    if left:
+        more = f"; {len(left)} of {over} cells still stand out, the largest {_after_in_words(left[0])}"
+    if bad:
+        more += f", and {len(bad)} got worse"
+    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
+            "floor on data "
+            f"held out, from {short(before)} to {short(after)} times the floor{more}.")
+
+
+def _after_in_words(cell: Cell) -> str:
+    return (f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} "
+            f"({short(ratio(cell))} to {short(summary.after(cell))} times the floor)")
+
+
+def remaining_in_words(cells: Sequence[Cell]) -> list[str]:
+    """One line for each cell that stays over its floor with the named effects in the model."""
+    return [_after_in_words(c) + (": worse than before" if summary.got_worse(c) else "") for c in cells]
+
+
+def band_in_words(cell: Cell) -> str:
+    """`0-0.5 Hz`."""
+    return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
+
+
+def plain(name: str) -> str:
+    """An effect's name as a phrase."""
+    return name.replace("_", " ")
+
+
+def effect_in_words(effect: Found) -> str:
+    """`weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`; of one that comes and goes, when it acts."""
+    when = seconds_in_words(effect)
+    return (f"{effect.name}: " + ", ".join(f"{k} {quantity(q)}" for k, q in effect.parameters.items())
+            + (f"; acts from {when}" if when else ""))
+
+
+def seconds_in_words(effect: Found) -> str:
+    """When an effect acts, "" where it always does."""
+    return ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
+
+
+def open_in_words(entry: Mapping[str, Any]) -> str:
+    """`lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv; follows height`."""
+    low, high = entry["band_hz"]
+    follows = f"; follows {joined(list(entry['follows']))}" if entry["follows"] else ""
+    return (f"{CHANNEL_WORDS[entry['channel']]}, {low:g}-{high:g} Hz, {entry['phase']}: up to "
+            f"{entry['over_floor']:.1f} times the "
+            f"floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of {Path(entry['flight']).name}{follows}")
+
+
+def nearest_in_words(entry: Mapping[str, Any]) -> list[str]:
+    """Why each of the nearest effects was not named."""
+    return [f"{plain(n['name'])}: {n['fails']}" for n in entry["nearest"]]
+
+
+def quantity(q: Quantity, form: str = "{:.3g}") -> str:
+    """A number with unit and interval."""
+    unit = "" if q.unit in ("1", "") else f" {q.unit}"
+    interval = "" if q.low is None or q.high is None else f" ({form.format(q.low)} to {form.format(q.high)})"
+    return form.format(q.value) + unit + interval
+
+
+def joined(names: list[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def measured(where: Cell | None) -> str:
+    """The answer of a measurement: where most of the gap lies."""
+    return f"Most of the gap lies {in_words(where)}." if where else "No gap stands out of the floor."
+
+
+def overall(gap: Mapping[str, float]) -> str:
+    """The gap of a measurement in a sentence."""
+    return f"Overall it is {gap['before']:.2g} times the floor" + (
+        f", {gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights."
+        if "calibrated" in gap else ".")
+
+
+def rotor_in_words(rotor: Mapping[str, float]) -> str:
+    """`rotor 1: 19600 rpm logged, 0.96 of the model's (0.95 to 0.97 over 6 flights)`."""
+    return (f"rotor {rotor['rotor']}: {rotor['logged']:.0f} rpm logged, {rotor['ratio']:.3f} of the model's "
+            f"({rotor['low']:.3f} to {rotor['high']:.3f} over {rotor['flights']} flights)")

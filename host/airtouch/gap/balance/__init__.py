@@ -1,0 +1,1 @@
+"""Flights without a gyro: which rotor is damaged, by the commands of a hover."""

@@ -1,0 +1,211 @@
+"""Flights without a gyro: what the balance of the motors in hover says, and how unsteady it is.
+
+Angular acceleration is not measured then, but its mean is zero in hover, so the mean
+thrusts that the motors were told to give are the torques that act on the vehicle. A rotor
+that lost thrust needs a higher command by itself, which shows in lift, roll, pitch and
+yaw alike; a weight raises the lift and, off centre, moves commands between opposite
+rotors and leaves yaw as it is. Six numbers a flight; evidence by integrating the
+likelihood over each hypothesis' prior, so that a hypothesis with more freedom must earn it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import welch
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.vehicle import Vehicle
+
+#: lift, roll, pitch, yaw in units of a rotor's share of the weight, from thrusts of rotors 1 to 4
+MIX = np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4.0
+NAMES = ("lift", "roll", "pitch", "yaw", "unsteady", "heave")
+VOLTAGE_EXPONENT = 1.2  #: thrust at a PWM grows with voltage to this power (from nominal flights)
+SETTLE_S = 0.8  #: left out after take-off and before landing
+LEAST_S = 4.0
+UNSTEADY_HZ, HEAVE_HZ = (2.0, 35.0), (0.9, 2.0)
+SAMPLES = 4096  #: of each prior
+Manner = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """What is taken as known beforehand about vehicles and defects.
+
+    between (6,): standard deviations of NAMES between flights of a vehicle as it should be.
+    Propellers of one kind differ by 2 % in thrust (0.01 in each of the first four), a battery
+    slid by 1 mm moves the centre of mass by 0.2 mm, thrust at a voltage is known to 1 %; the
+    last two are of log10 power. own: nominal flights that this is worth beside the scatter of
+    those given. worked_on (4,): more of it where the vehicle was worked on: another set of
+    propellers, whose torque differs too. freedom: of the Student-like tail, as a set may be
+    far off. loss, weight, hung: half-normal priors of a share of thrust lost, an added share
+    of the mass, and of one on a thread, which may rest on the floor. reach: farthest place of
+    a weight, over the arm. shift_m: normal prior of a centre of mass that moved. damaged,
+    loaded, swinging: mean and deviation of unsteadiness and heave with such a defect.
+    """
+
+    between: tuple[float, ...] = (0.012, 0.011, 0.011, 0.014, 0.2, 0.2)
+    own: float = 0.5
+    worked_on: tuple[float, ...] = (0.012, 0.012, 0.012, 0.02)
+    freedom: float = 4.0
+    loss: float = 0.12
+    weight: float = 0.1
+    hung: float = 0.02
+    reach: float = 1.2
+    shift_m: float = 0.002
+    damaged: Manner = ((0.4, 0.35), (0.1, 0.5))
+    loaded: Manner = ((0.4, 0.35), (0.6, 0.4))
+    swinging: Manner = ((0.4, 0.35), (0.6, 0.4))
+
+
+BELIEFS = Beliefs()
+STEADY: Manner = ((0.0, 0.0), (0.0, 0.0))
+
+
+def pattern(flight: Flight, vehicle: Vehicle, voltage_too: bool = True) -> np.ndarray:
+    """NAMES of a flight (6,), lift as its logarithm; NaN without a hover of LEAST_S.
+
+    voltage_too: take the lift at 1 V, for flights that log the voltage; else at the voltage flown.
+    """
+    weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
+    thrust = vehicle.thrust(flight.pwm) / weight
+    if voltage_too and flight.log.has("vbat_V"):
+        voltage = np.nan_to_num(flight.log["vbat_V"], nan=float(np.nanmedian(flight.log["vbat_V"])))
+        thrust = thrust * gaussian_filter1d(voltage, 20, mode="nearest")[:, None] ** VOLTAGE_EXPONENT
+    mixed = thrust @ MIX.T
+    means, power, heave, size = [], [], [], []
+    for first, last in _hovers(flight):
+        part = mixed[first:last]
+        means.append(part.mean(axis=0))
+        size.append(last - first)
+        f, p = welch(part[:, 1:] / part[:, :1].mean(), 1.0 / PERIOD_S, nperseg=256, axis=0)
+        power.append(_bands(f, p).mean())
+        f, p = welch(flight.acceleration[first:last, 2], 1.0 / PERIOD_S, nperseg=256)
+        heave.append(np.log10(p[(f >= HEAVE_HZ[0]) & (f < HEAVE_HZ[1])].mean()))
+    if not size:
+        return np.full(len(NAMES), np.nan)
+    mean = np.average(means, axis=0, weights=size)
+    return np.array([np.log(mean[0]), *(mean[1:] / mean[0]), np.average(power, weights=size),
+                     np.average(heave, weights=size)])
+
+
+def _bands(f: np.ndarray, p: np.ndarray) -> np.ndarray:
+    edges = np.geomspace(*UNSTEADY_HZ, 5)
+    pairs = zip(edges[:-1], edges[1:], strict=True)
+    return np.array([np.log10(p[(f >= a) & (f < b)].mean(axis=0)) for a, b in pairs])
+
+
+def _hovers(flight: Flight) -> list[tuple[int, int]]:
+    """Stretches in the air without take-off and landing."""
+    air = (flight.phase != GROUND) & ~flight.on_ground
+    change = np.flatnonzero(np.diff(np.concatenate([[0], air.astype(np.int8), [0]])))
+    trim = int(SETTLE_S / PERIOD_S)
+    found = [(a + trim, b - trim) for a, b in zip(change[::2], change[1::2], strict=True)]
+    return [(a, b) for a, b in found if (b - a) * PERIOD_S >= LEAST_S]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Nominal flights: mean (6,) and variance (6,) of a further nominal flight of any session."""
+
+    mean: np.ndarray
+    variance: np.ndarray
+
+
+def reference(table: np.ndarray, beliefs: Beliefs = BELIEFS) -> Reference:
+    """Mean of nominal flights' patterns (flights, 6), and their scatter beside that which is believed."""
+    table = table[np.isfinite(table).all(axis=1)]
+    n, own = len(table), beliefs.own
+    squares = ((table - table.mean(axis=0)) ** 2).sum(axis=0)
+    variance = (squares + own * np.array(beliefs.between) ** 2) / (n - 1.0 + own)
+    return Reference(table.mean(axis=0), variance * (1.0 + 1.0 / n))
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Effects with their parameters drawn from the prior (samples,), and the change (samples, 4) of hover."""
+
+    name: str  #: of the family
+    prior: float
+    effects: tuple[tuple[str, dict], ...]
+    change: np.ndarray
+    manner: Manner
+
+
+def hypotheses(vehicle: Vehicle, beliefs: Beliefs = BELIEFS) -> list[Hypothesis]:
+    """No effect, one or two weak rotors, a weight at its place, a weight on a thread, something else."""
+    draw = qmc.Sobol(3, seed=1).random(SAMPLES)
+    normal = ndtri(np.clip(draw, 1e-6, 1.0 - 1e-6))
+    out = [Hypothesis("none", 0.25, (), np.zeros((1, 4)), STEADY)]
+    loss = np.minimum(beliefs.loss * np.abs(normal), 0.8)
+    rise = loss / (1.0 - loss)
+    for i in range(4):
+        one = (_weak(i, loss[:, 0]),)
+        out.append(Hypothesis("weak_motor", 0.15 / 4, one, _rotors({i: rise[:, 0]}), beliefs.damaged))
+        for j in range(i):
+            two = (_weak(j, loss[:, 0]), _weak(i, loss[:, 1]))
+            change = _rotors({j: rise[:, 0], i: rise[:, 1]})
+            out.append(Hypothesis("weak_motor", 0.10 / 6, two, change, beliefs.damaged))
+    reach, turn = beliefs.reach * vehicle.arm_m * np.sqrt(draw[:, 1]), 2.0 * np.pi * draw[:, 2]
+    x, y = reach * np.cos(turn), reach * np.sin(turn)
+    half = vehicle.arm_m / np.sqrt(2.0)
+    share = beliefs.weight * np.abs(normal[:, 0])
+    com = {"x": share / (1.0 + share) * x, "y": share / (1.0 + share) * y}
+    out.append(Hypothesis("mass", 0.20, (("mass", {"fraction": share}), ("com_offset", com)),
+                          _carried(share, x, y, half), beliefs.loaded))
+    share = beliefs.hung * np.abs(normal[:, 0])
+    tied = {"load": share * vehicle.mass_kg, "x": x, "y": y}
+    out.append(Hypothesis("slung_load", 0.25, (("slung_load", tied),), _carried(share, x, y, half),
+                          beliefs.swinging))
+    shift = beliefs.shift_m * normal[:, :2]
+    moved = np.column_stack([np.zeros(SAMPLES), shift[:, 1] / half, -shift[:, 0] / half, np.zeros(SAMPLES)])
+    out.append(Hypothesis("com_offset", 0.03, (("com_offset", {"x": shift[:, 0], "y": shift[:, 1]}),),
+                          moved, beliefs.loaded))
+    wide = ndtri(np.clip(qmc.Sobol(4, seed=2).random(SAMPLES), 1e-6, 1.0 - 1e-6))
+    out.append(Hypothesis("unknown", 0.02, (("unknown", {}),), 0.15 * wide, beliefs.damaged))
+    return out
+
+
+def _carried(share: np.ndarray, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
+    """Change of (log lift, roll, pitch, yaw) by a weight of this share of the mass at (x, y)."""
+    part = share / (1.0 + share)
+    return np.column_stack([np.log1p(share), part * y / half, -part * x / half, np.zeros(len(share))])
+
+
+def _weak(i: int, loss: np.ndarray) -> tuple[str, dict]:
+    return "weak_motor", {"rotor": np.full(SAMPLES, i + 1.0), "thrust_loss": loss}
+
+
+def _rotors(rise: dict[int, np.ndarray]) -> np.ndarray:
+    """Change of (log lift, roll, pitch, yaw) when these rotors are told more by a share."""
+    told = np.ones((SAMPLES, 4))
+    for i, r in rise.items():
+        told[:, i] += r
+    mixed = told @ MIX.T
+    return np.column_stack([np.log(mixed[:, 0]), mixed[:, 1:] / mixed[:, :1]])
+
+
+def evidence(seen: np.ndarray, base: Reference, every: Sequence[Hypothesis],
+             beliefs: Beliefs = BELIEFS) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Log evidence of each hypothesis for a pattern (6,), and the weights of its samples."""
+    apart, nu = seen - base.mean, beliefs.freedom
+    logs, weights = [], []
+    for h in every:
+        variance = base.variance[:4] + (np.array(beliefs.worked_on) ** 2 if h.effects else 0.0)
+        each = np.log1p((apart[:4] - h.change) ** 2 / variance / nu)
+        distance = 0.5 * (nu + 1.0) * each.sum(axis=1)
+        w = np.exp(distance.min() - distance)
+        log = np.log(w.mean()) - distance.min() + np.log(h.prior) - 0.5 * np.log(variance).sum()
+        for k, (mean, spread) in enumerate(h.manner):
+            width = spread ** 2 + base.variance[4 + k]
+            log -= 0.5 * (apart[4 + k] - mean) ** 2 / width + 0.5 * np.log(width)
+        logs.append(log)
+        weights.append(w / w.sum())
+    return np.array(logs), weights
+
+
+__all__ = ["BELIEFS", "NAMES", "Beliefs", "Hypothesis", "Reference", "evidence", "hypotheses", "pattern",
+           "reference"]

@@ -1,0 +1,159 @@
+"""Flights as a diagnosis sees them: short-time spectra of what was measured minus what the model says."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.flights.flight import Flight
+from airtouch.gap.loop.twin import COMMAND_ONLY, Twin
+from airtouch.gap.signals.channels import TORQUE, angular_acceleration
+from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
+from airtouch.gap.signals.response import FIRST_BIN, Response
+from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
+from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+SCALES_TORQUE = frozenset({"inertia"})  #: what only multiplies torque, and would make less of any trim
+KEPT, KEPT_SAMPLES = 96, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a diagnosis holds flights against: vehicle, calibration, controller and floor."""
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    controller: Twin | None
+    floor: Floor
+    response: Response | None = None
+    usual: Any = None  #: generic.Usual of the nominal flights
+    nominal: int = 0  #: how many there were
+    scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its nominal flights are those of a simulator with the same models."""
+        return self.scatter is not None and self.scatter.exact
+
+    @property
+    def recorded(self) -> bool:
+        """Whether they are not; neither where there are none."""
+        return self.scatter is not None and not self.scatter.exact
+
+
+@dataclass
+class Data:
+    """Flights with their blocks and the spectra of the gap before any effect is added.
+
+    slow: torque counts below the bins in which commands hold aliases only.
+    """
+
+    study: Study
+    flights: Sequence[Flight]
+    slow: bool = False
+    first: list[dict[str, np.ndarray]] = field(default_factory=list)
+    base: list[dict[str, np.ndarray]] = field(default_factory=list)
+    turning: list[np.ndarray] = field(default_factory=list)  #: spectra in the air of the measured angular acceleration
+    quiet: list[np.ndarray] = field(default_factory=list)  #: blocks in the air and axes where no set-point stepped
+    bridging: list[np.ndarray] = field(default_factory=list)  #: power that lost rows add to the blocks in the air
+
+    def __post_init__(self) -> None:
+        self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
+        self.turning = [blocks(angular_acceleration(f), b[AIR], AIR)
+                        for f, b in zip(self.flights, self.first, strict=True)]
+        if self.study.response is not None:
+            self.quiet = [self.study.response.quiet(t - b[AIR][:, :, TORQUE])
+                          for t, b in zip(self.turning, _replayed(self, ()), strict=True)]
+        study = self.study
+        quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
+        self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
+                         for f, b, q in zip(self.flights, self.first, quiet, strict=True)]
+        self.base = spectra(self, ())
+
+
+def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+    """Spectra of the gap with effects in the model, by flight and regime; commands are the twin view's.
+
+    Where nominal flights tell how the gyro follows the commands, torque is compared with what that leaves to expect.
+    """
+    response = data.study.response
+    replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
+    if response is None:
+        every = _replayed(data, replayed)
+        return _without_means(data, replayed, every) if data.slow else every
+    return _cached(data, "_applied", active, lambda: _applied(data, response, active, replayed))
+
+
+def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
+             ) -> list[dict[str, np.ndarray]]:
+    """Spectra of the gap, torque compared with what the commands leave to expect. replayed: without COMMAND_ONLY."""
+    every = _replayed(data, replayed)
+    law = data.study.controller
+    assert law is not None  # a response is known of nominal flights, and so is their loop
+    beside = [a for a in replayed if not law.changes_loop((a,))]
+    through = [a for a in beside if a.effect.wrench is None]
+    change = law.torque_change(active, frequencies(AIR))
+    replays = (_replayed(data, s) for s in ((), through, beside))
+    sets = zip(data.flights, data.quiet, data.turning, *replays, every, strict=True)
+    return [e if f.rates is None else {**e, AIR: response.applied(q, m, n[AIR], d[AIR], o[AIR], e[AIR], change)}
+            for f, q, m, n, d, o, e in sets]
+
+
+def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
+    """Power that the gap may have by flight and regime, as `spectra`, where effects change what is cut of a step.
+
+    None where they change nothing of it.
+    """
+    response, law = data.study.response, data.study.controller
+    change = law.torque_change(active, frequencies(AIR)) if response is not None and law is not None else None
+    if response is None or change is None or not change.cut.any():
+        return None
+    out = []
+    for f, q, turned, nominal in zip(data.flights, data.quiet, data.turning, _replayed(data, ()), strict=True):
+        power = {r: np.zeros(x.shape) for r, x in nominal.items()}
+        if f.rates is not None:
+            doubt = response.doubt(q, turned - nominal[AIR][:, :, TORQUE], change)
+            power[AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
+        out.append(power)
+    return out
+
+
+def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, np.ndarray]],
+                   ) -> list[dict[str, np.ndarray]]:
+    """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
+    some = [a for a in active if a.effect.name not in SCALES_TORQUE]
+    if len(some) == len(active):
+        return every
+    out = [{r: v.copy() for r, v in e.items()} for e in every]
+    for mine, other in zip(out, _replayed(data, some), strict=True):
+        for r, v in mine.items():
+            v[:, :, TORQUE] = other[r][:, :, TORQUE]
+    return out
+
+
+def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
+    """Spectra of what was measured minus what the model makes of the logged commands."""
+    return _cached(data, "_spectra", active, lambda: [_replay(data, *pair, active)
+                                                      for pair in zip(data.flights, data.first, strict=True)])
+
+
+def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], active: Sequence[Active],
+            ) -> dict[str, np.ndarray]:
+    rest = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active))
+    return {r: blocks(rest, first[r], r) for r in first}
+
+
+def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],
+            ) -> list[dict[str, np.ndarray]]:
+    """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
+    cache = data.__dict__.setdefault(name, {})
+    key = tuple((a.effect.name, *a.values.values(), a.gate) for a in active)
+    spectra_of = cache.pop(key) if key in cache else make()
+    if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
+        cache[key] = spectra_of  # the last one used is the last in it
+        if len(cache) > KEPT:
+            cache.pop(next(k for k in cache if k))
+    return spectra_of

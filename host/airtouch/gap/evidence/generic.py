@@ -1,0 +1,268 @@
+"""What no named effect explains: a model without names of what a hypothesis leaves.
+
+Two parts, both found on one half of the data and judged on the other. The first is a
+regression of every force, torque and rate on the flight's own signals: thrust and how
+it changes, roll, pitch and yaw commands, velocity, tilt, height over what is below, time.
+The second is a free power in every view, channel and band. Only columns and bands that
+gain more than chance among so many does are used. What nominal flights have of a column
+or a band is no evidence: as far as they scatter, the coefficient is taken away at no gain.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.evidence.basis import BASIS, basis
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.problem import GROUPS, Part, Problem, problem_of, whole_of
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, blocks, squared
+from airtouch.gap.signatures.candidates import Term
+
+CHANNELS = 9  #: that are regressed: force, torque, rate
+NOTHING = 1e-9  #: variance of a coefficient that has no scatter
+ROUNDS = 3
+MOST_COLUMNS = 4  #: of one channel
+SURE = 3.0  #: standard deviations by which coefficients must scatter more than chance has them do
+SCATTER = 0.15  #: of the logarithm of power between nominal flights, believed like
+BELIEF = 2.0  #: that many of them
+CHANCE = 4.0  #: gain on the half that it is found on by which a column or a band is used: about one by chance
+LOOSE = (np.zeros(GROUPS), np.full(GROUPS, 1e3))  #: mean and scatter of powers of which nothing is believed
+
+
+@dataclass(frozen=True)
+class Usual:
+    """Nominal flights: rms of coefficients (CHANNELS, columns), log power's mean and rms (2, GROUPS)."""
+
+    columns: np.ndarray
+    power: np.ndarray
+
+
+def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
+    """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and regime; made once."""
+    kept = data.__dict__.get("_basis")
+    if kept is None:
+        kept = []
+        for flight, first in zip(data.flights, data.first, strict=True):
+            signals = basis(flight, data.study.vehicle)
+            kept.append([{r: blocks(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
+        data.__dict__["_basis"] = kept
+    return kept
+
+
+def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
+    """The basis (elements, columns) at the elements of one channel, in their order."""
+    every = _columns(data)
+    made = [every[i][channel % 3][r][chosen][:, problem.keep[r][:, channel]].reshape(-1, len(BASIS))
+            for i, r, chosen in part.pieces]
+    return np.concatenate(made) if made else np.zeros((0, len(BASIS)), complex)
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """One channel of one flight: elements own, columns (elements, basis and offsets), spread of the offsets."""
+
+    channel: int
+    own: np.ndarray
+    columns: np.ndarray
+    offsets: np.ndarray
+
+    def precision(self, usual: Usual) -> np.ndarray:
+        """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
+        nominal = np.maximum(usual.columns[self.channel] ** 2, NOTHING)
+        return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
+
+
+class HalfResiduals:
+    """What a hypothesis leaves of a half: values, the power that they should have, and the basis there.
+
+    cells: every channel of every flight; what nominal flights may have of a column, each flight has for itself.
+    """
+
+    def __init__(self, data: Data, part: Part, terms: Sequence[Term]) -> None:
+        self.problem = problem = problem_of(data, part)
+        self.values, added, _ = problem.modelled(terms)
+        self.power = problem.power + added
+        self.groups = problem.groups
+        kept = problem.__dict__.setdefault("_cells", [])
+        if not kept:
+            kept += _cells(data, part, problem)
+        self.cells = kept
+
+    def system(self, cell: _Cell, values: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Normal matrix and right-hand side for values of a cell; tails as those of what is left of them."""
+        nu, tail, power = self.problem.freedom[cell.own], self.problem.tail[cell.own], self.power[cell.own]
+        weights = OVERLAP_WEIGHT * (nu + 1.0) / (tail + squared(left) / power) / power
+        weighted = cell.columns.conj().T * weights
+        return 2.0 * (weighted @ cell.columns).real, 2.0 * (weighted @ values).real
+
+    def without(self, cell: _Cell, given: np.ndarray, usual: Usual) -> tuple[np.ndarray, float]:
+        """A cell without given coefficients and without what nominal flights may have, and its likelihood."""
+        values = self.values[cell.own] - cell.columns[:, :len(BASIS)] @ given
+        left, precision = values, cell.precision(usual)
+        for _ in range(2):
+            normal, right = self.system(cell, values, left)
+            x = np.linalg.solve(normal + np.diag(precision), right)
+            left = values - cell.columns @ x
+        nu, tail = self.problem.freedom[cell.own], self.problem.tail[cell.own]
+        tails = (nu + 1.0) * np.log1p(squared(left) / self.power[cell.own] / tail)
+        return left, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
+
+    def powers(self, left: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Power of what is left over what it should be, freedom, tail and group of the values that are known."""
+        known = self.problem.known
+        over = squared(left[known]) / self.power[known]
+        return over, self.problem.freedom[known], self.problem.tail[known], self.groups[known]
+
+
+def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:
+    out = []
+    channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
+    for c in range(CHANNELS):
+        table, every = _table(data, part, problem, c), np.flatnonzero(channel == c)
+        for f in np.unique(flight):
+            here = known[every] & (flight[every] == f)
+            own = every[here]
+            offsets = [(x[own], p) for x, p in problem.constant() if np.any(x[own])]
+            if len(own):
+                out.append(_Cell(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
+                                 np.array([p for _, p in offsets])))
+    return out
+
+
+def coefficients(half: HalfResiduals, channel: int, usual: Usual) -> np.ndarray:
+    """Coefficients (columns,) that a channel asks for, one column after another; zero for the others."""
+    cells = [c for c in half.cells if c.channel == channel]
+    n, found = len(BASIS), np.zeros(len(BASIS))
+    left = [half.values[c.own] for c in cells]
+    for _ in range(ROUNDS):  # of weights
+        told, right = np.zeros((n, n)), np.zeros(n)
+        for cell, rest in zip(cells, left, strict=True):  # the flight's own share of every column is solved for
+            normal, slope = half.system(cell, half.values[cell.own], rest)
+            ridge = normal + np.diag(cell.precision(usual))
+            taken = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
+            told += normal[:n, :n] - normal[:n] @ taken[:, :n]
+            right += slope[:n] - normal[:n] @ taken[:, n]
+        told += np.diag(1e-9 * np.diag(told) + 1e-12)
+        free: list[int] = []
+        gain = 0.0
+        while len(free) < MOST_COLUMNS:
+            tried = [(_gain(told, right, [*free, k]), k) for k in range(n) if k not in free]
+            if max(tried)[0] - gain < CHANCE:
+                break
+            gain, k = max(tried)
+            free.append(k)
+        found = np.zeros(n)
+        found[free] = np.linalg.solve(told[np.ix_(free, free)], right[free])
+        left = [half.without(c, found, usual)[0] for c in cells]
+    return found
+
+
+def _gain(told: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
+    return 0.5 * float(right[free] @ np.linalg.solve(told[np.ix_(free, free)], right[free]))
+
+
+def power_factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.ndarray, middle: np.ndarray,
+                  spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Logarithm (GROUPS,) of the power's factor of highest posterior, and the log likelihood there."""
+    out = middle.copy()
+    count = np.bincount(groups, minlength=GROUPS)
+    precision = 1.0 / np.maximum(spread ** 2, NOTHING)
+    mean_nu = np.bincount(groups, nu / (nu + 3.0), GROUPS)
+    for _ in range(8):
+        scaled = e * np.exp(-out[groups])
+        push = np.bincount(groups, OVERLAP_WEIGHT * ((nu + 1.0) * scaled / (tail + scaled) - 1.0), GROUPS)
+        out += np.clip((push - (out - middle) * precision) / (OVERLAP_WEIGHT * mean_nu + precision), -1.5, 1.5)
+    out[count == 0] = middle[count == 0]
+    scaled = e * np.exp(-out[groups])
+    level = np.bincount(groups, -OVERLAP_WEIGHT * (out[groups] + (nu + 1.0) * np.log1p(scaled / tail)), GROUPS)
+    return out, level - 0.5 * (out - middle) ** 2 * precision
+
+
+def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]]) -> tuple[float, float]:
+    """Held-out log likelihood that columns, and powers on top of them, add to a hypothesis.
+
+    terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated
+    flights alone: a recorded one had calm air.
+    """
+    usual = data.study.usual or nothing_usual()
+    nothing = np.zeros(len(BASIS))
+    linear = power = 0.0
+    for train, test in ((0, 1), (1, 0)):
+        a, b = (HalfResiduals(data, parts[k], terms[train]) for k in (train, test))
+        left = [h.values.copy() for h in (a, b)]
+        for channel in range(CHANNELS):
+            found = coefficients(a, channel, usual)
+            gained = 0.0
+            for k, h in enumerate((a, b)):
+                for cell in (c for c in h.cells if c.channel == channel):
+                    left[k][cell.own], level = h.without(cell, found, usual)
+                    if h is b and found.any():
+                        gained += level - h.without(cell, nothing, usual)[1]
+            linear += float(gain_at_even_odds(gained)) if found.any() else 0.0
+        one, two = (h.powers(x) for x, h in zip(left, (a, b), strict=True))
+        middle, spread = usual.power
+        _, usually = power_factors(*one, middle, spread)
+        found, freely = power_factors(*one, middle, LOOSE[1])
+        used = freely - usually > CHANCE
+        if not data.study.simulated:
+            used &= found > middle
+        gained = power_factors(*two, found, spread)[1] - power_factors(*two, middle, spread)[1]
+        power += float(gain_at_even_odds(gained[used]).sum())
+    return linear, power
+
+
+def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
+    """Log likelihood gained by something that is there with probability one half."""
+    return np.logaddexp(gain, 0.0) - np.log(2.0)
+
+
+def usual_of(data: Data) -> Usual:
+    """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
+    halves = [HalfResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
+    n = len(halves)
+    if n < 2:
+        return nothing_usual()
+    columns, surprise = np.zeros((2, CHANNELS, len(BASIS)))
+    for h in halves:
+        for cell in h.cells:
+            found, variance = _one_by_one(h, cell)
+            columns[cell.channel] += (found ** 2 - variance) / (n - 1)
+            surprise[cell.channel] += found ** 2 / variance / n
+    columns[surprise < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
+    few = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
+    usual = Usual(np.sqrt(np.maximum(few * columns, 0.0)), nothing_usual().power)
+    log_power, chance = np.zeros((len(halves), GROUPS)), np.full((len(halves), GROUPS), np.nan)
+    for i, h in enumerate(halves):
+        left = h.values.copy()
+        for cell in h.cells:
+            left[cell.own] = h.without(cell, np.zeros(len(BASIS)), usual)[0]
+        e, nu, tail, groups = h.powers(left)
+        log_power[i] = power_factors(e, nu, tail, groups, *LOOSE)[0]
+        count = np.bincount(groups, OVERLAP_WEIGHT * nu / (nu + 3.0), GROUPS)
+        chance[i, count > 0.0] = 1.0 / count[count > 0.0]
+    there = np.isfinite(chance)
+    count = np.maximum(there.sum(axis=0), 1)
+    middle = np.where(there, log_power, 0.0).sum(axis=0) / count
+    squares = np.where(there, (log_power - middle) ** 2 - chance, 0.0).sum(axis=0)
+    own = (np.maximum(squares, 0.0) + BELIEF * SCATTER ** 2) / (count - 1 + BELIEF)
+    return Usual(usual.columns, np.stack([middle, np.sqrt(own * (1.0 + 1.0 / count))]))
+
+
+def _one_by_one(half: HalfResiduals, cell: _Cell) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficient and variance (columns,) of every column of a cell, each beside the offsets alone."""
+    n = len(BASIS)
+    left = half.without(cell, np.zeros(n), nothing_usual())[0]
+    normal, right = half.system(cell, half.values[cell.own], left)
+    found, variance = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        here = [k, *range(n, len(right))]
+        precision = np.concatenate([[1e-12], 1.0 / cell.offsets ** 2])
+        inverse = np.linalg.inv(normal[np.ix_(here, here)] + np.diag(precision + 1e-9 * np.diag(normal)[here]))
+        found[k], variance[k] = (inverse @ right[here])[0], inverse[0, 0]
+    return found, variance
+
+
+def nothing_usual() -> Usual:
+    """Where no nominal flight is known: columns and bands as the floor has them."""
+    return Usual(np.zeros((CHANNELS, len(BASIS))), np.zeros((2, GROUPS)))

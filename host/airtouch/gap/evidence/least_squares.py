@@ -1,0 +1,89 @@
+"""Steps of weighted ridge regression on flattened spectra: those of a fit, and the offsets between flights."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.gap.evidence.problem import Problem
+from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, squared
+from airtouch.gap.signatures.candidates import Term
+
+
+def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
+    pairs = [t.bounds() for t in mean]
+    return (np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])) if pairs \
+        else (np.zeros(0), np.zeros(0))
+
+
+def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+    power = problem.power + added
+    e = squared(values) / power
+    return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
+
+
+def _normal(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
+            weights: np.ndarray, at: np.ndarray, twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and right-hand side of the ridge regression that lowers values + sum(step * column).
+
+    twin: gradient and information of the likelihood from the commands' spectra.
+    """
+    j = np.ascontiguousarray(columns, complex).view(float)  # real and imaginary parts side by side
+    wj = j * np.repeat(weights, 2)
+    normal = 2.0 * (wj @ j.T) + np.diag(1.0 / prior ** 2)
+    slope = -2.0 * (wj @ np.ascontiguousarray(values, complex).view(float)) - at / prior ** 2
+    return normal + twin[1], slope + twin[0]
+
+
+def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
+                 x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
+                 twin: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A step that leaves parameters at a bound there when it would take them past it, and the covariance (n, n) of x.
+
+    damping: share of the normal matrix's diagonal that is added to it for the step.
+    """
+    at, n = np.concatenate([x, offsets]), len(x)
+    free = np.ones(len(at), bool)
+    covariance = np.zeros((n, n))
+    gradient, information = np.zeros(len(at)), np.zeros((len(at), len(at)))
+    gradient[:n], information[:n, :n] = twin
+    normal, slope = _normal(columns, prior, values, weights, at, (gradient, information))
+    for _ in range(n + 1):
+        change = np.zeros(len(at))
+        where = np.flatnonzero(free)
+        if not len(where):
+            break
+        full = np.linalg.pinv(normal[np.ix_(where, where)], hermitian=True)
+        damped = normal[np.ix_(where, where)] + damping * np.diag(np.diag(normal)[where])
+        change[where] = np.linalg.solve(damped, slope[where]) if damping else full @ slope[where]
+        stuck = np.zeros(len(at), bool)
+        stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
+        if not stuck.any():
+            inside = where[where < n]
+            covariance = np.diag(1.0 / np.maximum(np.diag(normal)[:n], 1e-300))  # of those at a bound: all else known
+            covariance[np.ix_(inside, inside)] = full[:len(inside), :len(inside)]
+            break
+        free &= ~stuck
+    return change, covariance
+
+
+def cost_of(problem: Problem, values: np.ndarray, added: np.ndarray | float, x: np.ndarray,
+          offsets: np.ndarray, prior: np.ndarray) -> float:
+    return -problem.likelihood(values, added) + 0.5 * float(((np.concatenate([x, offsets]) / prior) ** 2).sum())
+
+
+def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> tuple[np.ndarray, float]:
+    """Values less the offsets between flights of highest posterior, and minus the log of these offsets' prior.
+
+    An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
+    """
+    power, residual, cost = problem.power + added, values.copy(), 0.0
+    for here, column, spread in problem.offsets:
+        amount, most = 0.0, OVERLAP_WEIGHT * (problem.freedom[here] + 1.0) * problem.known[here] / power[here]
+        for _ in range(2):
+            weights = most / (problem.tail[here] + squared(residual[here]) / power[here])
+            normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
+            slope = 2.0 * float(np.vdot(column, weights * residual[here]).real) - amount / spread ** 2
+            amount += slope / normal
+            residual[here] = values[here] - amount * column
+        cost += 0.5 * (amount / spread) ** 2
+    return residual, cost

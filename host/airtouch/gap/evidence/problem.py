@@ -1,0 +1,246 @@
+"""Blocks flattened to one array, and their likelihood: Whittle's, of the gap's spectra against the floor.
+
+A bin's power e over what the floor and the random effects give is exponential when the
+hypothesis holds; since the floor itself is estimated from few flights, a Student-like
+tail stands in for it.
+"""
+
+import functools
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import exp1
+
+from airtouch.gap.evidence import random_effects
+from airtouch.gap.evidence.data import Data, spectra, step_doubt
+from airtouch.gap.loop.twin import COMMAND_ONLY
+from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
+from airtouch.gap.signals.response import FIRST_BIN
+from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
+from airtouch.gap.signals.twin_view import TwinView
+from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
+from airtouch.simulation.effects import Active
+
+OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
+LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
+DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
+REST_VIEW, TWIN_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
+GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
+FREEDOM = 12.0  #: of the Student-like tail at most
+
+
+@dataclass(frozen=True)
+class Part:
+    """Which blocks of which flights: (flight, regime, chosen bool array), for fitting or judging."""
+
+    pieces: tuple[tuple[int, str, np.ndarray], ...]
+
+
+class Problem:
+    """Blocks flattened to one array: rows are (block, bin, channel) values that count."""
+
+    def __init__(self, data: Data, part: Part) -> None:
+        # the data keeps its problems: no cycle, no garbage to wait for
+        self.data, self.part = weakref.proxy(data), part
+        self._constant: list[tuple[np.ndarray, float]] | None = None
+        self.keep = {r: judged(r) for r in (AIR, REST)}
+        for keep in self.keep.values():
+            keep[:, COMMAND] = False  # the twin view judges them
+        if data.slow:
+            self.keep[AIR][FIRST_BIN:, TORQUE] = False
+        self.twin = TwinView(data.study.controller, data.flights, data.first, part.pieces)
+        self.power = self._gather([{r: data.study.floor.level(f, b[r], r) + (lost if r == AIR else 0.0) for r in b}
+                                   for f, b, lost in zip(data.flights, data.first, data.bridging, strict=True)]).real
+        self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
+                                     for s in data.base]).real.astype(int)
+        self.flight = np.concatenate([np.full(self._size(p), p[0]) for p in part.pieces]) \
+            if part.pieces else np.zeros(0, int)
+        self.base = self._gather(data.base)
+        self.known = np.isfinite(self.base)
+        self.power = np.where(self.known, self.power, 1.0)
+        self.base = np.where(self.known, self.base, 0.0)
+        counts = data.study.floor.blocks
+        nu = [np.full(self._size(p), np.clip(3.0 * counts[p[1]], 2.0, FREEDOM)) for p in part.pieces]
+        self.freedom = np.concatenate(nu) if nu else np.zeros(0)
+        self.own = len(self.base)  #: elements of the replay view; those of the twin view follow
+        self.torque = (self.channel >= TORQUE.start) & (self.channel < TORQUE.stop)
+        #: number of the block in the air of each element, -1 for the others; begin, piece: of each such block the first
+        self.block = self._blocks()  #: sample and the flight
+        twin = self.twin
+        self.power = np.concatenate([self.power, twin.floor])
+        self.base = np.concatenate([self.base, twin.values])
+        self.known = np.concatenate([self.known, np.ones(len(twin), bool)])
+        self.channel = np.concatenate([self.channel, twin.channel]).astype(int)
+        self.flight = np.concatenate([self.flight, twin.flight]).astype(int)
+        self.tail = np.concatenate([tail(self.freedom), twin.freedom])  #: the twin's floor has its tails in it
+        self.freedom = np.concatenate([self.freedom, twin.freedom])
+
+    def _blocks(self) -> np.ndarray:
+        out, begin, flights = [], [], []
+        for i, regime, chosen in self.part.pieces:
+            size = int(self.keep[regime].sum())
+            numbers = np.full(int(chosen.sum()), -1)
+            if regime == AIR:
+                numbers = len(begin) + np.arange(len(numbers))
+                begin += list(self.data.first[i][AIR][chosen])
+                flights += [i] * len(numbers)
+            out.append(np.repeat(numbers, size))
+        self.begin, self.piece = np.array(begin, int), np.array(flights, int)
+        return np.concatenate([*out, np.full(len(self.twin), -1)]).astype(int)
+
+    @functools.cached_property
+    def groups(self) -> np.ndarray:
+        """A number below GROUPS for each flattened value: view, regime, channel and band."""
+        groups = []
+        for _, regime, chosen in self.part.pieces:
+            band = np.digitize(frequencies(regime), BANDS_HZ) - 1
+            table = band[:, None] * COUNT + np.arange(COUNT) + (1000 * REST_VIEW if regime == REST else 0)
+            groups.append(np.tile(table[self.keep[regime]], int(chosen.sum())))
+        twin = np.digitize(self.twin.frequency, BANDS_HZ) * COUNT + self.twin.channel + 1000 * TWIN_VIEW \
+            if len(self.twin) else np.zeros(0)
+        return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
+
+    def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
+        return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
+
+    def _gather(self, by_flight: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
+        parts = [by_flight[i][r][chosen][:, self.keep[r]].ravel() for i, r, chosen in self.part.pieces]
+        return np.concatenate(parts) if parts else np.zeros(0, complex)
+
+    def values(self, active: Sequence[Active]) -> np.ndarray:
+        """Spectra with effects in the model, flattened."""
+        seen = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
+        own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
+        return np.where(self.known, self._with_twin(own, self.twin.moved([a for a in active if not a.gate])), 0.0)
+
+    def _with_twin(self, own: np.ndarray, twin: np.ndarray | float = 0.0) -> np.ndarray:
+        return np.concatenate([own, np.broadcast_to(twin, len(self.twin))])
+
+    def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
+        """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
+        power, cost = self.twin.power([a for a in active if not a.gate], wide)
+        return np.concatenate([self.doubt(active), power - self.twin.floor]), cost
+
+    def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
+        """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
+        random = [t for t in terms if t.kind == SPECTRUM]
+        mean = [t.active() for t in terms if t.kind == MEAN]
+        told, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
+        return self.values(mean), self.random_power(random) + told, cost
+
+    def doubt(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (own,) of what the loop model may be wrong by in the torque that it changes."""
+        law = self.data.study.controller
+        loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
+        if not self.own or not loop or not law.changes_loop(loop):
+            return np.zeros(self.own)
+        change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
+        steps = step_doubt(self.data, loop)
+        return DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else self._gather(steps).real)
+
+    def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
+        """Whether the loops of roll and pitch differ between two hypotheses."""
+        law = self.data.study.controller
+        return law is not None and not law.same_loop(before, after)
+
+    def constant(self) -> list[tuple[np.ndarray, float]]:
+        """Spectra of a unit offset in each of the OFFSETS channels of each flight, with its prior's deviation."""
+        if self._constant is None:
+            self._constant = self._constants()
+        return self._constant
+
+    @functools.cached_property
+    def offsets(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
+        """`constant` without zeros: indices, values there, deviation. No two have an index in common."""
+        places = [np.flatnonzero(column) for column, _ in self.constant()]
+        return [(here, column[here], spread) for here, (column, spread) in zip(places, self.constant(), strict=True)]
+
+    def _constants(self) -> list[tuple[np.ndarray, float]]:
+        columns = []
+        tell = self.data.study.floor.offset
+        for i, flight in enumerate(self.data.flights):
+            for c in range(OFFSETS):
+                if tell[c] <= 0.0:
+                    continue
+                ones = np.zeros((len(flight), COUNT))
+                ones[~flight.on_ground, c] = 1.0
+                made = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
+                         for r in f} for j, f in enumerate(self.data.first)]
+                columns.append((self._with_twin(self._gather(made)), float(tell[c])))
+        return columns
+
+    def random_power(self, terms: Sequence[Term]) -> np.ndarray:
+        """PSD that random effects add, flattened."""
+        total = np.zeros(len(self.base))
+        for term in terms:
+            total += self._with_twin(self._gather(random_effects.power(self.data, term)).real)
+        return total
+
+    def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+        """Log likelihood of what is left, over nothing in particular; only differences mean something."""
+        return self.likelihood_of(squared(values), added)
+
+    def likelihood_of(self, size: np.ndarray, added: np.ndarray | float = 0.0) -> float:
+        """The same, from the values' squared size: for one set of values and many powers."""
+        return float(self._each(size, added).sum())
+
+    def power_slopes(self, values: np.ndarray, added: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Slope (own,) of the log likelihood against the expected power of each value of the replay view, and its
+
+        expected curvature.
+        """
+        own = slice(self.own)
+        power = self.power[own] + added[own]
+        e = squared(values[own]) / power
+        share = OVERLAP_WEIGHT * self.known[own] / power
+        return share * ((self.freedom[own] + 1.0) * e / (self.tail[own] + e) - 1.0), share / power
+
+    def each(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> np.ndarray:
+        """Log likelihood of each value."""
+        return self._each(squared(values), added)
+
+    def _each(self, size: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+        power = self.power + added
+        tails = (self.freedom + 1.0) * np.log1p(size / power / self.tail)
+        return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + tails), 0.0)
+
+
+def cell_words(group: int) -> str:
+    """The cell of a number of `Problem.groups`, in words: channel, band, and whether at rest."""
+    view, place = divmod(group, 1000)
+    band, channel = divmod(place, COUNT)
+    low, high = BANDS_HZ[max(band - (view == TWIN_VIEW), 0):][:2]
+    return f"{CHANNELS[channel].name} at {low:g} to {min(high, 50.0):g} Hz{' at rest' if view == REST_VIEW else ''}"
+
+
+def tail(freedom: np.ndarray) -> np.ndarray:
+    """Scale (n,) of tails whose likelihood is highest at the mean of exponential power:
+
+    E[(nu + 1) e / (tail + e)] = 1.
+    """
+    return np.array([_tail(nu) for nu in np.unique(freedom)])[np.unique(freedom, return_inverse=True)[1]] \
+        if len(freedom) else freedom
+
+
+@functools.cache
+def _tail(nu: float) -> float:
+    return float(brentq(lambda a: a * np.exp(a) * exp1(a) - nu / (nu + 1.0), 1e-3, 600.0))
+
+
+def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
+    """Every block of every flight, or of the flights of these numbers."""
+    chosen = range(len(data.flights)) if flights is None else flights
+    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in chosen for r in (AIR, REST)
+                      if len(data.first[i][r])))
+
+
+def problem_of(data: Data, part: Part) -> Problem:
+    """The flattened blocks of a part, made once."""
+    kept = data.__dict__.setdefault("_problems", {})
+    if id(part) not in kept:
+        kept[id(part)] = (part, Problem(data, part))
+    return kept[id(part)][1]

@@ -1,0 +1,195 @@
+"""Spectra that random effects add to the gap, for a flight as it was flown.
+
+White noise of the IMU and the rotors' lines in closed form; random forces by running the
+effect itself on the flight's signals with several seeds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.signal import freqz
+
+from airtouch.gap.evidence.vibration_lines import lines
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.loop.controller import AXES
+from airtouch.gap.loop.loop_model import spectra
+from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
+from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
+from airtouch.simulation import filters, rigid_body
+from airtouch.simulation.flight import prepare
+
+SEEDS = 4
+LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by
+SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
+
+
+def growth(term: Any, x: float) -> float:
+    """Added power at scaled strength x over that at 1."""
+    if term.name == "imu_noise":
+        values = term.at(np.array([x])), term.at(np.array([1.0]))
+        return max(values[0]["factor"] ** 2 - 1.0, 0.0) / (values[1]["factor"] ** 2 - 1.0)
+    return x * x
+
+
+def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
+    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
+    cache = data.__dict__.setdefault("_random", {})
+    unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
+    key = (term.name, tuple(sorted(unit.values.items())))
+    if key not in cache:
+        cache[key] = [_unit_power(data, i, unit) for i in range(len(data.flights))]
+    p = next(q for q in term.effect.parameters if q.name == term.free[0])
+    neutral = p.neutral or 0.0
+    step = unit.values[term.free[0]] - neutral
+    scale = growth(term, (term.values[term.free[0]] - neutral) / step)
+    if term.gate:
+        return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()}
+                for i, f in enumerate(cache[key])]
+    return [{r: scale * v for r, v in f.items()} for f in cache[key]]
+
+
+def _covered(data: Any, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:
+    """Share (blocks, 1, 1) of the power of each block of a flight that lies within a gate, by the blocks' window."""
+    acts = inside(gate, data.flights[i]).astype(float)
+    length, first = LENGTH[regime], data.first[i][regime]
+    weight = np.hanning(length + 1)[:-1] ** 2
+    cut = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
+    return (cut @ weight / weight.sum())[:, None, None]
+
+
+def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
+    shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
+    maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
+    made = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
+    response = data.study.response
+    if response is not None and data.flights[i].rates is not None:
+        made[AIR][:, :, TORQUE] *= response.added(data.quiet[i], term.name in SENSED)
+    return made
+
+
+def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+    """White noise of gyro and accelerometer, the latter as its low-pass and the log's fold leave it."""
+    row = prepare(data.study.vehicle, ())[0][0]
+    extra = term.values["factor"] ** 2 - 1.0
+    out = {}
+    for r in shape:
+        f = frequencies(r)
+        made = np.zeros((len(f), COUNT))
+        made[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
+        if data.flights[i].rates is not None:
+            gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
+            made[:, TORQUE] = _difference(r)[:, None] * gyro
+            made[:, RATE] = gyro
+            if r == AIR and r in data.study.floor.power:
+                beyond = np.nan_to_num(data.study.floor.power[r][:, TORQUE]) - made[:, TORQUE]
+                made[:, TORQUE] += _gyro_share(data.study) * np.maximum(beyond, 0.0)
+        out[r] = np.broadcast_to(extra * made, shape[r]).copy()
+    return out
+
+
+def logged_noise(row: Any, f: np.ndarray) -> np.ndarray:
+    """PSD (bins,), 1/Hz, of the accelerometer's noise of rms 1 as logged: white, through its low-pass, folded."""
+    whole = np.concatenate([f, 1.0 / PERIOD_S - f, 1.0 / PERIOD_S + f, 2.0 / PERIOD_S - f, 2.0 / PERIOD_S + f])
+    b = np.zeros(5)
+    filters.lowpass_coefficients(float(row["acc_lowpass"]), float(row["step"]), b)
+    _, passed = freqz(b[:3], [1.0, b[3], b[4]], worN=whole, fs=1.0 / float(row["step"]))
+    total = (np.abs(passed) ** 2).reshape(5, -1).mean(axis=0)
+    return 2.0 * PERIOD_S * total / filters.noise_gain(b) ** 2
+
+
+def _gyro_share(study: Any) -> np.ndarray:
+    """Share (bins, 3) of the gyro's noise in what moves the roll and pitch commands of nominal flights.
+
+    The commands' noise is what the floor of the angular acceleration holds beyond the gyro's own.
+    """
+    f = frequencies(AIR)
+    share = np.zeros((len(f), 3))
+    twin = study.controller
+    if twin is None:
+        return share
+    row = prepare(study.vehicle, study.calibration)[0][0]
+    for i, axis in enumerate(AXES[1:]):
+        strength, made = twin.strengths[i + 1], spectra(twin.controllers[i + 1], row, axis, f)
+        share[:, i] = strength[0] * made[0] / np.maximum(strength @ made, 1e-300)
+    return share
+
+
+def _difference(regime: str) -> np.ndarray:
+    """PSD (bins,) of differences over a sample, 1/s^2, of what is white; the lowest bin as its window leaks."""
+    f = frequencies(regime)
+    return 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2 / PERIOD_S ** 2
+
+
+def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+    """Each rotor's thrust times first-order noise: Lorentzian spectra through the mixing."""
+    flight, study = data.flights[i], data.study
+    row = prepare(study.vehicle, study.calibration)[0][0]
+    thrust = study.vehicle.thrust(flight.pwm)
+    tau, rms = term.values["time"], term.values["rms"]
+    arms = np.stack([np.full(4, 1.0 / row["mass"]), row["rotor_y"] / row["inertia"][0],
+                     -row["rotor_x"] / row["inertia"][1],
+                     np.array(rigid_body.SPIN) * -row["yaw_torque_over_thrust"] / row["inertia"][2]])
+    out = {}
+    for r in shape:
+        f = frequencies(r)
+        aliases = np.array([f, 100.0 - f, 100.0 + f, 200.0 - f, 200.0 + f])
+        density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
+        folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
+        folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
+        made = np.zeros(shape[r])
+        for b, first in enumerate(data.first[i][r]):
+            size = (thrust[first:first + 256] ** 2).mean(axis=0)
+            strength = rms ** 2 * (arms ** 2 @ size)
+            made[b, :, 2:6] = folded * strength
+        if r != "air":
+            made[:] = 0.0
+        out[r] = made
+    return out
+
+
+def _vibration(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
+    """The rotors' lines: as strong on each axis of the accelerometer, and on the gyro's differences."""
+    out = {r: np.zeros(s) for r, s in shape.items()}
+    if not len(data.base[i][AIR]):
+        return out
+    line = lines(data).power[i][:, :, None] * term.values["amplitude"] ** 2
+    out[AIR][:, :, FORCE] = line
+    if data.flights[i].rates is not None:
+        out[AIR][:, :, TORQUE] = term.values["gyro"] ** 2 * _difference(AIR)[:, None] * line
+    return out
+
+
+def _over_a_sample() -> np.ndarray:
+    """Power (bins,) of the gyro's differences, which are means over a sample, over that of means of two samples,
+
+    as `channels.residual` takes them; near 50 Hz, where the latter have none, no more than LEAST_PASSED allows.
+    """
+    turns = frequencies(AIR) * PERIOD_S
+    return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
+
+
+def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
+    """The effect run on the flight's own signals with several seeds: one shape of the spectrum a channel,
+
+    at the strength that it has in each block.
+    """
+    flight: Flight = data.flights[i]
+    study = data.study
+    runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
+            for seed in range(SEEDS)]
+    middle = np.mean(runs, axis=0)
+    out = {}
+    for r, first in data.first[i].items():
+        changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - middle)) for run in runs]
+        total = np.sum([np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
+        if not len(total):
+            out[r] = np.zeros(data.base[i][r].shape)
+            continue
+        if r == AIR:
+            total[:, :, TORQUE] *= _over_a_sample()[:, None]
+        shape = total.mean(axis=0, keepdims=True)
+        strength = total.mean(axis=1, keepdims=True) / np.maximum(shape.mean(axis=1, keepdims=True), 1e-300)
+        out[r] = shape * strength
+    return out

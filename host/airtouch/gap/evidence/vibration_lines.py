@@ -1,0 +1,163 @@
+"""Where the lines of turning rotors lie in a flight's spectra, and how strong they are there.
+
+An out-of-balance rotor shakes the IMU once a turn; the log's 100 Hz fold that line to
+somewhere below 50 Hz. Motor commands tell how the speed wanders: the mean of the rotors
+follows the thrust, which changes slowly, while differences between them are aliases of
+the rate loop but for their mean (trim). How fast a rotor turns for its thrust is seldom
+known to the percent that would tell where the fold puts the line, so the place of all
+lines together, and how far those of single rotors are apart, are found from the flights:
+two numbers for all of them. Lines of rotors that turn alike add up as their phases happen to
+stand, so that flights of one vehicle differ: each has its own share of the power.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.signals.spectra import AIR, LENGTH
+from airtouch.simulation import replay
+from airtouch.simulation.flight import prepare
+from airtouch.simulation.plant import hover_speed
+
+BINS = LENGTH[AIR]  #: of a block's two-sided spectrum
+WANDER = 0.3  #: rad^2/s by which a phase walks away from the commanded one
+SPREADS_HZ = (0.0, 1.0, 3.0)  #: of the single rotors' lines around their common place
+KNOWN_SPEED = 0.02  #: relative error of a rotor's speed where the vehicle declares thrust over speed squared
+RPM = ("rpm_1", "rpm_2", "rpm_3", "rpm_4")
+LOWEST_HZ = 3.0  #: below it forces of other origin are strong
+STRENGTHS = np.geomspace(1e-3, 1e3, 13)  #: power over the floor's
+MOST_BLOCKS = 40  #: on which the place is looked for
+FREEDOM = 12.0  #: of the tails of a block's power, as in `problem`
+
+
+@dataclass(frozen=True)
+class Lines:
+    """power: for each flight (blocks, bins), PSD of an accelerometer axis, lines of 1 m/s^2 together in hover;
+
+    shift: bins from the place that the vehicle's thrust over speed squared gives; spread_hz.
+    """
+
+    power: list[np.ndarray]
+    shift: int
+    spread_hz: float
+
+
+def lines(data: Any) -> Lines:
+    """The lines of the flights of `data` (`data.Data`), worked out once."""
+    kept = data.__dict__.get("_lines")
+    if kept is None:
+        kept = data.__dict__["_lines"] = _found(data)
+    return kept
+
+
+def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
+    """Power (blocks, BINS) of exp(i angle) of all rotors, each 0.5 (speed / hover)^2, as blocks hold it.
+
+    speed (n, 4) rad/s at 100 Hz; first: samples at which the blocks begin. Bins as numpy.fft has them.
+    """
+    window = np.hanning(BINS + 1)[:-1]
+    place = first[:, None] + np.arange(BINS)
+    total = np.zeros((len(first), BINS))
+    for one in speed.T:
+        turning = 0.5 * (one / hover) ** 2 * np.exp(1j * PERIOD_S * np.cumsum(one))
+        total += np.abs(np.fft.fft(turning[place] * window, axis=1)) ** 2
+    return total * 2.0 * PERIOD_S / (window ** 2).sum()
+
+
+def widened(power: np.ndarray, spread_hz: float) -> np.ndarray:
+    """The same with a phase that walks by WANDER and a frequency that is uncertain by spread_hz (Gaussian)."""
+    apart = PERIOD_S * np.minimum(np.arange(BINS), BINS - np.arange(BINS))
+    less = np.exp(-0.5 * WANDER * apart - 0.5 * (2.0 * np.pi * spread_hz * apart) ** 2)
+    return np.maximum(np.fft.fft(np.fft.ifft(power, axis=1) * less, axis=1).real, 0.0)
+
+
+def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
+    """One-sided PSD (blocks, BINS // 2 + 1) of the real part, moved by `shift` bins before it is folded."""
+    moved = np.roll(power, shift, axis=1)
+    half = BINS // 2
+    out = 0.25 * (moved[:, :half + 1] + moved[:, -np.arange(half + 1) % BINS])
+    out[:, [0, half]] *= 0.5
+    return out
+
+
+def speeds(flight: Flight, study: Any) -> np.ndarray:
+    """Rotor speeds (n, 4), rad/s: logged ones, or the mean of what the commands give with each rotor's trim."""
+    if flight.log.has(*RPM):
+        return np.nan_to_num(flight.log.stack(RPM)) * np.pi / 30.0
+    told = replay.run(flight.log, study.vehicle, study.calibration, period_s=PERIOD_S,
+                      signals=flight.signals.copy(), pwm=flight.pwm).rotor_speed
+    common = told.mean(axis=1, keepdims=True)
+    return common + (told - common)[flight.phase != GROUND].mean(axis=0)
+
+
+def _found(data: Any) -> Lines:
+    study = data.study
+    hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
+    each = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
+    known = all(f.log.has(*RPM) for f in data.flights) or study.vehicle.thrust_per_speed2 > 0.0
+    turns = hover / (2.0 * np.pi)
+    reach = int(min(np.ceil(KNOWN_SPEED * turns * PERIOD_S * BINS), BINS // 2)) if known else BINS // 2
+    seen = _Seen(data, each)
+    if not len(seen.share):
+        return Lines([folded(widened(z, 0.0)) for z in each], 0, 0.0)
+    wide, some = SPREADS_HZ[1], range(-reach, reach + 1, 2)
+    rough = max(some, key=lambda s: seen.gain(wide, s))
+    near = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
+    spread, shift = max(near, key=lambda x: seen.gain(*x))
+    power = [folded(widened(z, spread), shift) for z in each]
+    return Lines(_shared(data, power), int(shift), spread)
+
+
+class _Seen:
+    """Some blocks of all flights, and how well lines at a place explain them."""
+
+    def __init__(self, data: Any, each: list[np.ndarray]) -> None:
+        blocks = np.concatenate([b[AIR][:, :, :3] for b in data.base])
+        chosen = np.unique(np.linspace(0, len(blocks) - 1, MOST_BLOCKS).astype(int)) if len(blocks) else []
+        self.share, self.floor = _over_floor(data, blocks[chosen])
+        two = np.concatenate(each)[chosen]
+        self.two = {h: widened(two, h) for h in SPREADS_HZ}
+
+    def gain(self, spread_hz: float, shift: int) -> float:
+        return _best(self.share, folded(self.two[spread_hz], shift)[:, _judged()] / self.floor)[0]
+
+
+def _judged() -> np.ndarray:
+    f = np.fft.rfftfreq(BINS, PERIOD_S)
+    return (f >= LOWEST_HZ) & (f < f[-1])
+
+
+def _over_floor(data: Any, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Power (blocks, bins) of the three axes over their floor, mean of them, and that floor (bins,)."""
+    floor = data.study.floor.power[AIR][_judged(), :3]
+    with np.errstate(invalid="ignore"):
+        over = np.nan_to_num(np.abs(blocks[:, _judged()]) ** 2 / floor).mean(axis=2)
+    return over, 1.0 / (1.0 / floor).mean(axis=1)
+
+
+def _best(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
+    """Gain in log likelihood of lines of the best strength over none, and that strength (power)."""
+    size = STRENGTHS / max(float(shape.mean()), 1e-300)
+
+    def likelihood(strength: float) -> float:
+        power = 1.0 + strength * shape
+        return float((-np.log(power) - (FREEDOM + 1.0) * np.log1p(over / power / FREEDOM)).sum())
+
+    found = [likelihood(s) for s in size]
+    best = int(np.argmax(found))
+    fine = size[best] * np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)
+    more = [likelihood(s) for s in fine]
+    return max(more) - likelihood(0.0), float(fine[int(np.argmax(more))])
+
+
+def _shared(data: Any, power: list[np.ndarray]) -> list[np.ndarray]:
+    """Lines of several flights, each with its share of the power; 1 on average."""
+    if len(power) < 2:
+        return power
+    share = np.array([_best(over, p[:, _judged()] / floor)[1] if len(p) else 0.0
+                      for p, (over, floor) in ((p, _over_floor(data, b[AIR][:, :, :3]))
+                                               for p, b in zip(power, data.base, strict=True))])
+    usual = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
+    return [p * s / usual for p, s in zip(power, share, strict=True)]

@@ -1,0 +1,84 @@
+"""Like with like: a floor that rises with how hard the vehicle is flown.
+
+What a model leaves of a nominal flight grows with the manoeuvres: motors that are late or
+saturated, air that flows through the rotors. A block's hardness is the logarithm of how much
+its tilt varies. The power of the gap in a channel and band goes with a power of that,
+E[power] = exp(a + slope * hardness), found by gamma regression over the blocks of nominal
+flights (McCullagh and Nelder, Generalized Linear Models, 2nd ed., chapter 8).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.flights.flight import Flight
+
+STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not flown calmer
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: one slope each
+PRIOR = (1.0, 1.0)  #: mean and standard deviation of slopes before any flight: errors are a share of what is flown
+STEEPEST = 3.0
+#: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted
+CALMER, HARDER = 0.5, 1.5
+ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """slope (bins, COUNT) of log power against hardness, whose nominal range is calmest to hardest, its mean usual."""
+
+    slope: np.ndarray
+    calmest: float
+    usual: float
+    hardest: float
+
+    def level(self, hardness: np.ndarray) -> np.ndarray:
+        """Power (blocks, bins, COUNT) relative to that at the usual hardness.
+
+        A flight calmer or harder than every nominal one has a floor as far beyond theirs as the slopes are trusted.
+        """
+        x = np.clip(hardness, self.calmest - CALMER, self.hardest + HARDER)
+        return np.exp((x - self.usual)[:, None, None] * self.slope)
+
+
+def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:
+    """Logarithm (blocks,) of the standard deviation of tilt, over STILL_RAD, in blocks of `length` samples."""
+    if not len(first):
+        return np.zeros(0)
+    tilt = flight.turn[:, 2, :2]  # the vertical in body axes: sines of pitch and roll
+    cut = tilt[first[:, None] + np.arange(length)]
+    return 0.5 * np.log1p(cut.var(axis=1).sum(axis=1) / STILL_RAD ** 2)
+
+
+def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray,
+              flat: np.ndarray | bool = False) -> Slopes:
+    """From the power (blocks, bins, COUNT) of what nominal flights leave; NaN where it is not known.
+
+    flat (bins, COUNT): where power does not go with hardness, whatever these flights say.
+    """
+    slope = np.zeros(power.shape[1:])
+    if len(power) < 4:
+        return Slopes(slope, 0.0, 0.0, 0.0)
+    band = np.digitize(frequency, BANDS_HZ) - 1
+    for c in range(power.shape[2]):
+        for b in np.unique(band):
+            here = power[:, band == b, c]
+            known = np.isfinite(here).any(axis=1) & (np.nan_to_num(here).sum(axis=1) > 0.0)
+            if known.sum() >= 4:
+                slope[band == b, c] = _slope(np.nanmean(here[known], axis=1), hardness[known])
+    return Slopes(np.where(flat, 0.0, slope), float(hardness.min()), float(hardness.mean()), float(hardness.max()))
+
+
+def _slope(y: np.ndarray, x: np.ndarray) -> float:
+    """Slope of log mean against x of gamma distributed y (n,), of highest posterior under PRIOR."""
+    table = np.stack([np.ones(len(x)), x - x.mean()], axis=1)
+    middle, spread = PRIOR
+    start = np.array([np.log(y.mean()), 0.0])
+    at = start.copy()
+    for _ in range(ROUNDS):
+        ratio = y / np.exp(table @ at)
+        dispersion = max(float(((ratio - 1.0) ** 2).sum()) / (len(y) - 2), 1e-3)
+        information = table.T @ table / dispersion + np.diag([0.0, 1.0 / spread ** 2])
+        push = table.T @ (ratio - 1.0) / dispersion - np.array([0.0, (at[1] - middle) / spread ** 2])
+        step = np.linalg.solve(information, push)
+        at = at + np.clip(step, -1.0, 1.0)
+    return float(np.clip(at[1], 0.0, STEEPEST))

@@ -1,0 +1,108 @@
+"""Gains of the controller, axis by axis, in newtons per motor: crazyflie-firmware's own, from a plant row."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.simulation.firmware import battery_compensation, settings
+
+DEGREES = 180.0 / np.pi
+AXES = ("thrust", "roll", "pitch")
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Gains of one axis. roll, pitch: rate -> command (gain, N per rad/s), angle -> rate (angle, 1/s),
+
+    velocity -> angle (velocity, rad per m/s). thrust: climb -> command (gain, N per m/s),
+    height -> climb (angle, 1/s). Integrals are shares of their gain per second, derivative
+    in s. period_s: of the controller; lowpass_hz: of its gyro, 0 for none.
+    """
+
+    gain: float
+    angle: float
+    velocity: float = 0.0
+    derivative: float = 0.0
+    integral: float = 0.0
+    angle_integral: float = 0.0
+    velocity_integral: float = 0.0
+    period_s: float = PERIOD_S
+    lowpass_hz: float = 0.0
+    on_error: bool = False  #: derivative acts on the error, angle loop included
+    hold_s: float = 0.0  #: the estimator's attitude, velocity and height are renewed so often; 0: at every run
+    chip_hz: float = 0.0  #: bandwidth of the gyro itself, 0 for all
+    range_gains: tuple[float, float] = (0.0, 0.0)  #: of a reading of the down range, to height and (1/s) climb
+    range_s: float = 0.025  #: period of these readings
+    acc_hz: float = 0.0  #: low-pass of the acceleration that the climb is integrated from, 0 for none
+
+
+def newtons_per_pwm(row: Any) -> float:
+    """Slope of a motor's thrust over its command in hover, N."""
+    c0, c1, c2 = (float(c) for c in row["thrust_curve"])
+    each = float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"])))
+    return float(np.sqrt(max(c1 * c1 + 4.0 * c2 * (each - c0), 1e-30)))
+
+
+def newtons_per_command(row: Any) -> float:
+    """Slope of a motor's thrust over the command that the firmware's battery compensation turns into PWM, N."""
+    c0, c1, c2 = (float(c) for c in row["thrust_curve"])
+    slope = newtons_per_pwm(row)
+    hover = (slope - c1) / (2.0 * c2) if c2 else (
+        float(row["mass"]) * float(row["gravity"]) / (4.0 * float(np.mean(row["gain"]))) - c0) / c1
+    return slope * battery_compensation.slope(row["firmware"], row, hover)
+
+
+def firmware(row: Any, axis: str) -> Controller:
+    """crazyflie-firmware's gains (simulation.firmware), with battery compensation where it is on."""
+    return _firmware(row, axis, newtons_per_command(row))
+
+
+def firmware_of(row: Any) -> list[Controller]:
+    """`firmware` of each of AXES."""
+    slope = newtons_per_command(row)
+    return [_firmware(row, axis, slope) for axis in AXES]
+
+
+def _firmware(row: Any, axis: str, slope: float) -> Controller:
+    loops = row["firmware"]["loops"]
+    release = row["firmware"]
+    periods = release["periods"]
+    hold, reading = 0.001 * float(periods["prediction_ms"]), 0.001 * float(periods["range_ms"])
+    if axis == "thrust":
+        climb, height = loops[settings.VELOCITY_Z], loops[settings.POSITION_Z]
+        gain = float(climb["p"]) * float(row["thrust_scale"]) * slope
+        return Controller(gain, float(height["p"]), integral=_share(climb["i"], climb["p"]),
+                          angle_integral=_share(height["i"], height["p"]), hold_s=hold,
+                          range_gains=_range_gains(reading, float(release["range"]["std_m"]),
+                                                   float(release["kalman"]["noise_acc_z_mps2"])), range_s=reading,
+                          acc_hz=float(release["filters"]["acc_hz"]))
+    i = AXES.index(axis) - 1
+    rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
+    speed = loops[settings.VELOCITY_Y if i == 0 else settings.VELOCITY_X]
+    gain = 0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope
+    return Controller(gain, float(angle["p"]), float(speed["p"]) / DEGREES, _share(rate["d"], rate["p"]),
+                      _share(rate["i"], rate["p"]), _share(angle["i"], angle["p"]), _share(speed["i"], speed["p"]),
+                      0.001 * float(periods["attitude_ms"]), float(row["gyro_lowpass"]),
+                      bool(release["controller"]["derivative_on_error"]), hold, float(row["gyro_bandwidth"]))
+
+
+@lru_cache(16)
+def _range_gains(period: float, std: float, acceleration: float) -> tuple[float, float]:
+    """Steady gains of the firmware's Kalman filter from a near down range reading to height and climb (1/s).
+
+    period: s, of the readings; std: m, that it gives them; acceleration: its process noise, m/s^2 a millisecond.
+    """
+    variance, noise = std ** 2, 1000.0 * period * (0.001 * acceleration) ** 2
+    ahead, p, gains = np.array([[1.0, period], [0.0, 1.0]]), np.eye(2), np.zeros(2)
+    for _ in range(400):
+        p = ahead @ p @ ahead.T + np.diag([0.0, noise])
+        gains = p[:, 0] / (p[0, 0] + variance)
+        p = p - np.outer(gains, p[0])
+    return float(gains[0]), float(gains[1])
+
+
+def _share(part: Any, of: Any) -> float:
+    return float(part) / float(of)

@@ -1,0 +1,202 @@
+"""What a flight does in the second after an edge passes under it: thrust, speed along its path, height.
+
+Effects of the height control and of the optical flow show there alone. Nominal flights
+give the usual response and how much it scatters; what an effect adds to it comes from
+the simulator, flown with and without the effect over a platform like the flight's.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap.flights import motion
+from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.logs.edges import Edge, true_edges
+from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
+from airtouch.logs.segments import PLATFORM_STEP_M
+from airtouch.simulation import scenario
+from airtouch.simulation.batch import flights as simulated
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+BEFORE, AFTER = 30, 130  #: samples around an edge
+BINS = ((0.1, 8), (0.2, 6), (0.2, 6))  #: width in s and number of bins: thrust, speed, height
+COUNT = sum(n for _, n in BINS)
+KINDS = ("entry", "exit")
+SHOWN = ("range_step", "flow_scale", "ground_effect")  #: effects whose edges are simulated
+LEAST_WINDOWS = 12  #: stretches without an edge, for the scatter
+_MISSION = """
+name = "edge-response"
+[[platform]]
+size_m = [{length}, 4.0]
+centre_m = [{centre}, 0.0]
+top_m = {top}
+[mission]
+control = "velocity"
+step = [{{ do = "wait", time_s = 0.5 }}, {{ do = "take-off", height_m = {height} }}, {{ do = "hover", time_s = 3.0 }},
+        {{ do = "go", distance_m = {way}, speed_mps = {speed} }}, {{ do = "hover", time_s = 1.0 }}, {{ do = "land" }}]
+"""
+
+
+@dataclass(frozen=True)
+class EdgeFloor:
+    """usual: response (COUNT,) of nominal flights by kind, `counts` edges each; whiten (COUNT, COUNT)."""
+
+    vehicle: Vehicle
+    calibration: tuple[Active, ...]
+    usual: dict[str, np.ndarray]
+    counts: dict[str, int]
+    whiten: np.ndarray
+
+
+def edges_of(flight: Flight) -> list[Edge]:
+    """Edges with enough flight around them, none where there is no down range."""
+    if not flight.log.has("zrange_m"):
+        return []
+    kept = flight.memory.get("edges")
+    if kept is None:
+        air = flight.phase != 0
+        kept = flight.memory["edges"] = [
+            e for e in true_edges(flight.log, PLATFORM_STEP_M)
+            if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()]
+    return kept
+
+
+def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int) -> np.ndarray:
+    """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,)."""
+    here = slice(at - BEFORE, at + AFTER)
+    thrust = vehicle.thrust(motion.held(log.stack(PWM)[here])).mean(axis=1)
+    if log.has(*VELOCITY[:2]):
+        speed = motion.held(log.stack(VELOCITY[:2])[here])
+        way = speed[:BEFORE].mean(axis=0)
+        speed = speed @ (way / max(float(np.hypot(*way)), 1e-6))
+    else:
+        speed = np.zeros(BEFORE + AFTER)
+    if log.has(POSITION[2]):
+        height = motion.held(log[POSITION[2]][here])
+    elif log.has("zrange_m"):
+        height = motion.held(log["zrange_m"][here])
+        step = np.diff(height, prepend=height[0])
+        step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
+        height = np.cumsum(step)
+    else:
+        height = np.zeros(BEFORE + AFTER)
+    out = []
+    for values, (width, n) in zip((thrust, speed, height), BINS, strict=True):
+        size = int(round(width / PERIOD_S))
+        values = values - values[:BEFORE - 3].mean()
+        out.append(values[BEFORE:BEFORE + n * size].reshape(n, size).mean(axis=1))
+    return np.concatenate(out)
+
+
+def floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
+    """Usual response and scatter of flights declared nominal; None where they cross no edge."""
+    found: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
+    windows = []
+    for f in flights:
+        edges = edges_of(f)
+        for e in edges:
+            found[e.kind].append(response(f.log, vehicle, f.turn, e.sample))
+        level = np.isin(f.phase, (2, 3, 4))
+        for at in range(BEFORE, len(f) - AFTER, 20):
+            if level[at - BEFORE:at + AFTER].all() and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges):
+                windows.append(response(f.log, vehicle, f.turn, at))
+    if not all(found.values()) or len(windows) < LEAST_WINDOWS:
+        return None
+    scatter = np.array(windows) - np.mean(windows, axis=0)
+    spread = np.cov(scatter.T)
+    mixed = 0.7 * spread + 0.3 * np.diag(np.diag(spread)) + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9)
+    usual = {k: np.mean(v, axis=0) for k, v in found.items()}
+    counts = {k: len(v) for k, v in found.items()}
+    left = np.array([x - usual[k] for k, v in found.items() if len(v) > 1 for x in v])
+    if len(left):
+        own = left.T @ left / max(sum(n - 1 for n in counts.values()), 1)
+        mixed += np.diag(np.maximum(np.diag(own) - np.diag(spread), 0.0))
+    return EdgeFloor(vehicle, tuple(calibration), usual, counts, np.linalg.inv(np.linalg.cholesky(mixed)))
+
+
+def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
+    """Response of one edge less the usual one, in its scatter, (COUNT,)."""
+    raw = response(flight.log, floor.vehicle, flight.turn, edge.sample) - floor.usual[edge.kind]
+    return floor.whiten @ raw / np.sqrt(1.0 + 1.0 / floor.counts[edge.kind])
+
+
+def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
+    """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
+    from airtouch.gap.signatures.candidates import terms
+    kept = floor.__dict__.setdefault("_templates", {})
+    place = _place(flight)
+    key = (effect, parameter, place)
+    if key not in kept:
+        term = terms(effect)[0]
+        step = term.step(parameter)
+        neutral = term.effect.scaled(term.effect.values(), 0.0)
+        moved = {**neutral, parameter: neutral[parameter] + step}
+        base = _flown(floor, place, ())
+        with_effect = _flown(floor, place, (Active(term.effect, moved),))
+        kept[key] = {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k])
+                     for k in KINDS}
+    return kept[key]
+
+
+def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
+    """Whitened response (COUNT,) that effects add to one edge, in proportion to their parameters."""
+    from airtouch.gap.signatures.candidates import terms
+    total = np.zeros(COUNT)
+    for a in active:
+        if a.effect.name not in SHOWN:
+            continue
+        term = terms(a.effect.name)[0]
+        for name, amount in zip(term.free, term.scaled(a.values), strict=True):
+            if amount:
+                total += amount * template(floor, flight, a.effect.name, name)[edge.kind]
+    return total
+
+
+def _place(flight: Flight) -> tuple[float, float, float, float]:
+    """Height, clearance, speed and length of crossing, rounded so that flights share a simulation."""
+    edges = edges_of(flight)
+    if not edges:
+        raise ValueError(f"{flight.name}: no edge in this flight")
+    entry = next((e for e in edges if e.kind == "entry"), None)
+    leave = next((e for e in edges if e.kind == "exit" and (entry is None or e.sample > entry.sample)), None)
+    one = entry or leave or edges[0]
+    high, low = max(one.height_before_m, one.height_after_m), min(one.height_before_m, one.height_after_m)
+    speed = 0.3
+    if flight.log.has(*VELOCITY[:2]):
+        v = motion.held(flight.log.stack(VELOCITY[:2])[one.sample - BEFORE:one.sample + BEFORE])
+        speed = float(np.hypot(*v.mean(axis=0)))
+    seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else 2.5
+    speed = float(np.clip(speed, 0.1, 0.9))
+    length = float(np.clip(seconds * speed, 0.4, 2.0))
+    return round(high, 1), round(max(low, 0.01), 2), round(speed, 1), round(length, 1)
+
+
+def calm(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with sensors that hardly err: what an effect changes then stands out after an exit too,
+
+    which comes at another time with it. Some flow noise stays, as the firmware's estimator drops the smallest
+    corrections of its attitude.
+    """
+    return replace(vehicle, acc_noise_rms_mps2=0.0, gyro_noise_rms_radps=0.0, range_noise_rms_m=0.0,
+                   range_drift_rms=0.0, flow_noise_mps=(0.02, 0.02), flow_noise_time_s=0.02)
+
+
+def _flown(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
+           ) -> dict[str, np.ndarray]:
+    kept = floor.__dict__.setdefault("_flown", {})
+    key = (place, tuple((a.effect.name, tuple(a.values.items())) for a in active))
+    if key not in kept:
+        height, low, speed, length = place
+        text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - low, 0.02), height=height,
+                               way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
+        logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=calm(floor.vehicle),
+                                     effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
+        made: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
+        for log in logs:
+            for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - low))):
+                if BEFORE <= e.sample < len(log) - AFTER:
+                    made[e.kind].append(response(log, floor.vehicle, None, e.sample))
+        kept[key] = {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in made.items()}
+    return kept[key]

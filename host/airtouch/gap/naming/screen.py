@@ -1,0 +1,125 @@
+"""A first look at every candidate: its first-order change of the spectra, fitted by least squares.
+
+One replay for each free parameter, shared by both halves of the data; candidates that do
+well here are then fitted in full.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data, spectra
+from airtouch.gap.evidence.fit import strongest
+from airtouch.gap.evidence.least_squares import bounded_step, limits, weights_of, without_offsets
+from airtouch.gap.evidence.problem import Part, Problem, problem_of
+from airtouch.gap.loop.twin import COMMAND_ONLY
+from airtouch.gap.signatures.candidates import MEAN, Term
+
+STEP = 0.25  #: of a parameter's natural step, at which the change is taken
+ROUNDS = 3
+NOTHING = 1e-9  #: change of a spectrum, unit/sqrt(Hz), that is none
+
+
+@dataclass
+class Screen:
+    """Changes of the spectra by effect and parameter, made when first asked for."""
+
+    data: Data
+    kept: dict[tuple, list[dict[str, np.ndarray]]] = field(default_factory=dict)
+    judged: dict[int, tuple[np.ndarray, float, float]] = field(default_factory=dict)
+
+    def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
+        """Change of the flattened spectra per scaled parameter i of a term at neutral."""
+        key = _key(term, term.free[i])
+        if key not in self.kept:
+            low, high = term.bounds()
+            x = np.zeros(len(term.free))
+            x[i] = STEP if STEP <= high[i] else -STEP
+            neutral = [term.active(np.zeros(len(term.free)))]
+            before = spectra(self.data, neutral) if term.acts_when_neutral else self.data.base
+            after = spectra(self.data, [term.active(x)])
+            self.kept[key] = [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
+                              for a, b in zip(after, before, strict=True)]
+        gathered = problem._gather(self.kept[key])
+        return np.where(problem.known, problem._with_twin(gathered), 0.0)
+
+    def shows(self, term: Term) -> bool:
+        """Whether a term changes what the logged commands lead to expect, once `column` was asked for its parameters.
+
+        An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
+        """
+        return any(np.abs(v).max(initial=0.0) > NOTHING for name in term.free
+                   for flight in self.kept[_key(term, name)] for v in flight.values())
+
+    def before(self, problem: Problem, residuals: np.ndarray, extra_power: np.ndarray) -> tuple[float, float]:
+        """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""
+        known = self.judged.get(id(residuals))
+        if known is None or known[0] is not residuals:
+            values, cost = without_offsets(problem, residuals, extra_power)
+            known = self.judged[id(residuals)] = (residuals, problem.likelihood(values, extra_power), cost)
+        return known[1:]
+
+
+def first_order(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.ndarray],
+                extra_power: Sequence[np.ndarray], terms: Sequence[Term],
+                beside: Sequence[Term] = ()) -> tuple[float, list[np.ndarray], list[np.ndarray]]:
+    """Held-out gain of mean effects to first order, their scaled parameters on each half, and the variances of these.
+
+    residuals, extra_power: for each part what the effects chosen before leave, and the power that
+    random ones add. beside: those effects, free to give way a little.
+    """
+    mean = [t for t in terms if t.kind == MEAN and t.name not in COMMAND_ONLY]
+    other = [t for t in beside if t.kind == MEAN and t.name not in COMMAND_ONLY]
+    gain, found, variances = 0.0, [], []
+    tables = []
+    for part in parts:
+        problem = problem_of(screen.data, part)
+        tables.append([screen.column(problem, t, i) for t in (*mean, *other) for i in range(len(t.free))])
+    n = sum(len(t.free) for t in mean)
+    low, high = limits(mean) if mean else (np.zeros(0), np.zeros(0))
+    wide = np.full(len(tables[0]) - n, 1e6)
+    low, high = np.concatenate([low, -wide]), np.concatenate([high, wide])
+    for train, test in ((0, 1), (1, 0)):
+        problem = problem_of(screen.data, parts[train])
+        constants = problem.constant()
+        columns = np.array([*tables[train], *(-c for c, _ in constants)])
+        prior = np.concatenate([np.full(len(tables[train]), 30.0), [p for _, p in constants]])
+        x, offsets = np.zeros(len(tables[train])), np.zeros(len(constants))
+        nothing = (np.zeros(len(x)), np.zeros((len(x), len(x))))
+        values = residuals[train]
+        for _ in range(ROUNDS):
+            change, covariance = bounded_step(columns, prior, values, weights_of(problem, values, extra_power[train]),
+                                      x, offsets, low, high, nothing)
+            x = np.clip(x + change[:len(x)], low, high)
+            offsets = offsets + change[len(x):]
+            values = residuals[train] + np.concatenate([x, offsets]) @ columns
+        problem = problem_of(screen.data, parts[test])
+        moved = sum((a * c for a, c in zip(x, tables[test], strict=True)), np.zeros(len(residuals[test])))
+        after, cost = without_offsets(problem, residuals[test] + moved, extra_power[test])
+        before, paid = screen.before(problem, residuals[test], extra_power[test])
+        gain += problem.likelihood(after, extra_power[test]) - cost - before + paid
+        found.append(x[:n])
+        variances.append(np.diag(covariance)[:n])
+    return gain, found, variances
+
+
+def random_look(screen: Screen, parts: Sequence[Part], residuals: Sequence[np.ndarray],
+                extra_power: Sequence[np.ndarray], term: Term) -> tuple[float, np.ndarray]:
+    """Held-out gain of a random effect beside what is chosen, which stays as it is, and its scaled strength (k,).
+
+    residuals, extra_power: as for `first_order`.
+    """
+    gain, strengths = 0.0, []
+    for train, test in ((0, 1), (1, 0)):
+        problem, other = (problem_of(screen.data, parts[k]) for k in (train, test))
+        found = strongest(problem, term, residuals[train], extra_power[train])
+        rest, before = residuals[test], extra_power[test]
+        gain += other.likelihood(rest, before + other.random_power([found])) - other.likelihood(rest, before)
+        strengths.append(found.scaled(found.values))
+    return gain, np.mean(strengths, axis=0)
+
+
+def _key(term: Term, parameter: str) -> tuple:
+    """What a column is kept by: the effect's variant and the parameter that is moved."""
+    return term.name, parameter, tuple(sorted((k, v) for k, v in term.values.items() if k not in term.free))

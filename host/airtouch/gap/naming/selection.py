@@ -1,0 +1,174 @@
+"""What a selection of effects found: hypotheses judged, the steps, and the probability of each candidate."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from airtouch.gap.evidence.fit import Fit
+from airtouch.gap.evidence.problem import Part
+from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, Term
+
+#: gain of a nameless model over the effects named, for `unknown`, where many nominal flights gave the floor, and else
+UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
+#: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
+#: the loop in recorded flights, since its spectrum is assumed, not measured
+UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
+TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
+BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
+BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
+Hypothesis = tuple[Term, ...]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A hypothesis with its gain in held-out log likelihood over no effect, and its fits of both halves.
+
+    strength: scaled parameters (k,) of its newest effect, the mean of both halves; variance: (k,) of those of a mean
+    effect, by chance. evidence: what that effect gains over the hypothesis before, and no more than its strength says
+    beyond the scatter of nominal flights. named: whether that is enough; if not, it is a deviation that nominal flights
+    have as well, and stands beside the effects that are named.
+    """
+
+    name: str
+    terms: Hypothesis
+    gain: float
+    fits: tuple[Fit, ...] = ()
+    full: bool = True  #: fitted in full, not to first order only
+    choice: float = 0.0  #: of the gain, what the choice of the effects' variants has cost
+    strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    variance: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    evidence: float = 0.0
+    named: bool = True
+    share: float = np.inf  #: where several effects are named: gain over the hypothesis of the others alone
+
+    @property
+    def of_the_log(self) -> bool:
+        """Whether the newest effect is one that the log has done to itself."""
+        return any(t.name == self.name and t.kind == CLOCK for t in self.terms)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """singles: the best variant of every candidate; steps: effects added one after another;
+
+    free_before, free_after: gain of the nameless model over no effect and over the last step; of_times: of the
+    latter, what the logged times hold; contradicted: log likelihood that the effects named lose in cells where they
+    say what the flights do not show, and the worst of these cells;
+    parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
+    assumed: whether a chosen effect is random or changes the loop.
+    """
+
+    singles: Mapping[str, Judged]
+    steps: tuple[Judged, ...]
+    free_before: float
+    free_after: float
+    parts: tuple[Part, Part]
+    least: Mapping[str, float]  #: evidence that each candidate needs as the first
+    nominal: int
+    assumed: bool
+    usual: float  #: log likelihood that a nameless model gains in nominal flights as long as these
+    simulated: bool = False  #: whether the flights come from the models that effects are fitted with
+    of_times: float = 0.0
+    contradicted: tuple[float, str] = (0.0, "")
+
+    @property
+    def whole(self) -> Judged | None:
+        """The effects named and the deviations that nominal flights have as well, as one hypothesis."""
+        return self.steps[-1] if self.steps else None
+
+    @property
+    def named(self) -> tuple[Judged, ...]:
+        """The steps whose effects are named, what adds most to the others first, what the log did to itself last."""
+        return tuple(sorted((s for s in self.steps if s.named), key=lambda s: (s.of_the_log, -s.share)))
+
+    @property
+    def chosen(self) -> Judged | None:
+        """The effects named, as fitted beside the deviations, as one hypothesis; None where none is."""
+        names, whole = {s.name for s in self.named}, self.whole
+        if not names or whole is None:
+            return None
+        names |= {COMPANIONS[n] for n in names if n in COMPANIONS}
+        terms, *fitted = ([t for t in some if t.name in names]
+                          for some in (whole.terms, *(f.terms for f in whole.fits)))
+        fits = (replace(f, terms=tuple(t)) for f, t in zip(whole.fits, fitted, strict=True))
+        return replace(whole, terms=tuple(terms), fits=tuple(fits))
+
+    @property
+    def allowed(self) -> float:
+        """Log likelihood that a nameless model may gain on top of the effects named where they are right.
+
+        The fewer nominal flights there are, the farther off may another one lie.
+        """
+        if self.nominal < 2:
+            return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
+        gained = self.whole.gain if self.whole else 0.0
+        if self.simulated:
+            return max(self.least_left, UNKNOWN_SHARE * gained)
+        share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
+        return max(self.least_left, share * gained, self.usual)
+
+    @property
+    def least_left(self) -> float:
+        """Log likelihood that is no news however little the effects named gain, with two nominal flights or more."""
+        return UNKNOWN_GAIN * (self.nominal + 1) / (self.nominal - 1)
+
+    @property
+    def unlike(self) -> float:
+        """How much speaks against the effects named, of what may: what is left, or what they lose; 1 is the limit."""
+        return max(float(np.logaddexp(self.free_after, 0.0)) / self.allowed, self.loss)
+
+    @property
+    def loss(self) -> float:
+        """What the effects named lose where they say what is not there, of what may be chance."""
+        return self.contradicted[0] / self.least_left if self.contradicted[0] else 0.0
+
+    @property
+    def explained(self) -> bool:
+        """Whether what is left is the floor, or close to it, and the effects named say nothing that is not there."""
+        return self.unlike < 1.0
+
+
+def _against_none(gain: float, least: float, many: int = 1) -> float:
+    """Score of one of many candidates beside 0 for `none`: what is missing counts in full, what is over little.
+
+    gain: the evidence, over `none` and over what nominal flights show.
+    """
+    if gain < least:
+        return TEMPERATURE * (gain - least - np.log(many))
+    return gain - least
+
+
+def _scores(selection: Selection, names: Sequence[str]) -> list[float]:
+    """Score of every single candidate beside 0 for `none`; those that could be named keep the order of their gains."""
+    singles, least = selection.singles, selection.least
+    out = {n: _against_none(singles[n].evidence, least[n], len(names)) for n in names}
+    if selection.named and selection.named[0].name in names:
+        first = selection.named[0]
+        for n in names:
+            if out[n] >= 0.0:
+                behind = max(singles[first.name].gain - singles[n].gain, BEHIND) if n != first.name else 0.0
+                out[n] = max(out[first.name] - behind, -TEMPERATURE)
+    return [out[n] for n in names]
+
+
+def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, float]:
+    """Of every single candidate, `none` and `unknown`; they sum to 1.
+
+    at_floor: nothing is named and the gap does not stand over its floor, so that `none` is the answer.
+
+    `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square.
+    """
+    names = list(selection.singles)
+    score = np.array([*_scores(selection, names), 0.0])
+    weight = np.exp((score - score.max()) / TEMPERATURE)
+    odds = selection.unlike ** 2
+    unknown = odds / (1.0 + odds)
+    if selection.chosen is not None and selection.explained:  # not above the effect that is the answer
+        share = weight[names.index(selection.named[0].name)] / weight.sum()
+        unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
+    if at_floor:
+        share = weight[-1] / weight.sum()
+        unknown = min(unknown, BELOW * share / (1.0 + BELOW * share))
+    known = (1.0 - unknown) * weight / weight.sum()
+    return dict(zip([*names, "none", "unknown"], [*known, unknown], strict=True))

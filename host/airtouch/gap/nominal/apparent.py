@@ -1,0 +1,42 @@
+"""How strong every effect seems to be in a nominal flight, held against others: what the yardstick is made of."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import strength_variance
+from airtouch.gap.evidence.gates import gated
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.naming.judging import at_bound, round_of, trial_of
+from airtouch.gap.naming.select import nameless, seconds
+from airtouch.gap.naming.selection import Judged
+from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, every, telling
+from airtouch.gap.signatures.nominal_scatter import Apparent
+
+NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
+
+
+def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
+    """How strong every effect but those of `without` seems to be in flights that have none."""
+    on = trial_of(data)
+    singles = round_of(on, every(without), None, thorough=True)
+    passing = gated(data, without)
+    known = {n: j for n, j in singles.items() if len(j.strength)}
+    return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
+                    nameless(on, None) / seconds(data),
+                    {n: max(passing[n].gain, 0.0) / seconds(data) if n in passing else 0.0 for n in GATED})
+
+
+def _error(data: Data, judged: Judged) -> np.ndarray:
+    """Standard deviation (k,) by chance of a candidate's strength."""
+    term = telling(judged.terms)
+    if term.kind == CLOCK:
+        return np.zeros(len(judged.strength))
+    if term.kind != SPECTRUM:
+        return np.where(at_bound(term, judged.strength), NOBODY_KNOWS,
+                        np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
+    fitted = judged.fits[0].terms
+    same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)
+    variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
+    return np.sqrt(np.where(judged.strength > 0.0, variance, 0.0))

@@ -1,0 +1,1 @@
+"""Sealed sets: flights with withheld effects, made, diagnosed and scored."""

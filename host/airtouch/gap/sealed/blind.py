@@ -1,0 +1,192 @@
+"""Sealed sets: flights whose effect is withheld, so that nobody, this package included, can look.
+
+A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` flights whose
+effect is drawn, and `sealed.json` with the SHA-256 of the key. The key lies apart, in
+`FOLDER.key.json` beside the folder.
+"""
+
+import hashlib
+import json
+import secrets
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.gap import measure
+from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.sealed.blind_draw import KINDS, Kind
+from airtouch.gap.sealed.blind_severity import severities, weakest
+from airtouch.logs.files import write, write_bytes
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.batch import flights as flown
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle, load
+
+SCENARIO, VEHICLE = "diagnosis", "crazyflie-2.1-flow"
+CAL = 6  #: flights free of effects
+SHARES = {"single": 0.42, "none": 0.42}  #: of all flights; the rest have two effects
+PAIR_LEVELS = (1, 2)  #: severities of the effects of a pair: not the weakest
+HIDDEN = ("vbat_V", "rpm_1", "rpm_2", "rpm_3", "rpm_4")  #: columns that logs of small vehicles seldom have
+TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength
+NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
+Say = Callable[[str], None]
+
+
+def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, force: bool = False,
+         kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
+    """Write a sealed set to the folder `out` and its key apart; returns the key's path.
+
+    kinds: of `blind_draw.KINDS` to draw from, all of them by default. Raises AirTouchError when
+    there is a set or a key already and `force` is not given.
+    """
+    out, key = Path(out), Path(key) if key else key_of(Path(out))
+    for path in (out / "sealed.json", key):
+        if path.exists() and not force:
+            raise AirTouchError(f"{path}: exists already; use --force to replace it")
+    out.mkdir(parents=True, exist_ok=True)
+    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob("opened.json")] if force else []:
+        old.unlink()
+    vehicle = load(VEHICLE)
+    text = (resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes()
+    write_bytes(text, out / "vehicle.toml", True)
+    cal = nominal(vehicle, CAL_FIRST, CAL, seed)
+    for i, log in enumerate(cal):
+        write(log, out / f"cal_{i}.csv.gz", force=True)
+    levels = strengths(vehicle, cal, seed, kinds, progress)
+    rng = np.random.default_rng([seed, 1])
+    answers = {}
+    for number, drawn in enumerate(draw(flights, levels, rng)):
+        name = f"flight_{number:04d}"
+        progress(name)
+        log, effects = _flight(vehicle, drawn, levels, seed, number, rng)
+        write(log, out / f"{name}.csv.gz", force=True)
+        answers[name] = {"effects": effects}
+    table = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE,
+             "severities": {k: list(v) for k, v in levels.items()}, "answers": answers}
+    content = (json.dumps(table, indent=1) + "\n").encode()
+    write_bytes(content, key, True)
+    sealed = {"key_sha256": hashlib.sha256(content).hexdigest(), "flights": flights, "calibration_flights": CAL}
+    write_bytes((json.dumps(sealed, indent=1) + "\n").encode(), out / "sealed.json", True)
+    return key
+
+
+def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
+    """Open the key of a set and score the diagnoses in `answers`: see `blind_score.figures`."""
+    from airtouch.gap.sealed import blind_score
+
+    cases = blind_score.read_answers(answers)
+    table = open_key(folder, hashlib.sha256(json.dumps(
+        [c for c in cases if not c.get("without")], sort_keys=True).encode()).hexdigest(), key)
+    return blind_score.figures(table, cases)
+
+
+def key_of(folder: Path) -> Path:
+    """Where the key of a set lies when nothing else is said: beside the folder."""
+    return folder.resolve().with_name(folder.resolve().name + ".key.json")
+
+
+def open_key(folder: Path, answers_sha256: str, key: Path | None = None) -> dict[str, Any]:
+    """The key, if it is the one that was sealed; the first opening is recorded with the answers' hash.
+
+    Raises AirTouchError for a key that was changed, and when other answers are already scored:
+    who has seen the key cannot answer blindly.
+    """
+    folder, key = Path(folder), Path(key) if key else key_of(Path(folder))
+    try:
+        sealed = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))["key_sha256"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with `airtouch gap blind "
+                            "make`") from None
+    try:
+        content = key.read_bytes()
+    except OSError as error:
+        raise AirTouchError(f"{key}: the key cannot be read: {error.strerror}; name it with --key") from None
+    if hashlib.sha256(content).hexdigest() != sealed:
+        raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
+    opened = folder / "opened.json"
+    if opened.exists():
+        if json.loads(opened.read_text(encoding="utf-8")).get("answers_sha256") != answers_sha256:
+            raise AirTouchError(f"{opened}: the key was opened for other answers; make a new set to answer again")
+    else:
+        write_bytes((json.dumps({"answers_sha256": answers_sha256}) + "\n").encode(), opened, False)
+    return json.loads(content)
+
+
+def stripped(log: FlightLog) -> FlightLog:
+    """A log that says nothing of how it came about."""
+    kept: dict[str, Any] = {k: log.meta[k] for k in ("sample_period_s", "acc_frame") if k in log.meta}
+    return FlightLog({k: v for k, v in log.columns.items() if k not in HIDDEN}, {**kept, "vehicle": VEHICLE})
+
+
+def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
+    """Flights free of effects that end well, from a number on."""
+    every = flown(SCENARIO, range(first, first + 10 * count), vehicle=vehicle, seed=seed, workers=1)
+    return [stripped(log) for log in islice((x for x in every if isinstance(x, FlightLog)), count)]
+
+
+def strengths(vehicle: Vehicle, cal: Sequence[FlightLog], seed: int, kinds: Sequence[str] | None = None,
+              progress: Say = lambda _: None) -> dict[str, tuple[float, ...]]:
+    """Three severities of each kind of effect that such flights show at all."""
+    study = study_of(vehicle, cal)
+    without = [Data(study, list(measure.usable([log], vehicle, []))) for log in nominal(vehicle, NONE_FIRST, 8, seed)]
+    found = {}
+    for name, kind in KINDS.items():
+        if kinds is None or name in kinds:
+            progress(f"severities of {name}")
+            low = weakest(kind, study, SCENARIO, without, seed, stripped)
+            if low is not None:
+                found[name] = severities(low, kind.highest)
+    return found
+
+
+def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
+    """What flights of a set are held against."""
+    return calibrate.calibrated(vehicle, list(measure.usable(cal, vehicle, [])))[0]
+
+
+def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Generator) -> list[list[tuple[str, int]]]:
+    """For each flight its kinds of effect with their severities, in random order."""
+    singles, none = (round(count * SHARES[k]) for k in ("single", "none"))
+    names = list(levels)
+    every = [(n, level) for level in range(3) for n in names]
+    cases: list[list[tuple[str, int]]] = []
+    while len(cases) < singles:
+        cases += [[every[i]] for i in rng.permutation(len(every))][:singles - len(cases)]
+    for _ in range(count - singles - none):
+        while True:
+            a, b = (names[i] for i in rng.choice(len(names), 2, replace=False))
+            if KINDS[a].effect != KINDS[b].effect and not alike(KINDS[a].effect, KINDS[b].effect):
+                break
+        cases.append([(n, int(rng.choice(PAIR_LEVELS))) for n in (a, b)])
+    cases += [[] for _ in range(none)]
+    return [cases[i] for i in rng.permutation(len(cases))]
+
+
+def alike(one: str, other: str) -> bool:
+    """Whether two names stand for one thing in these logs."""
+    from airtouch.gap.signatures.candidates import twins_of
+
+    group = twins_of(one)
+    return one == other or (group is not None and other in group[0])
+
+
+def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], levels: Mapping[str, Sequence[float]], seed: int,
+            number: int, rng: np.random.Generator) -> tuple[FlightLog, list[dict[str, Any]]]:
+    """A flight that ends well, and what acts in it: after a crash another one, a little weaker."""
+    for attempt in range(TRIES):
+        active: list[Active] = [KINDS[k].active(levels[k][level] * WEAKER ** attempt, rng) for k, level in drawn]
+        log = next(iter(flown(SCENARIO, [number + 10_000 * attempt], vehicle=vehicle, effects=active, seed=seed,
+                              workers=1)))
+        if isinstance(log, FlightLog) and list(measure.usable([stripped(log)], vehicle, [])):
+            return stripped(log), [{"name": a.effect.name, "kind": k, "level": level, "values": dict(a.values)}
+                                   for a, (k, level) in zip(active, drawn, strict=True)]
+    raise AirTouchError(f"{', '.join(k for k, _ in drawn)}: {TRIES} flights crashed; lower its highest strength")
+
+
+__all__ = ["Kind", "alike", "draw", "key_of", "make", "open_key", "score", "strengths", "stripped", "study_of"]

@@ -1,0 +1,126 @@
+"""The whole check: a sealed set made, every flight diagnosed, the key opened, unknown effects tried, all scored.
+
+One JSON for each case under OUT/answers: what is there is not done again.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from airtouch.errors import AirTouchError
+from airtouch.gap import measure
+from airtouch.gap.diagnose import brief
+from airtouch.gap.evidence.data import Study
+from airtouch.gap.sealed import blind, blind_score
+from airtouch.gap.sealed.blind_draw import KINDS
+from airtouch.gap.signatures.candidates import twins_of
+from airtouch.logs.files import read, write_bytes
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.in_order import in_order
+from airtouch.vehicle import load
+
+Say = Callable[[str], None]
+Mapper = Callable[[Callable, Iterable], Iterable]
+Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
+Answer = tuple[str, tuple[str, ...], str]
+AHEAD = 4  #: flights sent to each process and not yet back
+DEATHS = 3  #: of local processes, after which the work goes on
+_study: Study | None = None
+
+
+def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
+        kinds: Iterable[str] | None = None, spread: Mapper | None = None, progress: Say = lambda _: None,
+        ) -> dict[str, Any]:
+    """Make the set in `out` (unless it is there), diagnose it, score it: `blind_score.figures`.
+
+    unknown: how many single flights are diagnosed once more without their effect, all by default. spread: what
+    stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about 4 s of
+    one core for each flight, once more for each single one.
+    """
+    out = Path(out)
+    if not (out / "sealed.json").exists():
+        blind.make(out, flights, seed, kinds=list(kinds) if kinds else None, progress=progress)
+    answers = out / "answers"
+    names = sorted(p.name[:-7] for p in out.glob("flight_*.csv.gz"))
+    study = study_in(out)
+    answer(out, answers, [(n, ()) for n in names], workers, progress, study, spread)
+    first = sorted(answers.glob("flight_????.json"))
+    # the key is opened for the answers above; effects can be withheld only when they are known
+    sealed = hashlib.sha256(json.dumps([json.loads(p.read_text()) for p in first], sort_keys=True).encode()).hexdigest()
+    key = blind.open_key(out, sealed)["answers"]
+    single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
+    cases = [(n, tuple(sorted(group[0])) if (group := twins_of(e)) else (e,)) for n, e in single[:unknown]]
+    answer(out, answers, cases, workers, progress, study, spread)
+    return blind.score(out, answers)
+
+
+def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,
+           progress: Say = lambda _: None, study: Study | None = None, spread: Mapper | None = None) -> None:
+    """Diagnose flights of a set, one JSON each in `answers`; each case is a flight and effects to leave out.
+
+    study: of the set, where it is there already; spread: as for `run`. A local process that dies takes nothing along
+    but the flights that it was at, which are done again. Raises AirTouchError where processes die again and again.
+    """
+    answers.mkdir(parents=True, exist_ok=True)
+    cases = list(cases)
+    for left in range(DEATHS, -1, -1):
+        todo = [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
+        if not todo:
+            return
+        study = study or study_in(folder)
+        logs = ((name, without, read(folder / f"{name}.csv.gz")) for name, without in todo)
+        try:
+            for name, without, text in _answers(study, logs, min(workers, len(todo)), spread):
+                write_bytes(text.encode(), _place(answers, name, without), True)
+                progress(name)
+        except BrokenProcessPool:
+            progress(f"a process died; {left} more may")
+    raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
+
+
+def _answers(study: Study, logs: Iterable[Case], workers: int, spread: Mapper | None) -> Iterator[Answer]:
+    """Answers as they come, in the order of the flights."""
+    if spread is not None or workers == 1:
+        yield from (spread or map)(partial(_diagnosed, study), logs)
+        return
+    with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
+        yield from in_order(lambda case: pool.submit(with_study, case), logs, AHEAD * workers)
+
+
+def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
+    return answers / ".".join([name, *(["without", *without] if without else []), "json"])
+
+
+def study_in(folder: Path) -> Study:
+    """The study that a sealed set's own vehicle and nominal flights give."""
+    return blind.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+
+
+def _begin(study: Study | None) -> None:
+    """One study for every process: it is calibrated once."""
+    global _study
+    _study = study
+
+
+def with_study(case: Case) -> Answer:
+    """The answer to one case, in a process that `_begin` has given the study."""
+    assert _study is not None
+    return _diagnosed(_study, case)
+
+
+def _diagnosed(study: Study, case: Case) -> Answer:
+    """Name, effects left out, and the diagnosis as JSON."""
+    name, without, log = case
+    diagnosis = brief(study, list(measure.usable([log], study.vehicle, [])), without).plain()
+    diagnosis |= {"flights": [name], "without": list(without)}
+    content = {k: diagnosis[k] for k in ("flights", "without", "verdict", "effects", "ranking", "indistinguishable",
+                                     "gap", "shrink", "control")}
+    return name, without, json.dumps(content) + "\n"
+
+
+__all__ = ["KINDS", "answer", "blind_score", "run"]

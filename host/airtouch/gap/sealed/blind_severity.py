@@ -1,0 +1,96 @@
+"""The weakest strength of an effect that could be detected at all, by the test that no other can beat.
+
+Neyman and Pearson: among tests with a given rate of false alarms, the likelihood ratio of
+"this effect, this strength" against "none" misses least. It knows what the diagnosis has to
+find out. Its ratio is taken here on flights with and without the effect, each a normal
+variable with the mean and deviation seen; the strength is found by halving. A diagnosis
+that may raise 2 % false alarms asks about every effect at once, so that each test gets its
+share of them only.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm
+
+from airtouch.gap import measure
+from airtouch.gap.evidence.clock import clock_gain
+from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.sealed.blind_draw import KINDS, Kind
+from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.candidates import CLOCK, Term
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.batch import flights as flown
+from airtouch.simulation.effects import Active
+
+FALSE_ALARMS, MISSES = 0.02, 0.05  #: of all tests of a flight together, and of the one that should answer
+FALSE_ALARM, POWER = float(norm.isf(FALSE_ALARMS / len(KINDS))), float(norm.isf(MISSES))  #: deviations
+TRIES = 8  #: flights with and without the effect
+HALVINGS = 6
+FACTORS = (1.0, 2.0, 4.0)  #: severities, times the weakest; the last at most the highest plausible
+FIRST = 900_000  #: number of the first flight, beyond those of any set
+
+
+def weakest(kind: Kind, study: Study, scenario: str, without: Sequence[Data], seed: int,
+            seen: Callable[[FlightLog], FlightLog]) -> float | None:
+    """Strength that is just detected on such flights; None where the highest plausible one is not.
+
+    without: flights free of effects, other than those that the study was calibrated on.
+    seen: what the diagnosis gets to see of a log.
+    """
+    rng_seed = [seed, sum(map(ord, kind.effect)), int(1e6 * kind.highest)]
+    if not _seen(kind, kind.highest, study, scenario, without, rng_seed, seen):
+        return None
+    low, high = np.log(kind.highest / 300.0), np.log(kind.highest)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if _seen(kind, float(np.exp(middle)), study, scenario, without, rng_seed, seen):
+            high = middle
+        else:
+            low = middle
+    return float(np.exp(high))
+
+
+def _seen(kind: Kind, strength: float, study: Study, scenario: str, without: Sequence[Data],
+          seed: list[int], seen: Callable[[FlightLog], FlightLog]) -> bool:
+    """Whether the likelihood ratio tells flights with the effect from those without."""
+    ratio = {True: [], False: []}
+    for i in range(TRIES):
+        active = kind.active(strength, np.random.default_rng([*seed, i]))
+        log = next(iter(flown(scenario, [FIRST + i], vehicle=study.vehicle, effects=[active], workers=1)))
+        if not isinstance(log, FlightLog):
+            continue
+        flights = list(measure.usable([seen(log)], study.vehicle, []))
+        if not flights:
+            continue
+        ratio[True].append(log_ratio(Data(study, flights), active))
+        ratio[False].append(log_ratio(without[i % len(without)], active))
+    if len(ratio[True]) < 3:
+        return True  # so strong that it cannot fly
+    yes, no = np.array(ratio[True]), np.array(ratio[False])
+    alarm = no.mean() + FALSE_ALARM * no.std(ddof=1)
+    return bool(yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm)  # strong ones scatter widely
+
+
+def log_ratio(data: Data, active: Active) -> float:
+    """Log likelihood of the flights under an effect with these values over that under none."""
+    term = term_of(active)
+    if term.kind == CLOCK:
+        return clock_gain(data, term)[1]
+    whole = whole_of(data)
+    return judge(data, whole, (term,)) - judge(data, whole, ())
+
+
+def term_of(active: Active) -> Term:
+    """The hypothesis of exactly these values."""
+    first = candidates.terms(active.effect.name)[0]
+    return replace(first, values=dict(active.values))
+
+
+def severities(low: float, highest: float) -> tuple[float, ...]:
+    """Three strengths: the weakest that can be detected, twice and four times that, or up to the highest."""
+    top = min(FACTORS[2] * low, highest)
+    return (low, float(np.sqrt(low * top)), top) if top < FACTORS[2] * low else tuple(f * low for f in FACTORS)

@@ -1,0 +1,103 @@
+"""The gap's channels: what was measured minus what the model says, sample by sample.
+
+Replay view: specific force (3), angular acceleration (3), and the gyro's mean (3). Twin
+view: the controller's command (4), filtered to have the spectrum of nominal flights where
+the effects in the model are all that changed it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.motion import held
+from airtouch.gap.loop.twin import Twin
+from airtouch.simulation import replay
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import Active
+from airtouch.simulation.flight import prepare
+from airtouch.simulation.plant import hover_speed
+from airtouch.vehicle import Vehicle
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of the gap: its name, unit, and the band in which it is judged, Hz."""
+
+    name: str
+    unit: str
+    low_hz: float = 0.0
+    high_hz: float = 50.0
+    view: str = "replay"
+
+
+CHANNELS = (
+    *(Channel(f"force_{a}", "m/s^2") for a in "xyz"),
+    *(Channel(f"torque_{a}", "rad/s^2") for a in "xyz"),
+    *(Channel(f"rate_{a}", "rad/s", 0.0, 0.3) for a in "xyz"),
+    Channel("command_thrust", "N", 0.6, 30.0, "twin"),
+    *(Channel(f"command_{a}", "N", 0.6, 30.0, "twin") for a in ("roll", "pitch", "yaw")),
+)
+FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
+COUNT = len(CHANNELS)
+
+
+def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
+    """Samples (n,) of a flight within the stretches (flight, from_s, to_s) of a gate."""
+    t = np.arange(len(flight)) * PERIOD_S
+    out = np.zeros(len(flight), bool)
+    for name, begin, end in gate:
+        out |= (name == flight.name) & (t >= begin) & (t < end)
+    return out
+
+
+def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
+             controller: Twin | None = None, seed: int = 0) -> np.ndarray:
+    """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
+
+    `active`: effects that the model has. On the ground with motors off the model is a
+    vehicle at rest. Without a gyro the angular acceleration is taken as zero, which holds
+    at low frequency (the floor says how low).
+    """
+    out = np.full((len(flight), COUNT), np.nan)
+    gated = [a for a in active if a.gate]
+    if gated:
+        always = [a for a in active if not a.gate]
+        out = residual(flight, vehicle, always, controller, seed)
+        for a in gated:
+            acts = inside(a.gate, flight)
+            if acts.any():
+                out[acts] += (residual(flight, vehicle, [*always, replace(a, gate=())], controller, seed)
+                              - residual(flight, vehicle, always, controller, seed))[acts]
+        return out
+    plant = prepare(vehicle, active)[0]
+    row = plant[0]
+    seen = flight.signals.copy()
+    seen[:, at.MASS], seen[:, at.HOVER_SPEED] = row["mass"], hover_speed(plant)
+    seen[:, at.ROTOR_X:at.ROTOR_X + 4] = row["rotor_x"] - row["com"][0]
+    seen[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
+    model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=seen, pwm=flight.pwm, seed=seed)
+    force, turning = model.specific_force, model.angular_acceleration
+    turning = 0.5 * (turning + np.roll(turning, -1, axis=0))
+    rest = flight.phase == 0
+    if rest.any():
+        up = flight.turn[:, 2, :] * vehicle.gravity_mps2
+        force = np.where(rest[:, None], up + row["acc_bias"], force)
+        turning = np.where(rest[:, None], 0.0, turning)
+    out[:, FORCE] = flight.acceleration - force
+    out[:, TORQUE] = angular_acceleration(flight) - turning
+    if flight.rates is not None:
+        out[-1, TORQUE] = 0.0
+        out[:, RATE] = flight.rates - row["gyro_bias"]
+    if controller is not None:
+        out[:, COMMAND] = controller.commands_without(flight, active)
+    return out
+
+
+def angular_acceleration(flight: Flight) -> np.ndarray:
+    """Differences of the gyro (n, 3), rad/s^2; zero where there is none, which holds at low frequency."""
+    out = np.zeros((len(flight), 3))
+    if flight.rates is not None:
+        out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
+    return held(np.where(flight.bridged[:, None], np.nan, out))

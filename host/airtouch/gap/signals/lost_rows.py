@@ -1,0 +1,69 @@
+"""What bridging lost rows by straight lines adds to the spectra of the gap.
+
+A row that never reached the log takes a command with it that the motors have followed, so the replay is off until their
+thrust has settled. How far, the same flight tells: the same rows, taken out where they did arrive, change its residuals
+by so much.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.motion import held
+from airtouch.gap.signals.channels import COUNT, angular_acceleration, residual
+from airtouch.gap.signals.response import Response
+from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, squared
+from airtouch.simulation.effects import Active
+from airtouch.vehicle import Vehicle
+
+SHIFTS = 12  #: times that the pattern of lost rows is moved along the flight
+WIDTH = 1.5  #: bins over which the power is averaged, Gaussian, as that of the floor is
+
+
+def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Active], first: np.ndarray,
+                   quiet: np.ndarray | None = None, response: Response | None = None) -> np.ndarray:
+    """Power (blocks, bins, COUNT), unit^2/Hz, that lost rows add to the blocks in the air that begin at `first`.
+
+    quiet (blocks, 3), response: as `response.applied` takes them; without, the torque is that of the logged commands.
+    Zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight.
+    """
+    total = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT))
+    if not flight.lost.any() or not len(first):
+        return total
+    n, count = len(flight), np.zeros(len(first))
+    bad = (flight.phase == GROUND) | ~(flight.usable | flight.bridged)
+    before = np.cumsum(np.concatenate([[0], bad]))
+    known, turning = bridged_residual(flight, vehicle, calibration), angular_acceleration(flight)
+    for k in range(1, SHIFTS + 1):
+        offset = k * n // (SHIFTS + 1)
+        poorer = _without(flight, np.roll(flight.lost, offset))
+        change = np.nan_to_num(bridged_residual(poorer, vehicle, calibration) - known)
+        turned = angular_acceleration(poorer) - turning
+        begin = (first + offset) % n
+        room = begin + LENGTH[AIR] <= n
+        room[room] = before[begin[room] + LENGTH[AIR]] == before[begin[room]]
+        spectrum = blocks(change, begin[room], AIR)
+        if response is not None and quiet is not None and flight.rates is not None and room.any():
+            spectrum = response.applied(quiet[room], blocks(turned, begin[room], AIR), spectrum, spectrum, spectrum,
+                                        spectrum)
+        total[room] += np.nan_to_num(squared(spectrum))
+        count[room] += 1
+    return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], WIDTH, axis=1, mode="nearest")
+
+
+def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]) -> np.ndarray:
+    """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor."""
+    return held(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active)))
+
+
+def _without(flight: Flight, rows: np.ndarray) -> Flight:
+    """The flight as if some rows, bool (n,), had been lost as well."""
+    def bridged(values: np.ndarray) -> np.ndarray:
+        return held(np.where(rows[:, None], np.nan, values))
+
+    rates = None if flight.rates is None else bridged(flight.rates)
+    return replace(flight, pwm=bridged(flight.pwm), acceleration=bridged(flight.acceleration), rates=rates,
+                   lost=flight.lost | rows, memory={})

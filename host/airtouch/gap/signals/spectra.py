@@ -1,0 +1,173 @@
+"""Short-time spectra of the gap, and the floor that they are held against.
+
+Blocks of 2.56 s (0.24 s on the ground) under a Hann window, half overlapping. A bin's
+value over the floor's standard deviation is one standard normal number (real and
+imaginary part each) when nothing is wrong.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
+from airtouch.gap.signals.channels import CHANNELS, COUNT
+
+AIR, REST = "air", "ground"
+LENGTH = {AIR: 256, REST: 24}  #: samples
+OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
+MOST_LOST = 0.1  #: of a block
+HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
+LEAST_LEFT = 0.1  #: of a value's power, once what lost rows add on average is taken off
+TRIM_HZ = 0.6  #: below it torque and rate hold the trim of a flight, which does not go with how hard it is flown
+
+
+def starts(flight: Flight, regime: str) -> np.ndarray:
+    """First samples of the blocks of a regime that hold usable samples only."""
+    length = LENGTH[regime]
+    good = flight.on_ground if regime == REST else (flight.phase != GROUND) & ~flight.on_ground
+    near = good & (flight.usable | flight.bridged)
+    found, k = [], 0
+    bad = np.cumsum(np.concatenate([[0], ~near]))
+    lost = np.cumsum(np.concatenate([[0], flight.bridged]))
+    while k + length <= len(flight):
+        if bad[k + length] == bad[k] and lost[k + length] - lost[k] <= MOST_LOST * length:
+            found.append(k)
+            k += length // 2
+        else:
+            k += 1
+    return np.array(found, int)
+
+
+def frequencies(regime: str) -> np.ndarray:
+    """Hz, (bins,)."""
+    return np.fft.rfftfreq(LENGTH[regime], PERIOD_S)
+
+
+def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
+    """Spectra (blocks, bins, channels) of values (n, channels), unit/sqrt(Hz), two-sided.
+
+    |.|^2 has the mean of the one-sided PSD; a constant x gives x * sqrt(duration / 1.5).
+    """
+    length = LENGTH[regime]
+    window = np.hanning(length + 1)[:-1]
+    scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
+    cut = values[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length, values.shape[1]))
+    spectrum = np.fft.rfft(cut * window[:, None], axis=1)
+    spectrum *= scale
+    spectrum[:, 0] /= np.sqrt(2.0)
+    if length % 2 == 0:
+        spectrum[:, -1] /= np.sqrt(2.0)
+    return spectrum
+
+
+def squared(values: np.ndarray) -> np.ndarray:
+    """|values|^2 of complex values; the root that `abs` takes costs five times as much."""
+    return values.real ** 2 + values.imag ** 2
+
+
+def judged(regime: str) -> np.ndarray:
+    """Bins (bins, COUNT) that count: inside each channel's band; on the ground force and rate only.
+
+    In the air the yaw rate says nothing of the gyro: a vehicle that trusts a biased gyro turns slowly.
+    """
+    f = frequencies(regime)[:, None]
+    keep = np.array([[c.low_hz <= x <= c.high_hz for c in CHANNELS] for x in f[:, 0]])
+    if regime == REST:
+        force_or_rate = np.array([c.name.startswith(("force", "rate")) for c in CHANNELS])
+        keep = np.broadcast_to(force_or_rate, (len(f), COUNT)).copy()
+    else:
+        keep[:, [c.name for c in CHANNELS].index("rate_z")] = False
+    return keep
+
+
+@dataclass(frozen=True)
+class Floor:
+    """What nominal flights leave: power[regime] (bins, COUNT), unit^2/Hz, from `blocks` blocks;
+
+    offset (COUNT,): standard deviation between flights of a channel's mean in the air;
+    clock_s: rms of the logged times around regular ones; lost: share of lost samples.
+    """
+
+    power: dict[str, np.ndarray]
+    blocks: dict[str, int]
+    offset: np.ndarray
+    clock_s: float
+    lost: float
+    slopes: Slopes | None = None  #: with how hard it is flown, of the power in the air
+    least: np.ndarray | float = 0.0  #: (bins, COUNT) in the air, of the sensors alone
+    #: (COUNT,) of `offset`, what the power in the lowest bin does not give
+    offset_beyond: np.ndarray = field(default_factory=lambda: np.zeros(COUNT))
+
+    def level(self, flight: Flight, first: np.ndarray, regime: str) -> np.ndarray:
+        """Power (blocks, bins, COUNT) of the blocks of a flight that begin at samples `first`."""
+        power = self.power[regime]
+        if self.slopes is None or regime != AIR:
+            return np.broadcast_to(power, (len(first), *power.shape))
+        return np.maximum(power * self.slopes.level(hardness_of(flight, first, LENGTH[AIR])), self.least)
+
+
+def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: Sequence[dict[str, np.ndarray]],
+             spectra: Sequence[dict[str, np.ndarray]], least: np.ndarray, bridging: Sequence[np.ndarray]) -> Floor:
+    """The floor of flights declared nominal, from what the calibrated model leaves of them.
+
+    residuals: (n, COUNT) for each flight; first, spectra: of their blocks by regime the first samples and the spectra;
+    least (COUNT,): white noise that the sensors' data sheet alone gives, unit rms at 100 Hz (angular acceleration: of
+    its difference), below which the floor never goes. bridging: power (blocks, bins, COUNT) that lost rows add in the
+    air; it is taken off, as each flight has its own, but for what is left by chance.
+    """
+    power, count, slopes = {}, {}, None
+    for regime in (AIR, REST):
+        every = np.concatenate([s[regime] for s in spectra]) if spectra else np.zeros((0, 1, COUNT))
+        sensor = sensor_power(least, regime)
+        count[regime] = len(every)
+        if len(every) >= 4:
+            each = np.abs(every) ** 2
+            if regime == AIR:
+                hardness = np.concatenate([hardness_of(f, s[AIR], LENGTH[AIR])
+                                           for f, s in zip(flights, first, strict=True)])
+                trim = (frequencies(AIR) < TRIM_HZ)[:, None] & (np.arange(COUNT) >= 3)
+                slopes = slopes_of(each, hardness, frequencies(AIR), trim)
+                level = slopes.level(hardness)
+                each = np.maximum(each - np.concatenate(bridging), LEAST_LEFT * each) / level
+            mean = np.nan_to_num(np.nanmean(each, axis=0))
+            power[regime] = np.maximum(_smooth(mean), 0.5 * sensor)
+        else:
+            power[regime] = 2.0 * sensor
+    offset, own = _between(flights, residuals, power[AIR][0])
+    clock = np.sqrt(np.mean(np.concatenate([f.clock_s for f in flights]) ** 2)) if flights else 0.0
+    lost = float(np.mean(np.concatenate([f.lost for f in flights]))) if flights else 0.0
+    return Floor(power, count, offset, float(clock), lost, slopes, 0.5 * sensor_power(least, AIR), own)
+
+
+def _between(flights: Sequence[Flight], residuals: Sequence[np.ndarray], lowest: np.ndarray,
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviation (COUNT,) of flights' means in the air, and the same without what the power in the lowest bin
+
+    gives them by chance.
+    """
+    if len(flights) < 2:
+        return np.zeros(COUNT), np.zeros(COUNT)
+    air = [(f.phase != GROUND) & f.usable for f in flights]
+    means = np.array([r[a].mean(axis=0) for r, a in zip(residuals, air, strict=True)])
+    seen = np.nan_to_num(means.var(axis=0, ddof=1))
+    chance = HANN_POWER * lowest * np.mean([1.0 / max(a.sum() * PERIOD_S, PERIOD_S) for a in air])
+    return np.sqrt(seen), np.sqrt(np.maximum(seen - chance, 0.0))
+
+
+def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
+    """PSD (bins, COUNT) of the sensors' white noise; differences of the gyro rise with frequency."""
+    f = frequencies(regime)
+    white = np.broadcast_to(2.0 * PERIOD_S * least ** 2, (len(f), COUNT)).copy()
+    shape = 4.0 * np.sin(np.pi * np.maximum(f, 0.5 * f[1]) * PERIOD_S) ** 2
+    white[:, 3:6] = shape[:, None] * 2.0 * PERIOD_S * (least[3:6] / PERIOD_S) ** 2
+    return white
+
+
+def _smooth(power: np.ndarray) -> np.ndarray:
+    """Averaged over neighbouring bins in the logarithm, the lowest two (the means) left as they are."""
+    out = power.copy()
+    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], 1e-300)), 1.5, axis=0, mode="nearest"))
+    return out

@@ -1,0 +1,243 @@
+"""How strong every effect seems to be in flights that have none: the yardstick of the diagnosis.
+
+Two nominal flights of one vehicle differ in trim, battery, air and wear. Fitted to such a
+flight, an effect gets some apparent strength, and may gain many nats of likelihood. It is
+news only as far as its strength exceeds what nominal flights show of the same effect.
+
+The variance of a parameter's apparent strength has a scaled inverse chi-square prior
+(Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6) from the table
+`nominal_scatter.toml`, of one class of vehicles, and is updated by the baseline flights;
+which class it is they tell by themselves. `tools/nominal_scatter.py` makes the table.
+"""
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+
+import numpy as np
+from scipy.stats import t as student
+
+from airtouch.gap.signatures.candidates import TWINS, is_random
+
+MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
+LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
+LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
+WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own
+SURELY = 1.645  #: deviations from its middle to the ends of a 90 % interval
+POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them
+NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
+RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
+RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
+SIMULATED = "simulated"  #: the class of flights of this project's simulator
+GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the posterior's median is taken
+
+
+@dataclass(frozen=True)
+class Apparent:
+    """One nominal flight held against others.
+
+    strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
+    chance; rate: nats a second that a model without names gains; passing_rates: that each effect does that comes and
+    goes.
+    """
+
+    strengths: Mapping[str, np.ndarray]
+    errors: Mapping[str, np.ndarray]
+    rate: float
+    passing_rates: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
+
+    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose flights a
+    class of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
+    negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
+    """
+
+    rms: Mapping[str, np.ndarray]
+    freedom: float
+    rate: tuple[float, float]
+    passing_rates: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    vehicle: str = ""
+    middle: Mapping[str, np.ndarray] = field(default_factory=dict)
+    exact: bool = False
+
+    def evidence(self, name: str, strength: np.ndarray, error: np.ndarray | float = 0.0) -> float:
+        """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
+
+        Student's density with `freedom`, of what remains after each further parameter has paid for itself. error (k,):
+        standard deviation by chance; a strength counts with the end of its 90 % interval that is closer to none, as a
+        parameter that the data leave open says nothing. A parameter that the table does not know yet scatters as the
+        widest of its effect's others.
+        """
+        rms = self.rms.get(name)
+        if rms is None or not len(strength):
+            return math.inf
+        rms = np.append(rms, np.full(max(len(strength) - len(rms), 0), rms.max()))[:len(strength)]
+        if name in self.middle:  # a random effect weaker than usual is no news
+            strength = np.maximum(strength - self.middle[name], 0.0)
+        strength = np.maximum(np.abs(strength) - SURELY * error, 0.0)
+        far = float(np.sum((strength / rms) ** 2)) - max(int(np.count_nonzero(strength)) - 1, 0)
+        return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
+
+    def allowed(self, seconds: float, least: float) -> float:
+        """Log likelihood that a model without names may gain in a nominal flight of so many seconds.
+
+        least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
+        """
+        return self._usual(self.rate, seconds, least)
+
+    def passing(self, name: str, seconds: float, least: float) -> float:
+        """The same of an effect that comes and goes."""
+        return self._usual(self.passing_rates.get(name, (0.0, 0.0)), seconds, least)
+
+    def _usual(self, rate: tuple[float, float], seconds: float, least: float) -> float:
+        sure = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
+        return least + seconds * (rate[0] + min(sure, MOST_SURE) * rate[1]) ** 2
+
+
+def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
+    """What the table knows of the vehicle's class, or else of the one that the baseline flights fit best, updated by
+    them.
+
+    baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
+    by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
+    recorded: the logs' format says that a drone has flown them, so no class of simulated flights is theirs. A class
+    that was measured on the vehicle of this name leaves no room for other vehicles'.
+    """
+    classes = {name: c for name, c in table().items() if not (recorded and name == SIMULATED)}
+    if vehicle and any(c.vehicle == vehicle for c in classes.values()):
+        classes = {name: c for name, c in classes.items() if c.vehicle == vehicle}
+    n = len(baseline)
+    wide = (n + 1.0) / (n - 1.0) if n > 1 else 1.0
+    known = baseline if n > 1 else ()
+    weight = np.array([_fit(c, known, wide) for c in classes.values()])
+    name_of = list(classes)[int(np.argmax(weight))]
+    own = classes[name_of] if n > 1 else _widest(list(classes.values()))
+    simulated = name_of == SIMULATED and n > 1  # whose flights are all drawn alike
+    least = LEAST if simulated else LEAST_RECORDED
+    worth = own.freedom if simulated else min(own.freedom, WORTH)
+    rms, middle = {}, {}
+    for name, prior in own.rms.items():
+        rows = [f for f in known if name in f.strengths]
+        scale = math.sqrt(wide)
+        centre = np.zeros(len(prior))
+        if name in own.middle:
+            sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
+            middle[name] = centre = sums / (worth + len(rows))
+        own_rms = [_median(scale * (_column(rows, name, "strengths", k) - centre[k]),
+                           scale * _column(rows, name, "errors", k), p, worth)
+                   for k, p in enumerate(prior)] if rows else prior
+        exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
+        rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
+    for group, _ in TWINS:  # one thing in the logs, as mass and thrust, scatters as the wider of its names
+        same = [rms[n] for n in group if n in rms]
+        if len({len(x) for x in same}) == 1:
+            rms |= {n: np.max(same, axis=0) for n in group if n in rms}
+    passing = {n: _rate(r, [f.passing_rates.get(n, 0.0) for f in known], worth) for n, r in own.passing_rates.items()}
+    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing, middle=middle,
+                   exact=simulated)
+
+
+def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
+    """Parameter k of an effect, strength or error, in every flight (n,)."""
+    return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
+
+
+def _median(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> float:
+    """Posterior median of the standard deviation of values (n,) that chance alone scatters by `error` (n,).
+
+    The variance's prior is scaled inverse chi-square of `worth` degrees of freedom; where worth is 0 every order of
+    magnitude of GRID is as likely. The likeliest value would be none at all wherever chance can explain the values.
+    """
+    variance = GRID[:, None] ** 2 + error ** 2
+    level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
+    level -= 0.5 * worth * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) if worth else 0.0
+    below = np.cumsum(np.exp(level - level.max()))
+    return float(GRID[int(np.searchsorted(below, 0.5 * below[-1]))])
+
+
+def _rate(own: tuple[float, float], rates: Sequence[float], worth: float) -> tuple[float, float]:
+    """Mean and standard deviation of square roots of rates, from those of a class and those of the baseline (n,)."""
+    middle, spread = own
+    roots = np.minimum(np.sqrt(rates), middle + MOST_SURE * spread)
+    total = worth + len(roots)
+    mean = (worth * middle + roots.sum()) / total
+    return float(max(mean, middle)), float(np.sqrt((worth * spread ** 2 + ((roots - mean) ** 2).sum()) / total))
+
+
+def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
+    """Log likelihood of the baseline's strengths and rates in a class."""
+    total, nu = 0.0, own.freedom
+    for flight in baseline:
+        for name, rms in own.rms.items():
+            if name in flight.strengths:
+                n = min(len(rms), len(flight.strengths[name]))
+                variance = np.maximum(rms[:n], NEVER_BELOW) ** 2 + wide * flight.errors[name][:n] ** 2
+                strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
+                far = wide * strength ** 2 / variance
+                total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
+        passing = [(flight.passing_rates.get(n, 0.0), r) for n, r in own.passing_rates.items()]
+        for rate, (middle, spread) in ((flight.rate, own.rate), *passing):
+            total += float(student.logpdf(np.sqrt(rate), RATE_FREEDOM, middle, max(spread, RATE_NEVER_BELOW)))
+    return total
+
+
+def _widest(classes: Sequence[Scatter]) -> Scatter:
+    """Of every effect the widest scatter of any class: for vehicles of which no nominal flight is known."""
+    classes = list(classes)
+    names = {n for c in classes for n in c.rms}
+    rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
+
+    def highest(rates: Iterable[tuple[float, float]]) -> tuple[float, float]:
+        return max(rates, key=lambda r: r[0] + r[1])
+
+    passing = {n: highest(c.passing_rates[n] for c in classes if n in c.passing_rates)
+               for n in sorted({n for c in classes for n in c.passing_rates})}
+    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
+
+
+@cache
+def table() -> dict[str, Scatter]:
+    """The shipped classes of vehicles by name."""
+    text = (resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml").read_text(encoding="utf-8")
+    return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
+                          tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["root_passing_rates"].items()},
+                          entry.get("vehicle", ""), {k: np.array(v) for k, v in entry.get("middle", {}).items()})
+            for name, entry in tomllib.loads(text).items()}
+
+
+def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = None) -> Scatter:
+    """The scatter of flights each of which was held against others than itself.
+
+    alike: those of them that give the rates and the degrees of freedom, which were held against flights of their own
+    day and condition; all by default.
+    """
+    alike = flights if alike is None else alike
+    names = sorted({n for f in flights for n in f.strengths})
+    rms, middle = {}, {}
+    for name in names:
+        rows = [f for f in flights if name in f.strengths]
+        size = max(len(f.strengths[name]) for f in rows)
+        columns = [(_column(rows, name, "strengths", k), _column(rows, name, "errors", k)) for k in range(size)]
+        if is_random(name):
+            middle[name] = np.array([strengths.mean() for strengths, _ in columns])
+            columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
+        each, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
+        pooled = _median(each, errors, 0.0, 0.0)
+        rms[name] = np.array([_median(x, e, pooled, POOLED) for x, e in columns] if size > 1 else [pooled])
+    passing = {n: _robust([f.passing_rates.get(n, 0.0) for f in alike])
+               for n in sorted({n for f in alike for n in f.passing_rates})}
+    return Scatter(rms, float(len(alike)), _robust([f.rate for f in alike]), passing, middle=middle)
+
+
+def _robust(rates: Sequence[float]) -> tuple[float, float]:
+    """Mean and standard deviation of square roots, the tenth that are largest cut to the rest (winsorised)."""
+    roots = np.sqrt(rates)
+    roots = np.minimum(roots, np.quantile(roots, 0.9))
+    return float(roots.mean()), float(roots.std(ddof=1))

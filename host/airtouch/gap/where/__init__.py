@@ -1,0 +1,1 @@
+"""Where the gap lies: the map by channel, band, phase and regime."""

@@ -1,0 +1,180 @@
+"""The gap cut into bands and summed over short blocks of each phase: what the gap map is made of.
+
+A power-complementary filter bank (raised cosine between neighbours) is laid over each
+stretch in the air or on the ground, mirrored at its ends, so that phases of half a second
+have a value in every band, and the bands' mean squares add up to that of the signal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.signals.channels import COUNT, RATE, TORQUE
+from airtouch.simulation import signals as at
+from airtouch.simulation.flight import prepare
+from airtouch.vehicle import Vehicle
+
+BANDS_HZ = ((0.0, 0.5), (0.5, 2.0), (2.0, 6.0), (6.0, 12.0), (12.0, 25.0), (25.0, 50.0))
+CROSSOVER = 0.3  #: half width of a crossover, in parts of its frequency
+BLOCK = 256  #: samples of a block at most
+THIRDS = ("first", "second", "last")
+#: regimes beside "all": what they bound, unit, limits of the three bins
+BINS = (("height", "m", (0.1, 0.3)), ("speed", "m/s", (0.15, 0.5)), ("cell voltage", "V", (3.6, 3.9)))
+
+
+def _names() -> tuple[str, ...]:
+    names = ["all"]
+    for what, unit, (low, high) in BINS:
+        names += [f"{what} < {low:g} {unit}", f"{what} {low:g}-{high:g} {unit}", f"{what} > {high:g} {unit}"]
+    return (*names, *(f"{t} third of the flight" for t in THIRDS))
+
+
+REGIMES = _names()
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Blocks of one flight, or whole phases of it, with their sums over samples.
+
+    phase (b,): place in `segments.KINDS`; flight (b,): number of the flight; weight (b, r):
+    samples in each of REGIMES; power (b, r, bands, COUNT): sum of squares; mean
+    (b, r, COUNT): sum of the lowest band. NaN where a channel is missing.
+    """
+
+    phase: np.ndarray
+    flight: np.ndarray
+    weight: np.ndarray
+    power: np.ndarray
+    mean: np.ndarray
+
+    def by_phase(self) -> "Sums":
+        """One row for each phase of each flight."""
+        keys, row = np.unique(np.column_stack([self.flight, self.phase]), axis=0, return_inverse=True)
+        row = row.ravel()
+
+        def added(values: np.ndarray) -> np.ndarray:
+            out = np.zeros((len(keys), *values.shape[1:]))
+            np.add.at(out, row, values)
+            return out
+
+        return Sums(keys[:, 1], keys[:, 0], added(self.weight), added(self.power), added(self.mean))
+
+
+def join(parts: Sequence[Sums]) -> Sums:
+    """Sums of several flights, numbered in their order."""
+    if not parts:
+        r = len(REGIMES)
+        return Sums(np.zeros(0, int), np.zeros(0, int), np.zeros((0, r)),
+                    np.zeros((0, r, len(BANDS_HZ), COUNT)), np.zeros((0, r, COUNT)))
+    return Sums(np.concatenate([p.phase for p in parts]),
+                np.concatenate([np.full(len(p.phase), i) for i, p in enumerate(parts)]),
+                *(np.concatenate([getattr(p, key) for p in parts]) for key in ("weight", "power", "mean")))
+
+
+def gains(f: np.ndarray) -> np.ndarray:
+    """Amplitude gain (bands, len(f)) of each band at frequencies f, Hz; squares add up to 1."""
+    below = [np.zeros(len(f))]
+    for _, edge in BANDS_HZ[:-1]:
+        place = np.clip((f - edge) / (2.0 * CROSSOVER * edge) + 0.5, 0.0, 1.0)
+        below.append(np.cos(0.5 * np.pi * place) ** 2)
+    below.append(np.ones(len(f)))
+    return np.sqrt(np.maximum(np.diff(below, axis=0), 0.0))
+
+
+def filtered(values: np.ndarray) -> np.ndarray:
+    """Values (n, c) of one stretch in each band, (bands, n, c); a constant stays in the lowest."""
+    n = len(values)
+    mirrored = np.concatenate([values, values[::-1]])
+    spectrum = np.fft.rfft(mirrored, axis=0)
+    gain = gains(np.fft.rfftfreq(2 * n, PERIOD_S))
+    return np.fft.irfft(spectrum * gain[:, :, None], 2 * n, axis=1)[:, :n]
+
+
+def regimes(flight: Flight, vehicle: Vehicle) -> np.ndarray:
+    """Which samples belong to each of REGIMES, bool (n, r); only "all" on the ground."""
+    n, log = len(flight), flight.log
+    out = np.zeros((n, len(REGIMES)), bool)
+    out[:, 0] = True
+    air = flight.phase != GROUND
+    known = {
+        "height": flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1) if log.has("zrange_m")
+        else None,
+        "speed": np.hypot(log["vx_mps"], log["vy_mps"]) if log.has("vx_mps", "vy_mps") else None,
+        "cell voltage": log["vbat_V"] / vehicle.battery_cells if log.has("vbat_V") else None,
+    }
+    for i, (what, _, limits) in enumerate(BINS):
+        value = known[what]
+        if value is not None:
+            place = np.where(np.isfinite(value), np.digitize(value, limits), -1)
+            for k in range(3):
+                out[:, 1 + 3 * i + k] = air & (place == k)
+    third = np.minimum(3 * np.cumsum(air) // max(int(air.sum()) + 1, 1), 2)
+    for k in range(3):
+        out[:, 1 + 3 * len(BINS) + k] = air & (third == k)
+    return out
+
+
+def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
+    """Sums of one flight's gap (n, COUNT)."""
+    member = regimes(flight, vehicle)
+    parts: list[tuple] = []
+    for start, stop in stretches(flight):
+        good = ~flight.bridged[start:stop]
+        values = _bridged(residual[start:stop], good)
+        bands = filtered(values)
+        flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
+        for first, last in _blocks(flight.phase[start:stop]):
+            here = slice(first, last)
+            mask = (member[start:stop][here] & good[here, None]).T.astype(np.float64)
+            if mask[0].any():
+                parts.append((flight.phase[start + first], mask.sum(axis=1),
+                              (mask @ flat[here]).reshape(len(REGIMES), len(BANDS_HZ), COUNT),
+                              mask @ bands[0, here]))
+    if not parts:
+        return join([])
+    phase, weight, power, mean = (np.array(column) for column in zip(*parts, strict=True))
+    return Sums(phase.astype(int), np.zeros(len(phase), int), weight, power, mean)
+
+
+def stretches(flight: Flight) -> list[tuple[int, int]]:
+    """First sample and the one after the last of each stretch without contact, in the air or at rest."""
+    air = (flight.phase != GROUND) & ~flight.on_ground
+    kind = np.where(flight.on_ground, 1, np.where(air, 2, 0)) * (flight.usable | flight.bridged)
+    bounds = np.r_[0, np.flatnonzero(np.diff(kind)) + 1, len(kind)]
+    return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
+
+
+def sensor_rms(vehicle: Vehicle) -> np.ndarray:
+    """What the declared sensor noise alone gives in each band, (bands, COUNT); 0 for commands."""
+    row = prepare(vehicle, ())[0][0]
+    f = (np.arange(2000) + 0.5) * 0.00025 / PERIOD_S
+    share = gains(f) ** 2
+    flat = share.mean(axis=1)
+    rising = (share * 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2).mean(axis=1) / PERIOD_S ** 2
+    out = np.zeros((len(BANDS_HZ), COUNT))
+    out[:, :3] = flat[:, None] * np.asarray(row["acc_noise"]) ** 2
+    out[:, TORQUE] = rising[:, None] * np.asarray(row["gyro_noise"]) ** 2
+    out[:, RATE] = flat[:, None] * np.asarray(row["gyro_noise"]) ** 2
+    return np.sqrt(out)
+
+
+def _bridged(values: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """Lost samples replaced by straight lines; channels that a flight cannot have stay NaN."""
+    out = np.array(values)
+    if not good.all() and good.any():
+        index = np.arange(len(out))
+        for c in range(out.shape[1]):
+            out[:, c] = np.interp(index, index[good], out[good, c])
+    return out
+
+
+def _blocks(phase: np.ndarray) -> list[tuple[int, int]]:
+    """Runs of one phase cut into equal blocks of about BLOCK samples; short phases are one block."""
+    bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
+    found = []
+    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+        cuts = np.linspace(a, b, max(round((b - a) / BLOCK), 1) + 1).astype(int)
+        found += list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
+    return found

@@ -1,0 +1,141 @@
+"""Cells of the gap map from block sums: rms with its interval, and the floors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S
+from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums
+from airtouch.logs.segments import KINDS
+
+DRAWS = 400
+LEAST_FLIGHTS = 5  #: with fewer, blocks are drawn and not flights
+LEAST_SECONDS = 0.3  #: a cell with less is left out
+INTERVAL = (5.0, 95.0)
+SIGMAS = 1.645  #: the same of a normal distribution
+FREEDOM = 4.0  #: independent values that a block counts for at most: blocks differ by more than chance
+AIR = "air"  #: floor of phases that no nominal flight had
+
+Floors = dict[int | str, tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Table:
+    """rms (regimes, bands, COUNT) of one phase with its interval; seconds (regimes,)."""
+
+    rms: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    seconds: np.ndarray
+    blocks: np.ndarray
+    flights: np.ndarray
+
+
+def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
+    """One phase's rms with intervals."""
+    rows = all_sums.phase == phase
+    if not rows.any():
+        return None
+    flight = all_sums.flight[rows]
+    part = _rows(all_sums, rows)
+    blocks = (part.weight > 0).sum(axis=0)
+    flights = np.array([len(np.unique(flight[w > 0])) for w in part.weight.T])
+    if len(np.unique(flight)) >= LEAST_FLIGHTS:
+        part = part.by_phase()
+    weight = part.weight.sum(axis=0)
+    total = np.maximum(weight, 1.0)[:, None, None]
+    mean_square = part.power.sum(axis=0) / total
+    low, high = _bootstrap(part.weight, part.power, seed)
+    seconds = weight * PERIOD_S
+    width = np.array([b - a for a, b in BANDS_HZ])
+    most = np.maximum(FREEDOM * blocks, 1.0)[:, None]
+    freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, most)[:, :, None]
+    narrow, wide = (mean_square * freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
+    narrow[:, 0], wide[:, 0] = _offset(part.mean.sum(axis=0) / total[:, 0], mean_square[:, 0], freedom[:, 0])
+    low, high = np.minimum(low, narrow), np.maximum(high, wide)
+    return Table(np.sqrt(mean_square), np.sqrt(low), np.sqrt(high), seconds, blocks, flights)
+
+
+def _rows(some: Sums, rows: np.ndarray) -> Sums:
+    return Sums(some.phase[rows], some.flight[rows], some.weight[rows], some.power[rows], some.mean[rows])
+
+
+def _offset(mean: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Interval of a mean square that is a constant and something that varies around it."""
+    rest = np.maximum(square - mean ** 2, 0.0)
+    error = SIGMAS * np.sqrt(rest / freedom)
+    below, above = (freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
+    size = np.abs(mean)
+    return np.maximum(size - error, 0.0) ** 2 + rest * below, (size + error) ** 2 + rest * above
+
+
+def _bootstrap(weight: np.ndarray, power: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Percentiles of the mean square, rows drawn with replacement, (regimes, bands, COUNT) each."""
+    n = len(weight)
+    draws = np.random.default_rng(seed).multinomial(n, np.full(n, 1.0 / n), DRAWS).astype(np.float64)
+    low, high = np.zeros(power.shape[1:]), np.zeros(power.shape[1:])
+    for r in range(weight.shape[1]):
+        drawn = draws @ weight[:, r]
+        usable = drawn > 0
+        if not usable.any():
+            continue
+        means = (draws[usable] @ power[:, r].reshape(n, -1)) / drawn[usable, None]
+        low[r], high[r] = np.percentile(means, INTERVAL, axis=0).reshape(2, *power.shape[2:])
+    return low, high
+
+
+def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
+    """Phase -> floor and its upper end, (regimes, bands, COUNT); AIR for phases never flown."""
+    shape = (len(REGIMES), *sensor.shape)
+    least = np.broadcast_to(sensor, shape)
+    found: Floors = {GROUND: (least, least), AIR: (least, least)}
+    air = Sums(np.where(nominal.phase == GROUND, GROUND, 1), nominal.flight, nominal.weight, nominal.power,
+               nominal.mean)
+    of: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
+    for key, source, phase in of:
+        spread = _without_common(source, phase, count)
+        table = table_of(spread, phase, seed=100) if spread is not None else None
+        if table is None:
+            continue
+        wide = table.rms[:1], table.high[:1]  # where a regime was never flown, the phase as a whole
+        there = (table.seconds >= LEAST_SECONDS)[:, None, None]
+        own = table.rms, table.high
+        level, top = (np.where(there, one, every) for one, every in zip(own, wide, strict=True))
+        level, top = (np.where(np.isfinite(v), v, least) for v in (level, top))
+        found[key] = np.maximum(level, least), np.maximum(top, least)
+    return found
+
+
+def spreads_of(found: Sums, sensor: np.ndarray) -> Floors:
+    """Phase -> floor without a baseline: sensor noise, and the spread between flights (a single one: blocks)."""
+    spreads: dict[int | str, np.ndarray] = {}
+    for k in range(len(KINDS)):
+        rows = found.phase == k
+        part = _rows(found, rows)
+        if len(np.unique(part.flight)) > 1:
+            part = part.by_phase()
+        long = part.weight[:, 0] >= LEAST_SECONDS / PERIOD_S
+        if long.sum() > 1:
+            weight = part.weight[long, 0][:, None]
+            values = np.sqrt(part.power[long, 0] / weight[:, None])
+            values[:, 0] = part.mean[long, 0] / weight
+            spreads[k] = np.nan_to_num(values.std(axis=0, ddof=1))
+    air = [v for k, v in spreads.items() if k != GROUND]
+    spreads[AIR] = np.mean(air, axis=0) if air else np.zeros(sensor.shape)
+    spreads.setdefault(GROUND, np.zeros(sensor.shape))
+    shape = (len(REGIMES), *sensor.shape)
+    return {k: (np.broadcast_to(np.hypot(sensor, v), shape),) * 2 for k, v in spreads.items()}
+
+
+def _without_common(nominal: Sums, phase: int, count: int) -> Sums | None:
+    """One phase of the baseline less what all its flights have in common in the lowest band."""
+    rows = nominal.phase == phase
+    if not rows.any():
+        return None
+    weight, power, mean = nominal.weight[rows], nominal.power[rows].copy(), nominal.mean[rows]
+    total = np.maximum(weight.sum(axis=0), 1.0)[:, None]
+    common = mean.sum(axis=0) / total
+    spread = power[:, :, 0] - 2.0 * common * mean + weight[:, :, None] * common ** 2
+    power[:, :, 0] = np.maximum(spread, 0.0) * (count / (count - 1.0) if count > 1 else 1.0)
+    return Sums(nominal.phase[rows], nominal.flight[rows], weight, power, mean - weight[:, :, None] * common)
