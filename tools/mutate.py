@@ -43,7 +43,7 @@ GROUPS = {
         "gap8/test_requantise.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
     "selection": Group(("gap/naming/select.py", "gap/naming/judging.py"),
-                       ("gap/test_select.py", "gap/test_select_beside.py")),
+                       ("gap/naming/test_select.py", "gap/naming/test_select_beside.py")),
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)

@@ -1,4 +1,4 @@
-"""The map of the diagnosis names every module in its folder, and no folder imports one below it."""
+"""The map of the diagnosis names every module in its folder, no folder imports one below it, and tests mirror them."""
 
 import ast
 import re
@@ -24,6 +24,12 @@ def test_every_module_is_on_the_map_in_its_folder():
 def test_the_modules_beside_the_folders_are_on_the_map():
     assert {path.stem for path in ROOM.glob("*.py")} - {"__init__"} == set(BESIDE)
     assert all(f"`{name}`" in gap.__doc__ for name in BESIDE)
+
+
+def test_tests_stand_in_the_folders_that_they_test():
+    """Those of one folder in the folder of that name; those of several beside the folders."""
+    here = Path(__file__).parent
+    assert {path.parent.name for path in here.glob("*/test_*.py")} <= set(FOLDERS)
 
 
 def test_a_folder_imports_only_those_above_it():
