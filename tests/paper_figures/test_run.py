@@ -4,6 +4,7 @@ import csv
 import json
 import sys
 import types
+from functools import partial
 
 import pytest
 from click.testing import CliRunner
@@ -82,3 +83,25 @@ def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tm
         run.names(["fig8x"])
     missing = CliRunner().invoke(command, ["--flights", str(tmp_path / "none"), "--out", str(tmp_path)])
     assert "no such file or folder" in str(missing.exception)
+
+
+def test_processes_make_the_same_figures(tmp_path):
+    chosen, told = ["table1", "range"], tmp_path / "told"
+    for out, workers in (("one", 1), ("two", 2)):
+        job = Job(None, tmp_path / out / "work", tell=partial(note, told))
+        run.run(chosen, tmp_path / out, job, workers=workers)
+    for name in chosen:
+        for ending in ("csv", "svg", "png"):
+            file = f"{name}.{ending}"
+            assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+    assert "range" in (tmp_path / "two" / "index.html").read_text() and told.read_text().count("written") == 4
+
+
+def note(path, line):
+    """Append a line to a file: a `tell` that other processes can call."""
+    with path.open("a") as file:
+        file.write(line + "\n")
+
+
+def test_every_figure_is_in_one_group():
+    assert sorted(name for group in run.GROUPS for name in group) == sorted(run.FIGURES)

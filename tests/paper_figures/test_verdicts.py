@@ -11,6 +11,7 @@ from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.paper_figures import (
     components,
     conditions,
+    films,
     materials,
     overall,
     recorded,
@@ -122,6 +123,25 @@ def test_the_loss(job, monkeypatch, without, epochs, loss, sooner):
     assert (verdict(figure, "df-loss"), verdict(figure, "df-epochs")) == (loss, sooner)
 
 
+def test_a_quick_run_does_not_judge_what_it_trains_too_briefly_for(tmp_path, monkeypatch):
+    quick = Job(tmp_path, tmp_path / "work", quick=True)
+    monkeypatch.setattr(recorded, "files", lambda _: [])
+    monkeypatch.setattr(recorded, "varied", lambda *_: (flights(0.1), folds()))
+    seen(monkeypatch, lambda way, lux: 0.012, 0.033)
+    assert verdict(components.df_loss(quick), "df-epochs") == UNTESTABLE
+    monkeypatch.setattr(recorded, "varied", None)
+    assert verdict(vision_figures.network_size(quick), "network-airtouch") == UNTESTABLE
+
+
+def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
+    every = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
+    monkeypatch.setattr(recorded.dataset, "collect", lambda _: every)
+    assert recorded.files(Job(tmp_path, tmp_path)) == every
+    some = recorded.files(Job(tmp_path, tmp_path, quick=True))
+    count = [sum(f.condition.fold == fold for f in some) for fold in range(5)]
+    assert count == [9, 6, 6, 6, 6] and len({f.path for f in some}) == 33
+
+
 @pytest.mark.parametrize(("shortest", "resolution"),
                          [(0.05, REPRODUCED), (0.10, NOT_REPRODUCED), (0.2, NOT_REPRODUCED)])
 def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
@@ -156,23 +176,23 @@ def seen(monkeypatch, camera_m, felt_m):
     rng = np.random.default_rng(3)
     edges = (SimpleNamespace(sample=300, kind="entry"), SimpleNamespace(sample=600, kind="exit"))
     log = SimpleNamespace(source="f", __len__=None)
-    films = [SimpleNamespace(edges=edges, speed_mps=0.3, log=log) for _ in range(16)]
+    shots = [SimpleNamespace(edges=edges, speed_mps=0.3, log=log) for _ in range(16)]
 
     def crossed(error_m):
         from airtouch.detector.trace import Detection
 
         return [[Detection(e.sample + round(rng.choice([-1, 1]) * error_m / 0.003), "edge") for e in edges]
-                for _ in films]
+                for _ in shots]
 
     ways = ("classical", "fusion", *vision_figures.weights.SIZES)
-    there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in vision_figures.LUX}
+    there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in films.LUX}
     monkeypatch.setattr(vision_figures, "everything",
-                        lambda _: (films, there, {n: crossed(felt_m) for n in ("best", "paper")}))
-    monkeypatch.setattr(vision_figures, "film_scores", lambda films, found: [
+                        lambda _: (shots, there, {n: crossed(felt_m) for n in ("best", "paper")}))
+    monkeypatch.setattr(vision_figures, "film_scores", lambda shots, found: [
         FlightScore("f", Condition(speed_mps=0.3), tuple(EdgeScore(
             e.kind, e.sample, d.sample, "edge", (e.sample - d.sample) * 0.01, (e.sample - d.sample) * 0.003)
             for e, d in zip(film.edges, some, strict=True)), (), 2, 10.0) for film,
-                                                                         some in zip(films, found, strict=True)])
+                                                                         some in zip(shots, found, strict=True)])
 
 
 def test_light_as_in_the_paper(job, monkeypatch):

@@ -1,6 +1,7 @@
 """`airtouch paper`: the paper's evaluation, made again by one command."""
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import click
@@ -34,9 +35,11 @@ Figures, by the paper's labels:
 @click.option("--power-log", type=click.Path(path_type=Path, dir_okay=False),
               help="An INA219's log with a column of stages, for table1; an estimate if left out.")
 @click.option("--quick", is_flag=True, help="Fewer flights, one fold, short trainings.")
+@click.option("--workers", type=click.IntRange(1), help="Processes, each with up to 2 GB; one a core, four at most, if "
+                                                        "left out.")
 @click.option("--force", is_flag=True, help="Make figures again that are there, and replace those of other settings.")
 def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: Path | None, quick: bool,
-            force: bool) -> None:
+            workers: int | None, force: bool) -> None:
     """Make every table and figure of the paper's evaluation again, with the paper's method and with `best`.
 
     Recorded flights where they exist, the simulator where they do not; each caption says which. The page sets the
@@ -51,15 +54,16 @@ def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: P
     """
     from airtouch.paper_figures import run
     from airtouch.paper_figures.figure import Job
+    from airtouch.simulation.batch import available_cores
 
     chosen = run.names(only)
     need("plots", "the pictures of airtouch paper")
     for path in (flights, power_log):
         if path is not None and not path.exists():
             raise AirTouchError(f"{path}: no such file or folder")
-    job = Job(flights or find_flights(), out / "work", quick, power_log, lambda line: click.echo(line, err=True))
+    job = Job(flights or find_flights(), out / "work", quick, power_log, partial(click.echo, err=True))
     shown = " ".join(["airtouch paper", *(f"--only {name}" for name in only), *(["--quick"] if quick else [])])
-    records = run.run(chosen, out, job, force=force, command=shown)
+    records = run.run(chosen, out, job, force=force, command=shown, workers=workers or min(available_cores(), 4))
     for name in chosen:
         for claim in records[name]["claims"].values():
             click.echo(f"{name:7} {claim['verdict']:22} {claim['said']}\n        {claim['found']}")

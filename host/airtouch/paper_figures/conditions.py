@@ -52,13 +52,16 @@ def by_height(job: Job) -> Figure:
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
-            pictures.hit_curves(axes, {f"{h}, {kind}": some for (n, h, kind), some in groups.items() if n == name})
+            pictures.hit_curves(axes, {f"{h}, {kind}": some for (n, h, kind), some in groups.items() if n == name},
+                                legend=False)
             if name == "paper":
                 axes.plot(0.05, low, "k*", ms=9)
                 axes.plot(0.05, high, "kv", ms=6)
                 axes.text(0.06, low, "paper: 4 cm", fontsize=7)
                 axes.text(0.06, high, "paper: 9 and 12 cm, at most", fontsize=7)
             axes.set_title(name)
+        canvas.legend(*canvas.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7,
+                      frameon=False)
 
     return Figure("Errors by height", table, caption, verdicts, draw)
 

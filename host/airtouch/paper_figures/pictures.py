@@ -50,7 +50,8 @@ def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper
     axes.legend(fontsize=7, frameon=False, ncols=len(errors) + 1, loc="upper left")
 
 
-def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: Mapping[str, Any] | None = None) -> None:
+def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: Mapping[str, Any] | None = None,
+               legend: bool = True) -> None:
     """Draw the hit curve of each group of flights, name -> its scores. styles: name -> keywords of its line."""
     for name, some in scores.items():
         curve = hit_curve(some)
@@ -59,7 +60,15 @@ def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: M
                       **((styles or {}).get(name, {})))
     axes.set(xlim=(0, 0.4), ylim=(0, 1), xlabel="distance error, m", ylabel="share of true edges")
     axes.grid(alpha=0.25)
-    axes.legend(fontsize=7, frameon=False, loc="lower right")
+    if legend:
+        axes.legend(fontsize=7, frameon=False, loc="lower right")
+
+
+def logarithmic(axes: Any, places: Sequence[float], label: str) -> None:
+    """A logarithmic axis in x with a tick, in plain numbers, at each place."""
+    axes.set(xscale="log", xlabel=label)
+    axes.set_xticks(places, [f"{place:,.10g}" for place in places], minor=False)
+    axes.minorticks_off()
 
 
 def curve(axes: Any, places: Sequence[float], rows: Sequence[Mapping[str, Any]], key: str, factor: float, colour: str,

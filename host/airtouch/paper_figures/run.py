@@ -1,11 +1,14 @@
-"""Makes the figures one by one, skips finished ones, and continues when a figure cannot be made."""
+"""Makes the figures, skips finished ones, and continues when a figure cannot be made."""
 
 import hashlib
 import importlib
 import json
+import multiprocessing
 import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +29,11 @@ FIGURES = {
     "fig11c": ("vision_figures", "network_size"),
     "fusion": ("vision_figures", "fusion"), "range": ("sensing_range", "sensing_range"),
 }
+#: figures that share trainings or films: one process makes each group; the longest first
+GROUPS = (("fig8a", "fig8c", "fig8d", "fig8e", "sizes", "table2"), ("fig8g", "fig8h", "fig8i"),
+          ("fig11b", "fig11c", "fusion"), ("fig8b", "fig8f"), ("wind",), ("table1",), ("range",))
+#: one thread for each process, so that a figure does not depend on the number of cores
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "TF_NUM_INTRAOP_THREADS", "TF_NUM_INTEROP_THREADS")
 
 
 def names(only: Sequence[str]) -> list[str]:
@@ -40,12 +48,13 @@ def names(only: Sequence[str]) -> list[str]:
 
 
 def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, command: str = "airtouch paper",
-        ) -> dict[str, dict[str, Any]]:
+        workers: int = 1) -> dict[str, dict[str, Any]]:
     """Write figures as NAME.png, .svg, .csv and .json to `out`, and index.html of all figures there.
 
     Returns the records: name -> record. A figure with the same settings is not made again. A figure with missing or bad
-    input has the reason in its record ("missing"), and the others are made. Raises AirTouchError, before any work, if
-    `out` holds a figure with other settings, without `force`.
+    input has the reason in its record ("missing"), and the others are made. workers: processes; `job.tell` must then be
+    a function that can be pickled. Raises AirTouchError, before any work, if `out` holds a figure with other settings,
+    without `force`; and if a process dies.
     """
     key = settings_key(job)
     old = {name: record(out, name) for name in chosen}
@@ -53,21 +62,50 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     if stale and not force:
         raise AirTouchError(f"{out / stale[0]}.csv was made with other settings; use --force, or another --out")
     out.mkdir(parents=True, exist_ok=True)
-    for number, name in enumerate(chosen, start=1):
-        entry = old[name]
-        if entry and entry["key"] == key and "missing" not in entry and not force:
-            job.tell(f"[{number}/{len(chosen)}] {name}: done before")
-            continue
-        started = time.monotonic()
-        job.tell(f"[{number}/{len(chosen)}] {name}")
-        entry = make(name, job, out)
-        entry |= {"key": key, "seconds": round(time.monotonic() - started, 1), "quick": job.quick}
-        write_bytes(json.dumps(entry, indent=1).encode(), out / f"{name}.json", force=True)
-        page.write(out, records(out), command)
-        job.tell(f"    {entry.get('missing') or 'written'}, {entry['seconds']:.0f} s")
+    done = [name for name, entry in old.items()
+            if entry and entry["key"] == key and "missing" not in entry and not force]
+    for name in done:
+        job.tell(f"{name}: done before")
+    left = [name for name in chosen if name not in done]
+    groups = [part for group in GROUPS if (part := [name for name in left if name in group])]
+    if workers == 1 or len(groups) < 2:
+        make_all(left, job, out, key, command)
+    else:
+        _side_by_side(groups, job, out, key, command, workers)
     all_records = records(out)
     page.write(out, all_records, command)
     return all_records
+
+
+def make_all(chosen: Sequence[str], job: Job, out: Path, key: str, command: str) -> None:
+    """Make figures one after the other, and write each with its record and the page to `out`."""
+    for name in chosen:
+        started, cpu_before = time.monotonic(), time.process_time()
+        job.tell(f"{name} ...")
+        entry = make(name, job, out)
+        entry |= {"key": key, "seconds": round(time.monotonic() - started, 1),
+                  "cpu_seconds": round(time.process_time() - cpu_before, 1), "quick": job.quick}
+        write_bytes(json.dumps(entry, indent=1).encode(), out / f"{name}.json", force=True)
+        page.write(out, records(out), command)
+        job.tell(f"{name}: {entry.get('missing') or 'written'}, {entry['seconds']:.0f} s ({entry['cpu_seconds']:.0f} s "
+                 "of processor time)")
+
+
+def _side_by_side(groups: Sequence[Sequence[str]], job: Job, out: Path, key: str, command: str, workers: int) -> None:
+    """`make_all` for each group, in processes."""
+    for variable in ONE_THREAD:
+        os.environ.setdefault(variable, "1")
+    context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        futures = [pool.submit(make_all, group, job, out, key, command) for group in groups]
+        try:
+            for future in as_completed(futures):
+                future.result()
+        except BrokenProcessPool:
+            raise AirTouchError("a worker process died (memory? two need 4 GB); call the same command again to "
+                                "continue, with --workers 1 if it dies again") from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def make(name: str, job: Job, out: Path) -> dict[str, Any]:

@@ -1,29 +1,20 @@
 """The camera beside AirTouch: errors against light and network size, and both together (Performance:3b and 3c)."""
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from airtouch import extras
 from airtouch.detector.evaluation import summary, tuning
-from airtouch.detector.evaluation.score import FlightScore
-from airtouch.logs.files import write_bytes
-from airtouch.paper_figures import pictures, recorded, simulated, words
+from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
+from airtouch.paper_figures.films import FELT, SIZE_LUX, everything, film_scores, films_of, lux_of
 from airtouch.vision import teed, weights
-from airtouch.vision.camera import Camera
 
-SCENE = "paper-4cm"  #: scenario: 4 cm over the platform, straight on, as in the paper's comparison
-LUX, QUICK_LUX = (500.0, 100.0, 50.0, 20.0, 5.0), (100.0, 20.0)
-SIZE_LUX = 100.0  #: lux at which the smaller networks run too
-FILMS, QUICK_FILMS = (4, 16), (2, 4)  #: flights to choose thresholds on, flights to score; the paper has 20
-SEED = 31
-FELT = ("best", "paper")
 BEST_ZEROS = (0.85, 0.0)  #: sparsities of `best` in the plot of error against size
-STEPS, QUICK_STEPS = 800, 100  #: training steps of `best`
+STEPS = 800  #: training steps of `best`
+NAMES = {"classical": "OpenCV", "teed": "TEED's structure"}
 COLOURS = {"classical": "#8a6d00", "teed": "#7a3e9d", "half": "#a678c4", "quarter": "#c9aedb", "eighth": "#e0d3ea",
            "fusion": "#1a7f37"}
 LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate move the error of a line's place. It "
@@ -35,7 +26,7 @@ def light(job: Job) -> Figure:
     """Performance:3b: errors of the camera and of AirTouch from 500 to 5 lux."""
     films, seen, felt = everything(job)
     table, rows = [], {}
-    for lux in _lux(job):
+    for lux in lux_of(job):
         for name in ("classical", "teed"):
             rows[name, lux] = row = summary.summarise(film_scores(films, seen[name, lux]))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux))
@@ -43,7 +34,7 @@ def light(job: Job) -> Figure:
     table += [words.table_row(f"{name}, any light", row, detector=name) for name, row in ours.items()]
 
     def text(lux: float) -> str:
-        return "; ".join(f"{n} at {lux:g} lux {words.metres(rows[n, lux])}, {words.missed(rows[n, lux])}"
+        return "; ".join(f"{NAMES[n]} at {lux:g} lux {words.metres(rows[n, lux])}, {words.missed(rows[n, lux])}"
                          for n in ("teed", "classical") if (n, lux) in rows)
 
     flights = "; ".join(f"{n} {words.metres(r)}, {words.missed(r)}" for n, r in ours.items())
@@ -59,19 +50,21 @@ def light(job: Job) -> Figure:
                                      f"{text(bright)}; best {words.metres(ours['best'])}"),
         "light-dark": words.judged(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
                                    "; ".join(text(v) for v in dark) + f"; best {words.metres(ours['best'])}. "
-                                   + _crossing(rows, ours["best"], _lux(job)))}
+                                   + _crossing(rows, ours["best"], lux_of(job)))}
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
         for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
             for name in ("classical", "teed"):
-                pictures.curve(axes, _lux(job), [rows[name, v] for v in _lux(job)], key, factor, COLOURS[name], name)
+                pictures.curve(axes, lux_of(job), [rows[name, v] for v in lux_of(job)], key, factor, COLOURS[name],
+                               NAMES[name])
             _airtouch(axes, ours, key, factor)
             for name, row in ours.items():
                 if row["intervals"][key]:
                     axes.axhspan(*(factor * b for b in row["intervals"][key]), color=pictures.colour(name), alpha=0.12,
                                  lw=0)
-            axes.set(xscale="log", xlabel="light, lux", ylim=(0, None))
+            pictures.logarithmic(axes, lux_of(job), "light, lux")
+            axes.set(ylim=(0, None))
         left.plot(bright, SAID["light-bright"].values[1], "k*", ms=8, label="paper: TEED")
         left.plot([20, 50, 100], [SAID["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
         _labelled(canvas, left, right)
@@ -92,17 +85,24 @@ def network_size(job: Job) -> Figure:
     text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
                      for n, r in rows.items())
     ours = {name: summary.summarise(film_scores(films, felt[name])) for name in FELT}
+    by_bytes, airtouch = _airtouch_sizes(job)
+    table += [words.table_row(f"best, {size:,} bytes, recorded flights", r, parameters=size)
+              for size, r in by_bytes.items()]
     verdicts = {"network-vision": words.judged(words.worse(full, least), f"at 100 lux {text}"),
-                "network-airtouch": _airtouch_sizes(job, table)}
+                "network-airtouch": airtouch}
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
         sizes = [teed.parameters(weights.SIZES[n]) for n in rows]
         for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
             pictures.curve(axes, sizes, list(rows.values()), key, factor, COLOURS["teed"], "vision, 100 lux")
+            if by_bytes:
+                pictures.curve(axes, list(by_bytes), list(by_bytes.values()), key, factor, pictures.colour("best"),
+                               "best, recorded flights")
             _airtouch(axes, ours, key, factor)
             axes.axvline(SAID["network-vision"].values[0], color=pictures.PAPER, ls="--", lw=1)
-            axes.set(xscale="log", xlabel="parameters of the vision network", ylim=(0, None))
+            pictures.logarithmic(axes, sizes, "parameters (of best: bytes)")
+            axes.set(ylim=(0, None))
         _labelled(canvas, left, right)
 
     caption = (f"Simulated: the {len(films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 and 8; "
@@ -110,28 +110,27 @@ def network_size(job: Job) -> Figure:
     return Figure("Errors against the size of the network", table, caption, verdicts, draw)
 
 
-def _airtouch_sizes(job: Job, table: list[dict[str, Any]]) -> Verdict:
-    """Add a row for `best` at each sparsity, scored on recorded flights. Returns the verdict."""
+def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
+    """Bytes -> summary of `best` at each sparsity, on recorded flights; and the verdict."""
+    if job.quick:
+        return {}, Verdict(UNTESTABLE, "networks of other sizes are not trained in a quick run; leave out --quick")
     rows = {}
     try:
         for zeros in BEST_ZEROS:
-            options = {"steps": QUICK_STEPS if job.quick else STEPS, "sparsity": zeros}
-            scores, folds = recorded.varied(job, "best", None, options)
-            rows[folds[0]["parameters"]["parameter_bytes"]] = row = summary.summarise(scores)
-            table.append(words.table_row(f"best, {100 * zeros:.0f} % zeros, recorded flights", row,
-                                         parameters=folds[0]["parameters"]["parameter_bytes"]))
+            scores, folds = recorded.varied(job, "best", None, {"steps": STEPS, "sparsity": zeros})
+            rows[folds[0]["parameters"]["parameter_bytes"]] = summary.summarise(scores)
     except Missing as missing:
-        return Verdict(UNTESTABLE, str(missing))
+        return {}, Verdict(UNTESTABLE, str(missing))
     text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
     small, large = rows.values()
-    return words.judged(not words.worse(large, small), f"best on recorded flights: {text}")
+    return rows, words.judged(not words.worse(large, small), f"best on recorded flights: {text}")
 
 
 def fusion(job: Job) -> Figure:
     """Late fusion of camera and AirTouch: the timed F1 of each and of both at every illuminance."""
     films, seen, felt = everything(job)
     table, scores = [], {}
-    for lux in _lux(job):
+    for lux in lux_of(job):
         found = {"camera": seen["teed", lux], "AirTouch": felt["best"], "both": seen["fusion", lux]}
         for name, some in found.items():
             scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(films, some, strict=True)])
@@ -141,7 +140,7 @@ def fusion(job: Job) -> Figure:
         table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(films, found)
     worst = [(r["fusion_loses"], r["loses_low"], r["lux"]) for r in table if r["detector"] == "both"]
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
-                     f"{scores['both', v]:.3f}" for v in _lux(job))
+                     f"{scores['both', v]:.3f}" for v in lux_of(job))
     verdict = words.judged(all(low <= 0.0 for _, low, _ in worst),
                            f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; both are below the better "
                            f"one by {max(v for v, _, _ in worst):.3f} at most, and nowhere beyond the 95 % interval "
@@ -154,13 +153,15 @@ def fusion(job: Job) -> Figure:
         axes = canvas.subplots()
         for name, colour in (("camera", COLOURS["teed"]), ("AirTouch", pictures.COLOURS["best"]),
                              ("both", COLOURS["fusion"])):
-            axes.plot(_lux(job), [scores[name, v] for v in _lux(job)], "o-", ms=4, color=colour, label=name)
-        axes.set(xscale="log", xlabel="light, lux", ylabel="timed F1 (1: every edge, no error)", ylim=(0.5, 1.02))
+            axes.plot(lux_of(job), [scores[name, v] for v in lux_of(job)], "o-", ms=4, color=colour, label=name)
+        pictures.logarithmic(axes, lux_of(job), "light, lux")
+        axes.set(ylabel="timed F1 (1: every edge, no error)", ylim=(0.5, 1.02))
         axes.legend(fontsize=7, frameon=False)
 
     caption = (f"Simulated: {len(films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 s are "
-               "one edge, at a weighted time; weight, and whether edges of one sense alone count, are chosen at each "
-               f"light on {_count(job)[0]} other flights. Timed F1 counts a match 1 - |error| / 1.5 s. {LIMITS}")
+               "one edge, at a time weighted by the inverse squared errors; errors, and whether edges of one sense "
+               f"alone count, are learnt at each light on {films_of(job)[0]} other flights. Timed F1 counts a match "
+               f"1 - |error| / 1.5 s. {LIMITS}")
     return Figure("Camera and AirTouch together", table, caption, {"backup": verdict}, draw)
 
 
@@ -184,57 +185,6 @@ def _loss(films: Sequence[Any], found: dict[str, Any], draws: int = 2000) -> tup
     return float(f1(better, whole) - f1("both", whole)), float(low), float(high)
 
 
-def everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dict[str, list]]:
-    """The films to score, (method, lux) -> crossings of each film, and detector -> crossings of each.
-
-    Results are stored in the work folder.
-    """
-    lacking = extras.lacking("vision")
-    if lacking:
-        raise Missing(f"the camera needs {', '.join(lacking)}: pip install 'airtouch[vision]'")
-    from airtouch.vision import compare
-    from airtouch.vision.crossings import film
-
-    training_count, scored_count = _count(job)
-    made_of = weights.digest(repr((SCENE, SEED, simulated.SEED, Camera())))
-    job.tell(f"{training_count + scored_count} simulated flights, {SCENE}")
-    films = [film(log, SEED) for log in simulated.flown(SCENE, training_count + scored_count)]
-    trained, scored = films[:training_count], films[training_count:]
-    felt = {name: compare.felt(films, name) for name in FELT}
-    seen: dict[tuple[str, float], list] = {}
-    for lux in _lux(job):
-        found = _crossings(job, films, training_count, lux, f"{training_count}_{scored_count}_{lux:g}_{made_of}")
-        for way, some in found.items():
-            seen[way, lux] = compare.without_lag(some, compare.lag(trained, some[:training_count]))
-        how = compare.choose_fusion(trained, seen["teed", lux][:training_count], felt["best"][:training_count])
-        seen["fusion", lux] = [compare.fused(a, b, how) for a, b in zip(seen["teed", lux], felt["best"], strict=True)]
-    return (scored, {key: some[training_count:] for key, some in seen.items()},
-            {name: some[training_count:] for name, some in felt.items()})
-
-
-def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name: str) -> dict[str, list]:
-    """Method -> crossings of each film at one illuminance, from the work folder if they are there.
-
-    Each method has a threshold for each illuminance, because a camera knows its exposure.
-    """
-    from airtouch.detector.trace import Detection
-    from airtouch.vision import compare, lines
-
-    kept = job.work / f"vision_{name}.json"
-    try:
-        stored = json.loads(kept.read_text())
-    except (OSError, ValueError):
-        sizes = weights.SIZES if lux == SIZE_LUX else ("teed",)
-        mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in sizes}}
-        stored = {}
-        for way, sights in compare.filmed(films, lux, mappers, SEED, job.tell).items():
-            least = compare.threshold(films[:training_count], sights[:training_count])
-            stored[way] = [[d.sample for d in found] for found in compare.crossings(films, sights, least)]
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(json.dumps(stored).encode(), kept, force=True)
-    return {way: [[Detection(s, "edge") for s in found] for found in some] for way, some in stored.items()}
-
-
 def _airtouch(axes: Any, ours: dict[str, dict[str, Any]], key: str, factor: float) -> None:
     """Draw a horizontal line for each of AirTouch's detectors, which do not depend on light."""
     for name, row in ours.items():
@@ -247,21 +197,6 @@ def _labelled(canvas: Any, left: Any, right: Any) -> None:
     left.set_ylabel("mean error of edges found, m")
     right.set_ylabel("missed edges, %")
     canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
-
-
-def film_scores(films: list[Any], found: list[Any]) -> list[FlightScore]:
-    """A score a film, of the crossings found in each."""
-    from airtouch.vision import compare
-
-    return compare.scored(films, found)
-
-
-def _lux(job: Job) -> tuple[float, ...]:
-    return QUICK_LUX if job.quick else LUX
-
-
-def _count(job: Job) -> tuple[int, int]:
-    return QUICK_FILMS if job.quick else FILMS
 
 
 def _crossing(rows: dict[tuple[str, float], dict[str, Any]], ours: dict[str, Any], lux: Sequence[float]) -> str:

@@ -71,13 +71,16 @@ def project(camera: Camera, pose: Pose, points_m: np.ndarray) -> np.ndarray:
 
 def view(camera: Camera, pose: Pose, scene: Scene) -> np.ndarray:
     """Albedo (rows, columns), float32, that a camera at rest sees."""
-    image = _sampled(scene.floor, *ground_points(camera, pose, 0.0), FLOOR_M_PER_PX)
+    on_top = np.zeros((camera.height, camera.width), bool)
     if pose.place_m[2] > scene.top_m:
         x, y = ground_points(camera, pose, scene.top_m)
         on_top = over(scene, x, y)
         if on_top.any():
-            image = np.where(on_top, _sampled(scene.top, x, y, TOP_M_PER_PX), image)
-    return image
+            top = _sampled(scene.top, x, y, TOP_M_PER_PX)
+    if on_top.all():
+        return top
+    floor = _sampled(scene.floor, *ground_points(camera, pose, 0.0), FLOOR_M_PER_PX)
+    return np.where(on_top, top, floor) if on_top.any() else floor
 
 
 def over(scene: Scene, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -111,6 +114,11 @@ def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> 
 
 def _sampled(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
     """The texture at places, bilinear, repeated; the mean where a ray meets nothing."""
-    u, v = (np.mod(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px), np.float32(TILE_PX)) for a in (x, y))
+    u, v = (_wrapped(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px)) for a in (x, y))
     found = cv2.remap(tile, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
     return found if np.isfinite(x).all() else np.where(np.isfinite(x), found, tile.mean())
+
+
+def _wrapped(place_px: np.ndarray) -> np.ndarray:
+    """Places modulo TILE_PX; the same bits as np.mod, which is five times slower, for the tile is a power of two."""
+    return place_px - np.float32(TILE_PX) * np.floor(place_px / np.float32(TILE_PX))

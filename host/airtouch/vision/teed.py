@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import expit
 
 if TYPE_CHECKING:
     import keras
@@ -55,7 +56,7 @@ def multiplications(rows: int, columns: int, widths: tuple[int, int, int] = WIDT
 
 def smish(x: np.ndarray) -> np.ndarray:
     """x tanh(ln(1 + sigmoid(x))), TEED's activation; tanh(ln y) is (y^2 - 1) / (y^2 + 1)."""
-    y = (1.0 + 1.0 / (1.0 + np.exp(-x))) ** 2
+    y = (1.0 + expit(x)) ** 2
     return x * (y - 1.0) / (y + 1.0)
 
 
@@ -72,7 +73,7 @@ def infer(weights: Weights, image: np.ndarray) -> np.ndarray:
     high = _up(weights, "up3.1", smish(_conv(weights, "out3.1", three)))
     maps.append(_up(weights, "up3.2", smish(_conv(weights, "out3.2", high))))
     first = _depthwise(weights, "fuse1", smish(np.concatenate(maps, axis=-1)))
-    return 1.0 / (1.0 + np.exp(-(first + _depthwise(weights, "fuse2", first)).sum(axis=-1)))
+    return expit((first + _depthwise(weights, "fuse2", first)).sum(axis=-1))
 
 
 def normalised(image: np.ndarray) -> np.ndarray:
@@ -170,7 +171,9 @@ def _up(weights: Weights, name: str, x: np.ndarray) -> np.ndarray:
 def _depthwise(weights: Weights, name: str, x: np.ndarray) -> np.ndarray:
     """A depthwise 3 x 3 convolution that keeps the size; output channel of input c and multiplier m is c M + m."""
     kernel = weights[f"{name}.kernel"]
-    padded = np.pad(x, ((1, 1), (1, 1), (0, 0)))
-    windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), axis=(0, 1))
-    out = np.einsum("rcnij,ijnm->rcnm", windows, kernel, optimize=True)
-    return out.reshape(*out.shape[:2], -1) + weights[f"{name}.bias"]
+    padded, (rows, columns, channels) = np.pad(x, ((1, 1), (1, 1), (0, 0))), x.shape
+    out = np.zeros((rows, columns, channels, kernel.shape[3]), x.dtype)
+    for i in range(3):
+        for j in range(3):
+            out += padded[i:i + rows, j:j + columns, :, None] * kernel[i, j]
+    return out.reshape(rows, columns, -1) + weights[f"{name}.bias"]

@@ -7,10 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airtouch import vehicle
-from airtouch.detector.paper.decoding import decode, detections, physical_filter
+from airtouch.detector.paper.decoding import decode, detections, edge_codes, physical_filter
 from airtouch.detector.trace import Detection
 from airtouch.parameters import DEFAULT
 from airtouch.reference.edge_pipeline import EdgePipelineConfig, edge_pipeline
+from airtouch.reference.edge_pipeline import decode as reference_decode
 
 levels = st.sampled_from([0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0, float("nan")])
 
@@ -28,6 +29,12 @@ def flights(draw):
                        probability_exit=draw(st.sampled_from([0.1, 0.3, 0.45])),
                        dwell_samples=draw(st.integers(1, 6)), alert_hold=draw(st.integers(1, 5)))
     return np.array(p[:n]), np.array(armed[:n]), np.array(alert[:n]), settings
+
+
+@given(flights())
+def test_edges_are_those_of_the_reference_that_steps_through_the_samples(flight):
+    p, armed, _, settings = flight
+    assert edge_codes(p, armed, settings).tolist() == reference_decode(p, armed, settings).tolist()
 
 
 @given(flights(), st.integers(0, 100))

@@ -70,7 +70,7 @@ def crossval(
         entry = cached(cache)
         if entry is None:
             tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
-            started = time.monotonic()
+            started, cpu_before = time.monotonic(), time.process_time()
             kept = out / f"{name}_fold{fold}_{key}.npz"
             model = model_of_fold(detector, train, kept, seed, given)
             if not physical_filter and isinstance(detector, Filtered):
@@ -80,6 +80,7 @@ def crossval(
             entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model),
                      "parameters": detector.parameters(model),
                      "seconds": round(time.monotonic() - started, 1),
+                     "cpu_seconds": round(time.process_time() - cpu_before, 1),
                      "per_flight": [s.as_dict() for s in results]}
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
         else:

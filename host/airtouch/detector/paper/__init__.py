@@ -14,7 +14,7 @@ variants      the pipeline with one of its choices changed, for ablations
 """
 
 from airtouch.detector.paper.detector import (
-    candidates,
+    choose_decoding,
     decoding,
     fit,
     lag_s,
@@ -30,5 +30,5 @@ from airtouch.detector.paper.detector import (
 )
 from airtouch.detector.paper.model import Model
 
-__all__ = ["Model", "candidates", "decoding", "fit", "lag_s", "load", "parameters", "probability_of", "retune", "run",
-           "run_float", "signals", "stride", "tune"]
+__all__ = ["Model", "choose_decoding", "decoding", "fit", "lag_s", "load", "parameters", "probability_of", "retune",
+           "run", "run_float", "signals", "stride", "tune"]

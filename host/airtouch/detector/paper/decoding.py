@@ -4,8 +4,7 @@ import numpy as np
 
 from airtouch.detector.trace import Detection
 from airtouch.parameters import DEFAULT, Parameters
-from airtouch.reference.edge_pipeline import ENTRY, NONE
-from airtouch.reference.edge_pipeline import decode as reference_decode
+from airtouch.reference.edge_pipeline import ENTRY, EXIT, NONE
 
 
 def decode(
@@ -22,8 +21,32 @@ def decode(
     without one in the last `alert_hold` samples are dropped (the paper's physical filter);
     None switches that off. A dropped edge still changes the state.
     """
-    edges = detections(reference_decode(probability, armed, parameters), probability)
+    edges = detections(edge_codes(probability, armed, parameters), probability)
     return edges if alert is None else physical_filter(edges, alert, parameters.alert_hold)
+
+
+def edge_codes(probability: np.ndarray, armed: np.ndarray, parameters: Parameters = DEFAULT) -> np.ndarray:
+    """Edges (n,), NONE, ENTRY or EXIT: `reference.edge_pipeline.decode`, from crossing to crossing.
+
+    Tuning decodes each flight with hundreds of settings; one step a sample in Python took most of a training's time.
+    """
+    probability, armed = np.asarray(probability, float), np.asarray(armed, bool)
+    edge = np.full(len(probability), NONE)
+    usable = armed & np.isfinite(probability)
+    levels = {False: np.flatnonzero(usable & (probability >= parameters.probability_entry)),
+              True: np.flatnonzero(usable & (probability <= parameters.probability_exit))}
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], armed, [False]]).astype(int)))
+    for first, end in bounds.reshape(-1, 2).tolist():
+        over, sample = False, first
+        while True:
+            place = int(np.searchsorted(levels[over], sample))
+            if place == len(levels[over]) or levels[over][place] >= end:
+                break
+            crossing = int(levels[over][place])
+            over = not over
+            edge[crossing] = ENTRY if over else EXIT
+            sample = crossing + max(parameters.dwell_samples, 1)
+    return edge
 
 
 def detections(edge: np.ndarray, probability: np.ndarray) -> list[Detection]:

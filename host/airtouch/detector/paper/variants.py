@@ -9,7 +9,6 @@ import numpy as np
 
 from airtouch import logs
 from airtouch.detector import paper
-from airtouch.detector.evaluation import tuning
 from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.paper import training
 from airtouch.detector.paper.decoding import decode
@@ -18,7 +17,7 @@ from airtouch.detector.paper.losses import DEFAULT_LAMBDA
 from airtouch.detector.paper.network import float_layers
 from airtouch.detector.shared.pruning import BLOCK
 from airtouch.detector.shared.tensorflow import use_tensorflow
-from airtouch.detector.trace import Detection, Trace
+from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import infer_float
 from airtouch.logs.flight_log import FlightLog
@@ -55,13 +54,8 @@ class Variant:
         converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
         unseen = [flights[i] for i in held] or list(flights)
         model = VariantModel(network, DEFAULT, 0.0, converged)
-        seen = [self._seen(log, model) for log in unseen]
-
-        def detect(settings: Parameters, i: int) -> list[Detection]:
-            return decode(seen[i][0], seen[i][1], seen[i][2] if self.physical_filter else None, settings)
-
-        truth = [logs.true_edges(log) for log in unseen]
-        settings, lag, _ = tuning.choose(paper.candidates(self.physical_filter), truth, detect)
+        settings, lag, _ = paper.choose_decoding([self._seen(log, model) for log in unseen],
+                                                 [logs.true_edges(log) for log in unseen], self.physical_filter)
         return replace(model, settings=settings, lag_s=lag)
 
     def run(self, log: FlightLog, model: "VariantModel | None" = None) -> Trace:

@@ -20,6 +20,7 @@ def use_tensorflow(seed: int) -> None:
         import tensorflow as tf
     except ImportError:
         raise AirTouchError("training needs TensorFlow: pip install 'airtouch[train]'") from None
+    tf.get_logger().setLevel("ERROR")
     keras.backend.clear_session()
     keras.utils.set_random_seed(seed)
     tf.config.experimental.enable_op_determinism()
