@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
-  gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/*.[ch])
+  gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/batch/*.[ch])
 #: C that needs neither the firmware's headers nor the GAP8's SDK
 FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c gap8/kernels/*.c) gap8/app/src/gap8_core.c \
   $(addprefix firmware/app/src/,app_core.c app_level.c app_local.c app_log.c app_paper.c app_params.c floor_height.c)

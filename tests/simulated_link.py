@@ -21,7 +21,7 @@ from cflib.crtp.exceptions import WrongUriType
 
 from airtouch.sitl import Server
 from airtouch.sitl.faults import Fault, Line
-from airtouch.sitl.packet import LOG, PARAM, Packet
+from airtouch.sitl.services.packet import LOG, PARAM, Packet
 from patience import HANG_S
 
 URI = "simulated://"

@@ -14,9 +14,9 @@ from airtouch import logs
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "host" / "airtouch"
-DATA = ("py.typed", "vehicles/*.toml", "models/*", "report/*.html", "kernels/*.h", "logs/*.csv",
+DATA = ("py.typed", "vehicles/*.toml", "models/*", "report/*.html", "kernels/batch/*.h", "logs/*.csv",
         "simulation/scenarios/*.toml",
-        "simulation/firmwares/*.toml", "crazyflie/missions/*.toml", "gap/*.toml", "simulation/effects/*.txt",
+        "simulation/firmwares/*.toml", "crazyflie/missions/*.toml", "gap/signatures/*.toml", "simulation/effects/*.txt",
         "gap/example/*")
 
 pytestmark = pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.twin.course import Course
+from airtouch.twin.recorded.course import Course
 
 #: a lively flight without the effects that a test moves
 PLAIN = {"motor_noise": {"rms": 0.008, "time": 0.8, "fast": 0.006}, "gust": {"rms": 0.1}, "rotor_drag": {},

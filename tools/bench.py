@@ -15,17 +15,17 @@ from rich.table import Table
 from scipy.signal import ShortTimeFFT
 
 from airtouch import kernels, logs
-from airtouch.cli.flights import find_flights
+from airtouch.cli.shared.flights import find_flights
 from airtouch.detector import best, paper
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.recipe import CHANNELS, STRIDE
-from airtouch.detector.evaluation import dataset
+from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.paper.features import flight_features
 from airtouch.detector.shared.channels import nine_channels
 from airtouch.kernels.network import run_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
-from airtouch.reference.int8_network import quantise
+from airtouch.reference.networks.int8_network import quantise
 
 PAIRS = 7
 

@@ -15,11 +15,12 @@ import numpy as np
 from rich.progress import track
 
 from airtouch import kernels, logs
-from airtouch.cli import scores as show_scores
-from airtouch.cli.flights import need_flights
+from airtouch.cli.shared import scores as show_scores
+from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.best.recipe import STRIDE
-from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection

@@ -21,10 +21,11 @@ from airtouch import vehicle
 from airtouch.errors import AirTouchError
 from airtouch.simulation.firmware import range_module, settings
 from airtouch.simulation.flight import Diverged, fly
-from airtouch.twin import channels as ch
-from airtouch.twin import files, flights, near_range
-from airtouch.twin import fly as twin_fly
-from airtouch.twin.course import Course
+from airtouch.twin import files
+from airtouch.twin.fitting import fly as twin_fly
+from airtouch.twin.recorded import channels as ch
+from airtouch.twin.recorded import flights, near_range
+from airtouch.twin.recorded.course import Course
 
 FIRMWARE = "authors-2024-01"
 SHARES = np.array([-0.05, 0.05, 0.5, 0.6, 0.9, 1.05, 1.6])

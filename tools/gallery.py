@@ -22,7 +22,7 @@ from airtouch import logs
 from airtouch.crazyflie import mission
 from airtouch.detector import baseline, best, paper
 from airtouch.detector.evaluation import edge_map
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.evaluate import evaluate_flight
 from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.logs.files import write_bytes

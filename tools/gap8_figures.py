@@ -19,11 +19,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from airtouch.cli.flights import need_flights
+from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import paper, registry
 from airtouch.detector.best.export import golden_flight
-from airtouch.detector.evaluation import crossval, dataset, evaluate, summary
-from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation import crossval, evaluate, summary
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.paper import export
 from airtouch.errors import AirTouchError
@@ -31,7 +32,7 @@ from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
 from airtouch.logs.files import write_bytes
-from airtouch.reference.int8_network import multiplications, rolling_multiplications
+from airtouch.reference.networks.int8_network import multiplications, rolling_multiplications
 from tools import gap8_counts
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -20,7 +20,7 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.logs import read
-from airtouch.simulation import rigid_body
+from airtouch.simulation.body import rigid_body
 from gap_authors import VEHICLE, questions
 
 BAND_HZ, FAR = (0.6, 12.0), 5.0

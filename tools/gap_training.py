@@ -29,9 +29,10 @@ from typing import Any
 import numpy as np
 
 from airtouch import logs, vehicle
-from airtouch.cli.flights import need_flights
+from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
-from airtouch.detector.evaluation import crossval, dataset, evaluate, simulated
+from airtouch.detector.evaluation import crossval, evaluate
+from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError

@@ -31,8 +31,9 @@ import numpy as np
 from airtouch import vehicle
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
-from airtouch.detector.evaluation import crossval, dataset, evaluate
-from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation import crossval, evaluate
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.detector.shared import sensors, training_set

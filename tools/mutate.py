@@ -38,7 +38,7 @@ GROUPS = {
     "reference": Group(tuple(f"reference/{name}.py" for name in (
         "band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
         "finite", "floor_height", "fr_cfar", "motion_channels")), ("reference",)),
-    "int8": Group(("reference/int8_network.py", "reference/stream_graph.py", "reference/stream_int8.py"), (
+    "int8": Group(tuple(f"reference/networks/{name}.py" for name in ("int8_network", "stream_graph", "stream_int8")), (
         "reference/test_multiplications.py", "kernels/test_network.py", "kernels/test_stream.py",
         "gap8/test_requantise.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),

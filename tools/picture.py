@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from airtouch import logs
-from airtouch.cli.flights import need_flights
+from airtouch.cli.shared.flights import need_flights
 from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
-from airtouch.detector.evaluation import dataset
+from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import reliability_of
 from airtouch.logs.files import write_bytes

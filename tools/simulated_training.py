@@ -16,9 +16,10 @@ from typing import Any
 
 import airtouch.simulation
 from airtouch import vehicle as vehicles
-from airtouch.cli.flights import find_flights
+from airtouch.cli.shared.flights import find_flights
 from airtouch.detector import registry
-from airtouch.detector.evaluation import dataset, evaluate, simulated
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import dataset, simulated
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.logs.files import write_bytes
 from airtouch.simulation import scenario

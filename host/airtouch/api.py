@@ -103,9 +103,9 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     that cannot be scored, and for one with edges and without a speed.
     """
     from airtouch.detector import registry
-    from airtouch.detector.evaluation import dataset
     from airtouch.detector.evaluation import evaluate as scoring
-    from airtouch.detector.evaluation.dataset import Condition, FlightFile
+    from airtouch.detector.evaluation.data import dataset
+    from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 
     chosen, inputs = registry.get(detector), _several(flights)
     trained = chosen.load(Path(model) if model else None)
@@ -180,7 +180,7 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     """
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
-    from airtouch.detector.evaluation import dataset
+    from airtouch.detector.evaluation.data import dataset
     from airtouch.extras import need
     from airtouch.logs.files import check_free
     from airtouch.simulation import scenario

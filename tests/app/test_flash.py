@@ -6,7 +6,7 @@ import sys
 import pytest
 from click.testing import CliRunner
 
-from airtouch.cli import flash as cli
+from airtouch.cli.drone import flash as cli
 from airtouch.crazyflie import flash
 from airtouch.errors import AirTouchError
 

@@ -17,7 +17,7 @@ from airtouch.sitl.drone import Drone
 from patience import HANG_S
 
 ROOT, HERE = Path(__file__).parents[2], Path(__file__).parent
-APP, HOST = ROOT / "firmware" / "app" / "src", ROOT / "host" / "airtouch" / "kernels"
+APP, HOST = ROOT / "firmware" / "app" / "src", ROOT / "host" / "airtouch" / "kernels" / "batch"
 INCLUDES = [APP, HERE / "crazyflie", *(ROOT / folder for folder in (
     "firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model", "gap8/app/src"))]
 CORE = [*sorted(set(APP.glob("app_*.c")) - {APP / "app_sensors.c"}),

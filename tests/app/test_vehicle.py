@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import vehicle as vehicles
-from airtouch.cli import export as export_command
+from airtouch.cli.learning import export as export_command
 from airtouch.detector.shared import vehicle_header
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import DETECTORS, HEALTH, AppCore

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from airtouch.cli.ablate import command
+from airtouch.cli.learning.ablate import command
 from airtouch.detector import best
 from airtouch.detector.evaluation.ablation import ABLATIONS
 from airtouch.reference.motion_channels import NAMES, MotionConfig, motion_channels

@@ -6,9 +6,10 @@ import shutil
 import pytest
 from click.testing import CliRunner
 
-from airtouch.cli.crossval import command
+from airtouch.cli.learning.crossval import command
 from airtouch.detector import baseline
-from airtouch.detector.evaluation import crossval, dataset
+from airtouch.detector.evaluation import crossval
+from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
 
 

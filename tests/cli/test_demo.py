@@ -5,9 +5,10 @@ import re
 import pytest
 from click.testing import CliRunner
 
-from airtouch.cli import demo, flights
+from airtouch.cli import demo
+from airtouch.cli.shared import flights
 from airtouch.detector import best
-from airtouch.detector.evaluation import demo_flights
+from airtouch.detector.evaluation.data import demo_flights
 from airtouch.errors import AirTouchError
 from made_flight import SMALL
 

@@ -6,8 +6,9 @@ from click.testing import CliRunner
 
 from airtouch import logs
 from airtouch.cli import airtouch, demo
-from airtouch.cli.gap_input import files_of
-from airtouch.crazyflie import board, collect, mission
+from airtouch.cli.gap.files import files_of
+from airtouch.crazyflie import collect, mission
+from airtouch.crazyflie.view import board
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
 from airtouch.report import figures

@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import logs
-from airtouch.cli import export as export_command
-from airtouch.cli import train as train_command
+from airtouch.cli.learning import export as export_command
+from airtouch.cli.learning import train as train_command
 from airtouch.detector import best, registry
-from airtouch.detector.evaluation import simulated
+from airtouch.detector.evaluation.data import simulated
 from airtouch.errors import AirTouchError
 from made_flight import SMALL, made_flight
 from small_model import random_model

@@ -7,8 +7,8 @@ import queue
 import random
 import threading
 
-from airtouch.crazyflie import blocks
-from airtouch.crazyflie.log_blocks import Sample
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.log_blocks import Sample
 from airtouch.errors import AirTouchError
 
 FLYING_PWM, PLATFORM_M = 38000, 0.7

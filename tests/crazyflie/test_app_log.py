@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from airtouch.crazyflie import app_log, blocks
+from airtouch.crazyflie.connection import app_log, blocks
 from airtouch.kernels.app_core import HEALTH
 
 APP = Path(__file__).parents[2] / "firmware" / "app" / "src"

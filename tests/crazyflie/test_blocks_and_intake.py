@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from fake_craft import FakeCraft
 
-from airtouch.crazyflie import blocks
-from airtouch.crazyflie.drone import drain
-from airtouch.crazyflie.host_detector import with_gaps
-from airtouch.crazyflie.intake import Intake
-from airtouch.crazyflie.log_blocks import Sample
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.drone import drain
+from airtouch.crazyflie.connection.intake import Intake
+from airtouch.crazyflie.connection.log_blocks import Sample
+from airtouch.crazyflie.view.host_detector import with_gaps
 from airtouch.errors import AirTouchError
 
 ALL = set(blocks.MOTION.names) | set(blocks.STATE.names)

@@ -11,12 +11,13 @@ from click.testing import CliRunner
 
 from airtouch import logs
 from airtouch.cli import airtouch
-from airtouch.crazyflie import blocks, collect, mission
-from airtouch.crazyflie.drone import Drone, drain
+from airtouch.crazyflie import collect, mission
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.drone import Drone, drain
 from airtouch.crazyflie.guard import Guard
 from airtouch.errors import AirTouchError
-from airtouch.simulation import log_row
-from airtouch.sitl.variables import log_variables
+from airtouch.simulation.sensors import log_row
+from airtouch.sitl.services.variables import log_variables
 
 pytest.importorskip("cflib", reason="flying needs cflib")
 from missions import HOP

@@ -9,10 +9,11 @@ import pytest
 from fake_craft import FakeCraft
 
 from airtouch import logs
-from airtouch.crazyflie import blocks, mission
+from airtouch.crazyflie import mission
 from airtouch.crazyflie.autopilot import Autopilot
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.flight import Flight
-from airtouch.crazyflie.intake import Intake
 from airtouch.crazyflie.recorder import Recorder
 
 HEIGHT = 0.8

@@ -6,11 +6,11 @@ from unittest.mock import Mock
 
 import pytest
 
-from airtouch.crazyflie import blocks
-from airtouch.crazyflie.drone import Drone, drain
-from airtouch.crazyflie.link import disconnect
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.drone import Drone, drain
+from airtouch.crazyflie.connection.link import disconnect
 from airtouch.errors import AirTouchError
-from airtouch.sitl.packet import LOG, Packet
+from airtouch.sitl.services.packet import LOG, Packet
 
 pytest.importorskip("cflib", reason="flying needs cflib")
 from patience import HANG_S
@@ -118,7 +118,7 @@ def test_the_link_may_go_while_a_command_is_sent(far, drone):
 
 
 def test_answers_come_while_their_packet_is_repeated():
-    from airtouch.crazyflie.cflib_crazyflie import Unanswered
+    from airtouch.crazyflie.connection.cflib_crazyflie import Unanswered
 
     table, old, new = Unanswered(), Mock(), Mock()
     assert not table["answered"]

@@ -9,7 +9,7 @@ import airtouch as at
 from airtouch.crazyflie import mission
 from airtouch.errors import AirTouchError
 from airtouch.simulation import scenario
-from airtouch.simulation import setpoint as c
+from airtouch.simulation.firmware import setpoint as c
 
 
 def retraced(legs):

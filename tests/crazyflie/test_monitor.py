@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.crazyflie import app_log, blocks
-from airtouch.crazyflie.board import Board
-from airtouch.crazyflie.host_detector import HostDetector
-from airtouch.crazyflie.intake import Intake
-from airtouch.crazyflie.log_blocks import Sample
+from airtouch.crazyflie.connection import app_log, blocks
+from airtouch.crazyflie.connection.intake import Intake
+from airtouch.crazyflie.connection.log_blocks import Sample
 from airtouch.crazyflie.monitor import Monitor
+from airtouch.crazyflie.view.board import Board
+from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
 from airtouch.logs.flight_log import ACC_WORLD, ATTITUDE, PWM, FlightLog
 from airtouch.logs.quaternion import decompress, euler

@@ -9,10 +9,11 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli import airtouch
 from airtouch.crazyflie import replay
-from airtouch.crazyflie.board import Board
-from airtouch.crazyflie.host_detector import HostDetector
+from airtouch.crazyflie.view.board import Board
+from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
-from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import dataset
 from airtouch.simulation import batch
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airtouch.crazyflie.ticks import WRAP_MS, Restarted, Ticks, gaps, in_order
+from airtouch.crazyflie.connection.ticks import WRAP_MS, Restarted, Ticks, gaps, in_order
 
 
 @given(st.integers(0, WRAP_MS - 1), st.lists(st.integers(1, 5_000_000), min_size=1, max_size=30))

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from airtouch.crazyflie.board import SIGNALS, Board, Link, edge_line
-from airtouch.crazyflie.sparkline import BLOCKS, sparkline, text_map
+from airtouch.crazyflie.view.board import SIGNALS, Board, Link, edge_line
+from airtouch.crazyflie.view.sparkline import BLOCKS, sparkline, text_map
 
 NUMBERS = st.lists(st.floats(allow_nan=True, allow_infinity=True, width=32), max_size=80)
 

@@ -15,10 +15,10 @@ from click.testing import CliRunner
 
 from airtouch import logs
 from airtouch.cli import airtouch
-from airtouch.crazyflie import blocks
-from airtouch.crazyflie.drone import Drone
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.drone import Drone
 from airtouch.errors import AirTouchError
-from airtouch.simulation import log_row
+from airtouch.simulation.sensors import log_row
 from airtouch.sitl import serve
 
 pytest.importorskip("cflib", reason="flying needs cflib")
@@ -72,7 +72,7 @@ def until(condition):
 
 
 def test_a_connection_is_made_through_losses(hop, cache, monkeypatch):
-    monkeypatch.setattr("airtouch.crazyflie.log_blocks.BLOCK_S", HANG_S)
+    monkeypatch.setattr("airtouch.crazyflie.connection.log_blocks.BLOCK_S", HANG_S)
     with serve(hop, port=0, speed=SPEED, faults=("loss=0.05,all",)) as virtual:
         drone = Drone(virtual.uri, cache, HANG_S)
         try:

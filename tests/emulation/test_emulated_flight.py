@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airtouch.simulation import loop, scenario, setpoint
+from airtouch.simulation import loop, scenario
+from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import draw_flight
 from tools.emulate import build, compare, flight, height

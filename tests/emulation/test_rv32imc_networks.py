@@ -13,7 +13,7 @@ from airtouch import kernels, logs
 from airtouch.detector import best
 from airtouch.detector.best.batches import channels_of
 from airtouch.detector.best.export import golden_flight
-from airtouch.detector.evaluation.dataset import collect
+from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper import rolling
 from airtouch.detector.paper.export import golden_vectors
@@ -22,7 +22,7 @@ from airtouch.kernels.network import arena_bytes, parameter_bytes, run_int8
 from airtouch.kernels.rolling import fixed_scale, rolling_size, run_rolling
 from airtouch.kernels.stream import arena_bytes as stream_arena_bytes
 from airtouch.kernels.stream import run_stream
-from airtouch.reference.int8_network import quantise
+from airtouch.reference.networks.int8_network import quantise
 from tools import gap8_counts
 
 BUDGET = tomllib.loads(Path(__file__).with_name("gap8_budget.toml").read_text())

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 import short_flights
 from airtouch import logs
 from airtouch.cli.gap import command
-from airtouch.cli.gap_input import Flights, files_of, vehicle_of
+from airtouch.cli.gap.files import Flights, files_of, vehicle_of
 from airtouch.errors import AirTouchError
 from airtouch.simulation.effects import EFFECTS, unregister
 

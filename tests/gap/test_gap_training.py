@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airtouch import logs
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError

@@ -11,7 +11,8 @@ import pytest
 import airtouch
 import short_flights
 from airtouch import vehicle
-from airtouch.cli import gap_show, scores
+from airtouch.cli.gap import show as gap_show
+from airtouch.cli.shared import scores
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.pictures import of, of_measurement

@@ -10,8 +10,8 @@ import pytest
 from objects import compiled
 
 ROOT = Path(__file__).parents[2]
-KERNELS, MODEL, BATCH, FIRMWARE = (ROOT / "gap8" / "kernels", ROOT / "gap8" / "model", ROOT / "host/airtouch/kernels",
-                                   ROOT / "firmware" / "kernels")
+KERNELS, MODEL, FIRMWARE = ROOT / "gap8/kernels", ROOT / "gap8/model", ROOT / "firmware/kernels"
+BATCH = ROOT / "host/airtouch/kernels/batch"
 FLAGS = ["-std=gnu11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
          *(f"-I{folder}" for folder in (KERNELS, MODEL, BATCH, FIRMWARE))]
 EMULATION = "-DAIRTOUCH_XPULP_EMULATION"

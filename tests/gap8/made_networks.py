@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.reference.int8_network import Int8Layer, Int8Network
+from airtouch.reference.networks.int8_network import Int8Layer, Int8Network
 
 SCALE, ZERO = 0.05, -7
 

@@ -8,14 +8,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airtouch import kernels, logs
-from airtouch.detector.evaluation.dataset import collect
+from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper.features import flight_features
 from airtouch.detector.paper.normalisation import FixedScale
 from airtouch.errors import AirTouchError
 from airtouch.kernels import network as c_network
 from airtouch.kernels import rolling
-from airtouch.reference import int8_network
+from airtouch.reference.networks import int8_network
 from gap8.made_networks import network as made
 from small_model import random_model
 

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from airtouch.reference.int8_network import KINDS, OPERATIONS
+from airtouch.reference.networks.int8_network import KINDS, OPERATIONS
 
 HEADER = Path(__file__).parents[2] / "gap8" / "kernels" / "layer_int8.h"
 

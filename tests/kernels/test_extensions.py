@@ -14,7 +14,7 @@ import pytest
 from airtouch.kernels import band_power, library
 
 ROOT = Path(__file__).parents[2]
-KERNELS, HOST, GAP8 = ROOT / "firmware/kernels", ROOT / "host/airtouch/kernels", ROOT / "gap8/kernels"
+KERNELS, HOST, GAP8 = ROOT / "firmware/kernels", ROOT / "host/airtouch/kernels/batch", ROOT / "gap8/kernels"
 PLAIN = "-DAIRTOUCH_PLAIN_C"
 FLAGS = ["-std=c11", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
 COMPILERS = {"cc": [shutil.which(os.environ.get("CC", "cc")) or ""], "clang": [shutil.which("clang") or ""],

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airtouch import kernels, logs
-from airtouch.detector.evaluation.dataset import collect
+from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper import network
 from airtouch.detector.paper.features import flight_features
 from airtouch.errors import AirTouchError
 from airtouch.kernels import network as c_network
-from airtouch.reference import int8_network
+from airtouch.reference.networks import int8_network
 from small_model import random_model, random_weights, random_windows
 
 WINDOWS = 5200

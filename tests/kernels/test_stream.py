@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from airtouch.errors import AirTouchError
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream import run_stream as run_c
-from airtouch.reference.int8_network import Int8Layer
-from airtouch.reference.stream_graph import StreamLayer
-from airtouch.reference.stream_int8 import StreamNetwork, run_stream
+from airtouch.reference.networks.int8_network import Int8Layer
+from airtouch.reference.networks.stream_graph import StreamLayer
+from airtouch.reference.networks.stream_int8 import StreamNetwork, run_stream
 
 
 def dense(rng, taps, channels, outputs, *, relu=True, sparsity=0.0, zero_point=-128) -> Int8Layer:

@@ -15,9 +15,9 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.library import lib
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.reference.edge_decoder import LOGITS, DecoderConfig, edge_decoder
-from airtouch.reference.int8_network import quantise
 from airtouch.reference.motion_channels import NAMES, motion_channels
-from airtouch.reference.stream_int8 import run_stream
+from airtouch.reference.networks.int8_network import quantise
+from airtouch.reference.networks.stream_int8 import run_stream
 
 ODD = st.sampled_from([0.0, -0.0, 1e-42, 1e30, -1e38, np.nan, np.inf, -np.inf, 65535.0, 65536.0, -1.0])
 

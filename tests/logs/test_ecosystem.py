@@ -10,7 +10,8 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.logs import command
 from airtouch.errors import AirTouchError
-from airtouch.logs import mapped, streams, ulog
+from airtouch.logs import streams
+from airtouch.logs.formats import mapped, ulog
 
 N, HZ = 1000, 250.0  #: samples of the IMU
 T = np.arange(N) / HZ

@@ -13,7 +13,8 @@ from airtouch import logs
 from airtouch.cli import main
 from airtouch.crazyflie.recorder import recover
 from airtouch.errors import AirTouchError, shown
-from airtouch.logs import clock, public
+from airtouch.logs import public
+from airtouch.logs.checks import clock
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import FlightLog
 from log_fuzzing.hostile import HOSTILE, table, usd
@@ -253,7 +254,7 @@ def test_parquet_columns_that_are_no_numbers_are_refused_not_guessed():
 
 
 def test_parquet_is_measured_before_it_is_unpacked(monkeypatch):
-    monkeypatch.setattr("airtouch.logs.parquet.LARGEST_BYTES", 1 << 20)
+    monkeypatch.setattr("airtouch.logs.formats.parquet.LARGEST_BYTES", 1 << 20)
     with pytest.raises(AirTouchError, match="100000 rows of 2 columns are more than 1 GiB; split the log"):
         parse(HOSTILE["constant Parquet"](100_000), "made")
     footer = parquet(motion(40, 0.01, 0))

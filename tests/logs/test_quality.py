@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch import logs
-from airtouch.logs.clock import lost_samples, true_period
+from airtouch.logs.checks.clock import lost_samples, true_period
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 
 

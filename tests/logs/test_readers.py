@@ -13,8 +13,8 @@ from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM
+from airtouch.logs.formats.thrust_stand import read_thrust_stand
 from airtouch.logs.quaternion import rotation
-from airtouch.logs.thrust_stand import read_thrust_stand
 
 LEVEL = 3 << 30  # compressed quaternion 0, 0, 0, 1
 LSB = math.radians(4000 / 65536)

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.checks.readings import LARGEST, checked
 from airtouch.logs.flight_log import FlightLog
-from airtouch.logs.readings import LARGEST, checked
 
 
 def log(**columns):

@@ -13,9 +13,9 @@ from hypothesis.extra.numpy import arrays
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
-from airtouch.logs import canonical, parquet
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import COLUMNS, FlightLog
+from airtouch.logs.formats import canonical, parquet
 
 NAMES = st.lists(st.sampled_from([*COLUMNS, "extra", "my column"]), min_size=1, max_size=6, unique=True)
 LARGEST = float(np.finfo(np.float32).max)  # more than that is no reading

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.paper_figures import (
     components,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.reference.int8_network import Int8Layer, Int8Network, multiplications, rolling_multiplications
+from airtouch.reference.networks.int8_network import Int8Layer, Int8Network, multiplications, rolling_multiplications
 
 NO_WEIGHTS = np.zeros(0, np.int8)
 

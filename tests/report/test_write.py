@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.evaluate import Result
 from airtouch.detector.evaluation.score import score_flight
 from airtouch.detector.evaluation.score_report import (

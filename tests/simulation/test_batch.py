@@ -13,7 +13,8 @@ from airtouch import logs
 from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
 from airtouch.logs import true_edges
-from airtouch.simulation import batch, cluster, flight, scenario, store
+from airtouch.simulation import batch, flight, scenario
+from airtouch.simulation.workers import cluster, store
 
 QUICK = """
 name = "quick"

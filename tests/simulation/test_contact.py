@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from airtouch.simulation import contact
 from airtouch.simulation import signals as at
+from airtouch.simulation.body import contact
 from airtouch.simulation.plant import from_vehicle
 
 

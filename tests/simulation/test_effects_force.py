@@ -9,7 +9,7 @@ from scipy.signal import welch
 from airtouch.logs.flight_log import PWM
 from airtouch.simulation import effects, replay, scenario
 from airtouch.simulation import signals as at
-from airtouch.simulation.effects.ground_effect import thrust_ratio
+from airtouch.simulation.effects.air.ground_effect import thrust_ratio
 
 MASS, GRAVITY = 0.0362, 9.81
 

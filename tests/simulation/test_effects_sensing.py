@@ -6,9 +6,10 @@ from scipy.signal import welch
 
 from airtouch.logs import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM
-from airtouch.simulation import filters, flight, radio, scenario
+from airtouch.simulation import flight, scenario
 from airtouch.simulation.firmware import controller
 from airtouch.simulation.plant import from_vehicle
+from airtouch.simulation.sensors import filters, radio
 
 SWEEP = """
 name = "sweep"

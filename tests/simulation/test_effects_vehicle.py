@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from airtouch.logs.flight_log import PWM, FlightLog
-from airtouch.simulation import battery, effects, replay
+from airtouch.simulation import effects, replay
+from airtouch.simulation.body import battery
 from airtouch.simulation.firmware import battery_compensation
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import from_vehicle

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation.expressions import draw, evaluate
+from airtouch.simulation.flight_plan.expressions import draw, evaluate
 
 VALUES = {"a": 3.0, "height": 0.04}
 

@@ -4,7 +4,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from airtouch.simulation.in_order import in_order
+from airtouch.simulation.workers.in_order import in_order
 
 
 def test_results_come_in_the_order_of_the_items():

@@ -8,8 +8,9 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import true_edges
-from airtouch.simulation import effects, flight, ranging, scenario, setpoint
-from airtouch.simulation.firmware import battery_compensation, controller, settings
+from airtouch.simulation import effects, flight, scenario
+from airtouch.simulation.firmware import battery_compensation, controller, setpoint, settings
+from airtouch.simulation.sensors import ranging
 from airtouch.simulation.stepper import Stepper
 
 PLATFORM = """

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.simulation.multi_ranger import DIRECTIONS_RAD, wall_distance
+from airtouch.simulation.sensors.multi_ranger import DIRECTIONS_RAD, wall_distance
 
 shapely = pytest.importorskip("shapely", reason="the extra 'map'")
 ROOM = np.array([-1.5, 2.5, -3.0, 1.0])  # x0, x1, y0, y1

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from airtouch.simulation import rigid_body
+from airtouch.simulation.body import rigid_body
+from airtouch.simulation.body.rotation import as_matrix, euler, from_euler, matrix, rotate, rotate_back
 from airtouch.simulation.plant import from_vehicle, hover_speed
-from airtouch.simulation.rotation import as_matrix, euler, from_euler, matrix, rotate, rotate_back
 
 
 @pytest.fixture

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.simulation import effects, replay, rigid_body
+from airtouch.simulation import effects, replay
 from airtouch.simulation import signals as at
+from airtouch.simulation.body import rigid_body
+from airtouch.simulation.body.rotation import rotate_back
 from airtouch.simulation.plant import from_vehicle, hover_speed
-from airtouch.simulation.rotation import rotate_back
 
 STEP_S, FLOWN_S = 0.002, 2.0
 ORDER = [1, 2, 3, 0]  #: RotorPy's rotors front left, front right, rear right, rear left in our order

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
-from airtouch.simulation import log_row, loop, scenario
+from airtouch.simulation import loop, scenario
 from airtouch.simulation.flight import choose
+from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
 
 

@@ -10,8 +10,9 @@ from scipy.signal import butter, lfilter
 from airtouch import logs
 from airtouch import vehicle as vehicles
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
-from airtouch.logs.thrust_stand import read_thrust_stand
-from airtouch.simulation import effects, motors, replay
+from airtouch.logs.formats.thrust_stand import read_thrust_stand
+from airtouch.simulation import effects, replay
+from airtouch.simulation.body import motors
 from airtouch.simulation.plant import from_vehicle
 
 GRAM_N = 9.81e-3

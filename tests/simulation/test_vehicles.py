@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.simulation import flight, scenario
-from airtouch.simulation.effects.ground_effect import thrust_ratio
+from airtouch.simulation.effects.air.ground_effect import thrust_ratio
 from airtouch.simulation.plant import from_vehicle, hover_pwm
 
 BUILT_IN = ("crazyflie-2.1", "crazyflie-2.1-flow", "crazyflie-2.1-brushless", "quadrotor-450")

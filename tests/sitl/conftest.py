@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from airtouch.sitl import Server
-from airtouch.sitl.packet import HIGH_LEVEL, LOG, Packet
+from airtouch.sitl.services.packet import HIGH_LEVEL, LOG, Packet
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from airtouch.sitl import Server, serve
-from airtouch.sitl.packet import MOST_DATA, Packet, parse
+from airtouch.sitl.services.packet import MOST_DATA, Packet, parse
 from patience import HANG_S
 
 ECHO = bytes([15 << 4 | 0x0C]) + b"are you there"

@@ -13,7 +13,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.sitl import Server
 from airtouch.sitl.drone import CRASHED, LOCKED, PRE_FLIGHT
-from airtouch.sitl.packet import COMMANDER, CONSOLE, GENERIC, LOCALIZATION, PLATFORM, SUPERVISOR
+from airtouch.sitl.services.packet import COMMANDER, CONSOLE, GENERIC, LOCALIZATION, PLATFORM, SUPERVISOR
 
 HOVER, POSITION, VELOCITY, Z_DISTANCE, MANUAL, STOP = 10, 7, 8, 9, 11, 0
 QUIET = {"without": ["gust"]}

@@ -8,7 +8,7 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.sitl.faults import Fault, Line, parse
-from airtouch.sitl.packet import CONSOLE, LOG, PARAM, Packet
+from airtouch.sitl.services.packet import CONSOLE, LOG, PARAM, Packet
 from sitl.clients import connected, log_block
 
 pytest.importorskip("cflib")

@@ -13,10 +13,10 @@ import pytest
 from airtouch.kernels.app_core import PARAM_TYPES
 from airtouch.logs.quaternion import decompress
 from airtouch.sitl import app
-from airtouch.sitl.log_service import LENGTHS, encode
-from airtouch.sitl.packet import LOG, MEMORY, PARAM
-from airtouch.sitl.toc import Item, Toc
-from airtouch.sitl.variables import compress
+from airtouch.sitl.services.log_service import LENGTHS, encode
+from airtouch.sitl.services.packet import LOG, MEMORY, PARAM
+from airtouch.sitl.services.toc import Item, Toc
+from airtouch.sitl.services.variables import compress
 
 CREATE, APPEND, DELETE, START, STOP, RESET = 6, 7, 2, 3, 4, 5
 APP = Path(__file__).parents[2] / "firmware/app/src/airtouch_app.c"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.twin import channels as ch
+from airtouch.twin.recorded import channels as ch
 from tools import edge_readings
 from twin_courses import made_course
 

@@ -6,7 +6,7 @@ import pytest
 
 from airtouch import logs
 from airtouch.detector import best
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.errors import AirTouchError
 from airtouch.twin import adapt

@@ -7,7 +7,7 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import Diverged, fly
-from airtouch.twin import missions
+from airtouch.twin.recorded import missions
 from twin_courses import PLAIN, made_course
 
 

@@ -11,7 +11,7 @@ from airtouch import logs
 from airtouch import vehicle as vehicles
 from airtouch.cli import airtouch
 from airtouch.detector import best
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
@@ -52,8 +52,9 @@ def test_command_trains_says_and_goes_on(made, quick, tmp_path, monkeypatch):
     twin = tmp_path / "twin"
     twin.mkdir()
     from airtouch import vehicle
-    from airtouch.twin import files, levers
-    from airtouch.twin.course import course
+    from airtouch.twin import files
+    from airtouch.twin.fitting import levers
+    from airtouch.twin.recorded.course import course
     craft = vehicle.load()
     files.write(twin, craft, (), levers.starts(()), [course(log) for _, log, _ in made[:5]], PLAIN)
     asked = ["adapt", str(folder), "--twin", str(twin), "--out", str(tmp_path / "mine.npz")]
@@ -103,8 +104,8 @@ def test_flights_without_acceleration_train_a_detector_without(made, quick, tmp_
 
 @pytest.mark.slow
 def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(made, quick, tmp_path, monkeypatch):
-    from airtouch.cli.progress import Bar
-    from airtouch.twin import calibrate, edge_fit
+    from airtouch.cli.shared.progress import Bar
+    from airtouch.twin.fitting import calibrate, edge_fit
     monkeypatch.setattr(calibrate, "ROUNDS", 1)
     monkeypatch.setattr(calibrate, "BATCH", 40)
     flights, work = flights_of(made, 5), tmp_path / "work"

@@ -11,8 +11,9 @@ from airtouch.cli import airtouch
 from airtouch.logs.flight_log import FlightLog
 from airtouch.report import twin_report
 from airtouch.simulation import batch, scenario
-from airtouch.twin import compare, edge_fit
-from airtouch.twin.course import course
+from airtouch.twin.comparison import compare
+from airtouch.twin.fitting import edge_fit
+from airtouch.twin.recorded.course import course
 from skips import needs
 
 pytestmark = needs("sklearn")

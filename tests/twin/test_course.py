@@ -9,9 +9,9 @@ import pytest
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import VELOCITY, FlightLog
-from airtouch.simulation import setpoint
-from airtouch.twin import missions
-from airtouch.twin.course import PHASES, course, one_vehicle
+from airtouch.simulation.firmware import setpoint
+from airtouch.twin.recorded import missions
+from airtouch.twin.recorded.course import PHASES, course, one_vehicle
 from twin_courses import made_course
 
 

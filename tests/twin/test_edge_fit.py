@@ -7,9 +7,9 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.flight import Diverged
-from airtouch.twin import edge_fit, fit, fly, levers
-from airtouch.twin.course import course
-from airtouch.twin.features import features
+from airtouch.twin.fitting import edge_fit, fit, fly, levers
+from airtouch.twin.recorded.course import course
+from airtouch.twin.recorded.features import features
 from twin_courses import made_course
 
 FIXED = {"gust": {"rms": 0.05}, "rotor_drag": {}, "motor_noise": {"rms": 0.005, "time": 0.8, "fast": 0.005}}

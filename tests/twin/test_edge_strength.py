@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.twin import edge_strength, missions, overlay
-from airtouch.twin.features import height_class
+from airtouch.twin import edge_strength, overlay
+from airtouch.twin.recorded import missions
+from airtouch.twin.recorded.features import height_class
 from twin_courses import PLAIN, made_course
 
 

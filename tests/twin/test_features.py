@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import csd, welch
 
-from airtouch.twin import channels as ch
-from airtouch.twin.channels import channels
-from airtouch.twin.course import course
-from airtouch.twin.features import BANDS_HZ, BINS_S, CLASSES, LENGTH, PAIRS, features, height_class, names
+from airtouch.twin.recorded import channels as ch
+from airtouch.twin.recorded.channels import channels
+from airtouch.twin.recorded.course import course
+from airtouch.twin.recorded.features import BANDS_HZ, BINS_S, CLASSES, LENGTH, PAIRS, features, height_class, names
 
 NAMES = [f.name for f in names()]
 

@@ -7,9 +7,9 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.flight import Diverged
-from airtouch.twin import fit, fly, levers
-from airtouch.twin.course import course
-from airtouch.twin.features import features, names
+from airtouch.twin.fitting import fit, fly, levers
+from airtouch.twin.recorded.course import course
+from airtouch.twin.recorded.features import features, names
 from twin_courses import made_course
 
 FIXED = {"gust": {"rms": 0.1}, "rotor_drag": {}}

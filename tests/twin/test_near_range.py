@@ -7,9 +7,9 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation.flight import Diverged, fly
-from airtouch.twin import missions, near_range
-from airtouch.twin.channels import channels
-from airtouch.twin.course import course
+from airtouch.twin.recorded import missions, near_range
+from airtouch.twin.recorded.channels import channels
+from airtouch.twin.recorded.course import course
 from twin_courses import PLAIN, made_course
 
 TOP = 0.74

@@ -5,8 +5,9 @@ import pytest
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import scenario
-from airtouch.twin import missions, overlay
-from airtouch.twin.course import course
+from airtouch.twin import overlay
+from airtouch.twin.recorded import missions
+from airtouch.twin.recorded.course import course
 from twin_courses import PLAIN, made_course
 
 

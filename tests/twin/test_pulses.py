@@ -7,9 +7,10 @@ import pytest
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
-from airtouch.simulation import mission, setpoint, world
-from airtouch.twin import missions, pulses
-from airtouch.twin.course import course
+from airtouch.simulation.firmware import setpoint
+from airtouch.simulation.flight_plan import mission, world
+from airtouch.twin.recorded import missions, pulses
+from airtouch.twin.recorded.course import course
 from twin_courses import PLAIN, made_course
 
 

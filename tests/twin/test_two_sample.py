@@ -7,9 +7,9 @@ import pytest
 from scipy.stats import mannwhitneyu
 
 from airtouch.errors import AirTouchError
-from airtouch.twin.channels import channels
-from airtouch.twin.course import course
-from airtouch.twin.two_sample import area, area_within, number_names, two_sample, windows
+from airtouch.twin.comparison.two_sample import area, area_within, number_names, two_sample, windows
+from airtouch.twin.recorded.channels import channels
+from airtouch.twin.recorded.course import course
 from skips import needs
 from twin_courses import PLAIN, made_course
 

@@ -9,8 +9,8 @@ from airtouch import vehicle as vehicles
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
+from airtouch.simulation.flight_plan.world import top_at
 from airtouch.simulation.scenario import Scenario, draw_flight
-from airtouch.simulation.world import top_at
 from airtouch.vehicle import Vehicle
 from tools.emulate.flight import BOOT_S, Flown, fly
 from tools.emulate.plant import STEP_S

@@ -13,7 +13,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import EDGES
-from airtouch.simulation import loop, setpoint
+from airtouch.simulation import loop
+from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.vehicle import Vehicle

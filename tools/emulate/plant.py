@@ -5,8 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
-from airtouch.simulation import battery, imu, loop, ranging
+from airtouch.simulation import loop
+from airtouch.simulation.body import battery
 from airtouch.simulation.scenario import FlightPlan
+from airtouch.simulation.sensors import imu, ranging
 from airtouch.simulation.stepper import Stepper
 from airtouch.vehicle import Vehicle
 

@@ -19,7 +19,7 @@ from airtouch.detector import best
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.logs import read
 from airtouch.logs.flight_log import GYRO, PWM
-from airtouch.reference.int8_network import quantise
+from airtouch.reference.networks.int8_network import quantise
 from tools.emulator import budget
 from tools.emulator.build import compilers
 from tools.emulator.flight_code import KERNELS, Cost, FlightCode, compile_flight_code, made_flight, samples

@@ -16,10 +16,10 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli import airtouch
 from airtouch.errors import AirTouchError
-from airtouch.logs import canonical
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import FlightLog
-from airtouch.logs.thrust_stand import read_thrust_stand
+from airtouch.logs.formats import canonical
+from airtouch.logs.formats.thrust_stand import read_thrust_stand
 
 importlib.import_module("scipy.signal")  # its import counts for no input
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import click
 
-from airtouch.cli import scores as show
-from airtouch.cli.flights import find_flights
+from airtouch.cli.shared import scores as show
+from airtouch.cli.shared.flights import find_flights
 from airtouch.detector import registry
-from airtouch.detector.evaluation import demo_flights, evaluate
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import demo_flights
 from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need

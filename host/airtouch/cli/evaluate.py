@@ -5,9 +5,10 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli import scores as show
+from airtouch.cli.shared import scores as show
 from airtouch.detector import registry
-from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
 

@@ -13,7 +13,7 @@ import click
 from airtouch import logs
 from airtouch.cli import Suggesting
 from airtouch.errors import AirTouchError
-from airtouch.logs.rosbag import is_bag
+from airtouch.logs.formats.rosbag import is_bag
 
 ENDINGS = (".csv", ".csv.gz", ".parquet")
 RERUN = ".rrd"  #: ending of Rerun files, which are only written
@@ -100,8 +100,8 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
       airtouch logs convert log00 log01 --out converted --rate 100
     """
     from airtouch.extras import need
-    from airtouch.logs import canonical, mapped, rerun_file
     from airtouch.logs.files import write_bytes
+    from airtouch.logs.formats import canonical, mapped, rerun_file
 
     if plain and ending != "csv":
         raise AirTouchError("--plain is for --format csv")

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from airtouch import logs
-from airtouch.detector.evaluation import dataset
+from airtouch.detector.evaluation.data import dataset
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 

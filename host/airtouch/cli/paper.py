@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.flights import find_flights
+from airtouch.cli.shared.flights import find_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 

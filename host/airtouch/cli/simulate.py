@@ -68,9 +68,10 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     reported with their number and never written; the exit code is then 1.
     """
     from airtouch import vehicle as vehicles
-    from airtouch.simulation import batch, cluster, effects, local, store
+    from airtouch.simulation import batch, effects
     from airtouch.simulation import scenario as scenarios
     from airtouch.simulation.flight import choose, refuse_off
+    from airtouch.simulation.workers import cluster, local, store
 
     if flights < 1 or seed < 0 or (workers is not None and workers < 1):
         raise AirTouchError("--flights and --workers must be 1 or more, --seed 0 or more")
@@ -118,7 +119,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
 def _write(results, count: int, out: Path, name: str) -> None:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from airtouch.simulation import store
+    from airtouch.simulation.workers import store
 
     with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()) as bar:
         task = bar.add_task("flights", total=count)

@@ -15,12 +15,13 @@ from threading import Event
 from typing import Any
 
 from airtouch import __version__, logs
-from airtouch.crazyflie import blocks, checks, recorder
+from airtouch.crazyflie import checks, recorder
 from airtouch.crazyflie.autopilot import Autopilot, Origin
-from airtouch.crazyflie.drone import Drone, drain
+from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.drone import Drone, drain
+from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.flight import LINK_TIMEOUT_S, Flight
 from airtouch.crazyflie.guard import guarding
-from airtouch.crazyflie.intake import Intake
 from airtouch.crazyflie.mission import LANDING_MPS, Mission
 from airtouch.crazyflie.recorder import LEAST_FREE_BYTES, Recorder
 from airtouch.errors import AirTouchError

@@ -12,11 +12,11 @@ from typing import Protocol
 
 from airtouch.crazyflie.autopilot import Autopilot, Command
 from airtouch.crazyflie.checks import CONFLICTS, LOWEST_V
-from airtouch.crazyflie.drone import drain
-from airtouch.crazyflie.intake import Intake
-from airtouch.crazyflie.log_blocks import Sample
+from airtouch.crazyflie.connection.drone import drain
+from airtouch.crazyflie.connection.intake import Intake
+from airtouch.crazyflie.connection.log_blocks import Sample
+from airtouch.crazyflie.connection.ticks import Restarted
 from airtouch.crazyflie.recorder import Recorder
-from airtouch.crazyflie.ticks import Restarted
 from airtouch.errors import AirTouchError
 
 TURN_S = 0.02  #: s, period of the loop

@@ -54,7 +54,7 @@ def land(uri: str, height_m: float, seconds: float, patience_s: float = PATIENCE
     """Send land commands until the drone answers. False if it does not for `patience_s`."""
     from cflib.crtp.crtpstack import CRTPPacket
 
-    from airtouch.crazyflie.link import cflib_or_error
+    from airtouch.crazyflie.connection.link import cflib_or_error
 
     crtp = cflib_or_error().crtp
     deadline = time.monotonic() + patience_s
@@ -85,7 +85,7 @@ def _answered(link: Any) -> bool:
 
 def main() -> None:
     """Wait for the end of standard input, then land. The modules for landing are imported before."""
-    from airtouch.crazyflie.link import cflib_or_error
+    from airtouch.crazyflie.connection.link import cflib_or_error
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

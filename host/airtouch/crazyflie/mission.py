@@ -13,8 +13,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError, nearest
 from airtouch.simulation import scenario
-from airtouch.simulation import setpoint as c
-from airtouch.simulation.mission import RATE_HZ
+from airtouch.simulation.firmware import setpoint as c
+from airtouch.simulation.flight_plan.mission import RATE_HZ
 
 SHORTEST_S = 0.05  #: s; a shorter stop is a corner, no hover
 LANDING_MPS = 0.3

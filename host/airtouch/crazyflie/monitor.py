@@ -8,14 +8,14 @@ from threading import Event
 
 import numpy as np
 
-from airtouch.crazyflie import app_log, blocks
-from airtouch.crazyflie.board import Board, Felt, Link
-from airtouch.crazyflie.drone import Drone, drain
+from airtouch.crazyflie.connection import app_log, blocks
+from airtouch.crazyflie.connection.drone import Drone, drain
+from airtouch.crazyflie.connection.intake import Intake
+from airtouch.crazyflie.connection.log_blocks import Sample
+from airtouch.crazyflie.connection.ticks import Restarted
 from airtouch.crazyflie.flight import FORGOTTEN_S
-from airtouch.crazyflie.host_detector import HostDetector, with_gaps
-from airtouch.crazyflie.intake import Intake
-from airtouch.crazyflie.log_blocks import Sample
-from airtouch.crazyflie.ticks import Restarted
+from airtouch.crazyflie.view.board import Board, Felt, Link
+from airtouch.crazyflie.view.host_detector import HostDetector, with_gaps
 from airtouch.errors import AirTouchError
 
 TURN_S = 0.05

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from airtouch import logs
-from airtouch.crazyflie.ticks import gaps, in_order
+from airtouch.crazyflie.connection.ticks import gaps, in_order
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 

@@ -6,11 +6,11 @@ from threading import Event
 
 import numpy as np
 
-from airtouch.crazyflie.board import Board, Felt
-from airtouch.crazyflie.host_detector import HostDetector
+from airtouch.crazyflie.view.board import Board, Felt
+from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.logs import airborne
 from airtouch.logs.flight_log import FlightLog

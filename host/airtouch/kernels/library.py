@@ -12,7 +12,7 @@ REMEDY = "run `make setup` in the checkout, or `pip install .` where a C compile
 
 
 def _declarations(folder: Path) -> str:
-    """The shared structs, then every *_batch.h, without preprocessor lines."""
+    """The shared structs, then every *_batch.h of the folder `batch`, without preprocessor lines."""
     headers = [folder / "kernel_types.h", folder / "app_types.h", *sorted(folder.glob("*_batch.h"))]
     lines = [line for header in headers for line in header.read_text(encoding="utf-8").splitlines()]
     return "\n".join(line for line in lines if not line.lstrip().startswith("#"))
@@ -29,7 +29,7 @@ def _open(ffi: FFI) -> Any:
 
 
 ffi = FFI()
-ffi.cdef(_declarations(Path(__file__).parent))
+ffi.cdef(_declarations(Path(__file__).parent / "batch"))
 lib = _open(ffi)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
-from airtouch.reference.int8_network import KINDS, Int8Layer, Int8Network, runs_sparse, sparse_blocks
-from airtouch.reference.stream_int8 import StreamNetwork
+from airtouch.reference.networks.int8_network import KINDS, Int8Layer, Int8Network, runs_sparse, sparse_blocks
+from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 
 class Model(Protocol):

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.network import Model, flat_layers, pointer
-from airtouch.reference.int8_network import Int8Network, quantise
+from airtouch.reference.networks.int8_network import Int8Network, quantise
 
 
 class ScaledModel(Model, Protocol):

@@ -7,13 +7,13 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.network import checked, flat_layers, pointer
-from airtouch.reference.stream_int8 import StreamNetwork
+from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 
 def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
     """int8 head outputs (ceil(n / stride), outputs) of int8 samples (n, channels).
 
-    Reference: `airtouch.reference.stream_int8.run_stream`. Raises AirTouchError for samples of another
+    Reference: `airtouch.reference.networks.stream_int8.run_stream`. Raises AirTouchError for samples of another
     width and for layers that do not fit each other.
     """
     x = np.ascontiguousarray(quantised, dtype=np.int8)

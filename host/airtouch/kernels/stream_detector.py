@@ -11,7 +11,7 @@ from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.stream import arena_bytes, flat_stream
 from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
 from airtouch.reference.motion_channels import NAMES, MotionConfig
-from airtouch.reference.stream_int8 import StreamNetwork
+from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 #: what is said of a network that the detector cannot run
 OTHER_NETWORK = f"stream detector: the network must take {len(NAMES)} channels and give {len(LOGITS)} logits"

@@ -16,7 +16,7 @@ from airtouch.kernels.stream_detector import (
 )
 from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.motion_channels import MotionConfig
-from airtouch.reference.stream_int8 import StreamNetwork
+from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 
 class StreamSession:

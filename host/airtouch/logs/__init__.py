@@ -1,10 +1,10 @@
 """Flight logs: schema, readers, writers, true edges, phases of a flight, and quality checks."""
 
+from airtouch.logs.checks.quality import Quality, check, summary
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.files import read, write
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
-from airtouch.logs.quality import Quality, check, summary
 from airtouch.logs.resample import resample
 from airtouch.logs.segments import Segment, segments
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.logs.clock import sample_period
+from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
 

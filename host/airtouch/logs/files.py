@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from airtouch.errors import AirTouchError, shown
-from airtouch.logs import authors, canonical, crazypad, imrclab, usd, usd_old
+from airtouch.logs.checks.readings import checked
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
-from airtouch.logs.readings import checked
+from airtouch.logs.formats import authors, canonical, crazypad, imrclab, usd, usd_old
 from airtouch.logs.table import Sheet, names_of, sheet
 
 PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
@@ -23,7 +23,7 @@ def read(path: str | Path) -> FlightLog:
     for a file that cannot be read.
     """
     if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
-        from airtouch.logs import rosbag
+        from airtouch.logs.formats import rosbag
 
         if rosbag.is_bag(path):
             return checked(rosbag.read(path))
@@ -63,7 +63,7 @@ def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
     if name.endswith((".csv", ".csv.gz")):
         data = canonical.to_bytes(log, compress=name.endswith(".gz"))
     elif name.endswith(".parquet"):
-        from airtouch.logs import parquet
+        from airtouch.logs.formats import parquet
 
         data = parquet.to_bytes(log)
     else:
@@ -116,11 +116,11 @@ def _by_content(data: bytes, source: str) -> FlightLog:
     if not data or data.isspace():
         raise AirTouchError(f"{source}: the file is empty; log the flight again or leave it out")
     if data[:4] == b"PAR1":
-        from airtouch.logs import parquet
+        from airtouch.logs.formats import parquet
 
         return parquet.read(data, source)
     if data[:7] == b"ULog\x01\x12\x35":
-        from airtouch.logs import ulog
+        from airtouch.logs.formats import ulog
 
         return ulog.read(data, source)
     if data[0] == usd.MAGIC:

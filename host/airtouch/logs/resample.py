@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.clock import FASTEST_S, SLOWEST_S, regular_time, rising, true_period
+from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
 LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN

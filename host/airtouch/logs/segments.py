@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.logs.clock import sample_period
+from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import VELOCITY, FlightLog
 from airtouch.logs.in_flight import airborne

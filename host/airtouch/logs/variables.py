@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.logs.authors import GRAVITY, GYRO_LSB, range_m
 from airtouch.logs.flight_log import (
     ACC,
     ACC_WORLD,
@@ -23,6 +22,7 @@ from airtouch.logs.flight_log import (
     RPM,
     VELOCITY,
 )
+from airtouch.logs.formats.authors import GRAVITY, GYRO_LSB, range_m
 from airtouch.logs.quaternion import decompress, euler, rotation, to_body
 
 _DEGREE = np.pi / 180.0

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from airtouch.detector.best import free_air
-from airtouch.detector.evaluation import ablation, crossval, dataset, folds
+from airtouch.detector.evaluation import ablation, crossval
+from airtouch.detector.evaluation.data import dataset, folds
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, get
 from airtouch.paper_figures.figure import Job, Missing

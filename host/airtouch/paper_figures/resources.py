@@ -10,7 +10,7 @@ from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import REPRODUCED, SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.parameters import DEFAULT
-from airtouch.reference.int8_network import multiplications
+from airtouch.reference.networks.int8_network import multiplications
 from airtouch.vision import teed, weights
 from airtouch.vision.camera import Camera
 

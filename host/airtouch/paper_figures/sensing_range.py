@@ -11,7 +11,7 @@ from airtouch.paper_figures import pictures, words
 from airtouch.paper_figures.claims import SAID
 from airtouch.paper_figures.figure import Figure, Job
 from airtouch.simulation import effects
-from airtouch.simulation.effects.ground_effect import faded, thrust_ratio
+from airtouch.simulation.effects.air.ground_effect import faded, thrust_ratio
 
 #: rms of the vertical force that thrust does not explain, as a fraction of the weight: 0.5 to 0.7 % in the authors'
 #: recorded flights at 100 Hz; a larger drone is assumed to know its thrust equally well

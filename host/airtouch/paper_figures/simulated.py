@@ -10,7 +10,7 @@ import numpy as np
 
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge

@@ -9,7 +9,7 @@ from airtouch.reference.feature_window import streaming_z_score, z_score_window
 from airtouch.reference.finite import hold_finite
 from airtouch.reference.fr_cfar import fr_cfar, threshold_factor
 from airtouch.reference.motion_channels import MotionConfig, motion_channels
-from airtouch.reference.stream_int8 import StreamNetwork, run_stream
+from airtouch.reference.networks.stream_int8 import StreamNetwork, run_stream
 
 __all__ = [
     "DecoderConfig",

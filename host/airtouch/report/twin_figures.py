@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from airtouch.report.figures import FOUND, MUTED, TRUE, png, style
-from airtouch.twin import channels as ch
-from airtouch.twin.channels import NAMES, RATE_HZ, UNITS
-from airtouch.twin.curves import BEFORE, BEHIND, AroundEdges, Signals
-from airtouch.twin.features import BANDS_HZ, CLASSES
+from airtouch.twin.comparison.curves import BEFORE, BEHIND, AroundEdges, Signals
+from airtouch.twin.recorded import channels as ch
+from airtouch.twin.recorded.channels import NAMES, RATE_HZ, UNITS
+from airtouch.twin.recorded.features import BANDS_HZ, CLASSES
 
 REAL, TWIN = TRUE, FOUND
 

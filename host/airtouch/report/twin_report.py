@@ -11,11 +11,11 @@ from airtouch import __version__
 from airtouch.logs.files import write_bytes
 from airtouch.report import twin_figures
 from airtouch.report.write import embed
-from airtouch.twin.compare import Comparison
-from airtouch.twin.curves import Curves
-from airtouch.twin.flights import Recorded
-from airtouch.twin.levers import Lever
-from airtouch.twin.words import answer, gap_row
+from airtouch.twin.comparison.compare import Comparison
+from airtouch.twin.comparison.curves import Curves
+from airtouch.twin.comparison.words import answer, gap_row
+from airtouch.twin.fitting.levers import Lever
+from airtouch.twin.recorded.flights import Recorded
 
 MOST_GAPS = 30
 

@@ -11,8 +11,8 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario as scenarios
 from airtouch.simulation.flight import Chosen, Diverged, fly
-from airtouch.simulation.in_order import in_order
 from airtouch.simulation.scenario import Scenario
+from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import Vehicle
 
 AHEAD = 4  #: flights in work or waiting, for each worker

@@ -9,10 +9,12 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.simulation import effects as registry
-from airtouch.simulation import log_row, loop, setpoint
+from airtouch.simulation import loop
 from airtouch.simulation.effects import Active
-from airtouch.simulation.radio import received, rounded
+from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
+from airtouch.simulation.sensors import log_row
+from airtouch.simulation.sensors.radio import received, rounded
 from airtouch.simulation.stepper import Stepper, prepare
 from airtouch.vehicle import Vehicle
 

@@ -12,13 +12,15 @@ import numpy as np
 from numba import float64, from_dtype, int64, types
 from numba.core.typing.typeof import typeof_impl
 
-from airtouch.simulation import autopilot, battery, forces, imu, log_row, motors, multi_ranger, ranging, rigid_body
 from airtouch.simulation import signals as at
+from airtouch.simulation.body import battery, forces, motors, rigid_body
 from airtouch.simulation.compiled import inlined, jit
 from airtouch.simulation.effects.slots import EFFECT_SLOTS, EffectSlots
+from airtouch.simulation.firmware import autopilot
+from airtouch.simulation.flight_plan.world import WORLD, World
 from airtouch.simulation.plant import PLANT
+from airtouch.simulation.sensors import imu, log_row, multi_ranger, ranging
 from airtouch.simulation.state import STATE
-from airtouch.simulation.world import WORLD, World
 
 LOG_STEPS = 5  #: physics steps a logged row
 OK, NOT_FINITE, UPSET, STRUCK, LOST = range(5)  #: how a flight ended

@@ -13,15 +13,16 @@ import numpy as np
 from numba import float64, njit, types
 
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
-from airtouch.simulation import battery, filters, motors, rigid_body
 from airtouch.simulation import signals as at
+from airtouch.simulation.body import battery, motors, rigid_body
+from airtouch.simulation.body.rotation import as_matrix
 from airtouch.simulation.effects import Active, slots
 from airtouch.simulation.effects.effect import MEMORY
 from airtouch.simulation.effects.slots import EFFECT_SLOTS, SLOTS
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import PLANT, hover_speed
 from airtouch.simulation.random_stream import stream
-from airtouch.simulation.rotation import as_matrix
+from airtouch.simulation.sensors import filters
 from airtouch.vehicle import Vehicle
 
 FAR_M = 10.0  #: height where none is known: out of ground effect

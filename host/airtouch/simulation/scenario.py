@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation import effects, mission, world
-from airtouch.simulation.expressions import draw
+from airtouch.simulation import effects
 from airtouch.simulation.firmware.settings import DEFAULT
+from airtouch.simulation.flight_plan import mission, world
+from airtouch.simulation.flight_plan.expressions import draw
 from airtouch.vehicle import RANGE_MODULES, Vehicle, check_firmware, numbers
 
 KEYS = {"name", "summary", "firmware", "range_module", "vehicle", "values", "world", "platform", "mission", "effects"}

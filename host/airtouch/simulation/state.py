@@ -9,12 +9,15 @@ import math
 import numpy as np
 from numba import from_dtype, types
 
-from airtouch.simulation import autopilot, battery, contact, forces, imu, motors, ranging, rigid_body, setpoint, world
+from airtouch.simulation.body import battery, contact, forces, motors, rigid_body
 from airtouch.simulation.compiled import jit
+from airtouch.simulation.firmware import autopilot, setpoint
+from airtouch.simulation.firmware.setpoint import ROW
+from airtouch.simulation.flight_plan import world
+from airtouch.simulation.flight_plan.world import WORLD
 from airtouch.simulation.plant import PLANT
 from airtouch.simulation.random_stream import STREAM, normal
-from airtouch.simulation.setpoint import ROW
-from airtouch.simulation.world import WORLD
+from airtouch.simulation.sensors import imu, ranging
 
 _F = np.float64
 DTYPE = np.dtype([

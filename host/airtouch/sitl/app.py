@@ -6,7 +6,7 @@ LOG and PARAM groups have the names and types of firmware/app/src/airtouch_app.c
 from collections.abc import Sequence
 
 from airtouch.kernels.app_core import PARAM_TYPES, AppCore, Gap8Core
-from airtouch.sitl.param_service import Parameter
+from airtouch.sitl.services.param_service import Parameter
 from airtouch.vehicle import Vehicle
 
 GROUP = "airtouch"

@@ -10,7 +10,7 @@ import struct
 
 import numpy as np
 
-from airtouch.simulation import setpoint as c
+from airtouch.simulation.firmware import setpoint as c
 from airtouch.sitl.planner import Planner
 
 PERIOD_S = 0.01

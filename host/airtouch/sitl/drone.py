@@ -5,9 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from airtouch.simulation import log_row, loop, setpoint
+from airtouch.simulation import loop
 from airtouch.simulation.effects import Active
+from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.scenario import FlightPlan
+from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
 from airtouch.sitl.app import App
 from airtouch.sitl.commander import PERIOD_S, Commander

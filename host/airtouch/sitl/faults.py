@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.sitl import packet as crtp
-from airtouch.sitl.packet import Packet, Peer
+from airtouch.sitl.services import packet as crtp
+from airtouch.sitl.services.packet import Packet, Peer
 
 KINDS = {"loss": "a share, as loss=0.3", "late": "a time, as late=50ms",
          "disconnect": "when and how long, as disconnect=3,5s", "gap8-reset": "when, as gap8-reset=3",

@@ -2,14 +2,14 @@
 
 import struct
 
-from airtouch.sitl import memory_service, variables
-from airtouch.sitl import packet as crtp
 from airtouch.sitl.app import GROUP
 from airtouch.sitl.drone import Drone
-from airtouch.sitl.log_service import LogService
-from airtouch.sitl.packet import Packet
-from airtouch.sitl.param_service import ParamService
-from airtouch.sitl.variables import START_OVER
+from airtouch.sitl.services import memory_service, variables
+from airtouch.sitl.services import packet as crtp
+from airtouch.sitl.services.log_service import LogService
+from airtouch.sitl.services.packet import Packet
+from airtouch.sitl.services.param_service import ParamService
+from airtouch.sitl.services.variables import START_OVER
 
 PROTOCOL = 12
 VERSION, DEVICE = b"2026.08 virtual", b"CF21"

@@ -19,12 +19,12 @@ from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.simulation import scenario as scenarios
 from airtouch.simulation.flight import Chosen, choose
-from airtouch.sitl import packet as crtp
 from airtouch.sitl.commander import PERIOD_S
 from airtouch.sitl.drone import Drone
 from airtouch.sitl.faults import LINE, Fault, Line, parse
 from airtouch.sitl.firmware import Firmware
 from airtouch.sitl.recorder import Recorder
+from airtouch.sitl.services import packet as crtp
 from airtouch.vehicle import Vehicle
 
 HOST, PORT = "127.0.0.1", 19850  #: address at which cflib searches for virtual drones

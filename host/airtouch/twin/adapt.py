@@ -16,8 +16,9 @@ import numpy as np
 
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
-from airtouch.detector.evaluation import evaluate, simulated, summary
-from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation import evaluate, summary
+from airtouch.detector.evaluation.data import simulated
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.shared import sensors
 from airtouch.detector.shared.training_set import flight_hash
@@ -247,7 +248,7 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
              progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
     """Flights that can be used, and the others with the reason. A speed that is not stated comes from the log."""
     from airtouch import logs
-    from airtouch.twin.course import course
+    from airtouch.twin.recorded.course import course
 
     usable, left_out = [], []
     for number, file in enumerate(files):

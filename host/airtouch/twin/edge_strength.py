@@ -13,9 +13,9 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.twin import overlay
-from airtouch.twin.course import course
-from airtouch.twin.features import BASELINE_S, height_class
 from airtouch.twin.overlay import RATE_HZ, Response
+from airtouch.twin.recorded.course import course
+from airtouch.twin.recorded.features import BASELINE_S, height_class
 
 KINDS = ("entry", "exit")
 BEHIND_S = 1.2  #: after an edge: what is compared

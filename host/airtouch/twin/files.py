@@ -11,10 +11,10 @@ import tomli_w
 from airtouch import vehicle as vehicles
 from airtouch.logs.files import write_bytes
 from airtouch.simulation import scenario
-from airtouch.twin import levers as lever_set
-from airtouch.twin import missions
-from airtouch.twin.course import Course
-from airtouch.twin.levers import Lever
+from airtouch.twin.fitting import levers as lever_set
+from airtouch.twin.fitting.levers import Lever
+from airtouch.twin.recorded import missions
+from airtouch.twin.recorded.course import Course
 from airtouch.vehicle import Vehicle
 
 VEHICLE, SCENARIO = "vehicle.toml", "scenario.toml"

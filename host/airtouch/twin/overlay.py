@@ -18,9 +18,9 @@ from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM, FlightLog
 from airtouch.reference.finite import PWM_MAX, hold_finite
 from airtouch.simulation import flight, scenario
 from airtouch.simulation.flight import Diverged
+from airtouch.simulation.flight_plan.world import World
 from airtouch.simulation.scenario import Scenario
-from airtouch.simulation.world import World
-from airtouch.twin.course import course
+from airtouch.twin.recorded.course import course
 from airtouch.vehicle import Vehicle
 
 COLUMNS = (*ACC_WORLD, *GYRO, *PWM)

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.detector import registry
 from airtouch.detector.evaluation import tuning
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, TOLERANCE_S, FlightScore, match, score_flight
 from airtouch.detector.trace import Detection
 from airtouch.vision import lines

@@ -20,9 +20,9 @@ from airtouch.detector.best.recipe import CHANNELS, STRIDE, Recipe
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.reference.edge_decoder import LOGITS
-from airtouch.reference.int8_network import quantise
 from airtouch.reference.motion_channels import NAMES
-from airtouch.reference.stream_int8 import run_stream
+from airtouch.reference.networks.int8_network import quantise
+from airtouch.reference.networks.stream_int8 import run_stream
 from made_flight import SMALL, made_flight
 
 

@@ -9,7 +9,7 @@ from airtouch import logs
 from airtouch.detector import best
 from airtouch.detector.best import free_air
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.shared import sensors, training_set
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog

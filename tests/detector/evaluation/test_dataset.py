@@ -2,7 +2,7 @@
 
 import pytest
 
-from airtouch.detector.evaluation.dataset import Condition, collect, read_manifest
+from airtouch.detector.evaluation.data.dataset import Condition, collect, read_manifest
 from airtouch.errors import AirTouchError
 
 HEADER = "file,use,fold,height,angle_deg,wind,speed_mps\n"

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from airtouch.detector.evaluation import demo_flights
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data import demo_flights
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.errors import AirTouchError
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from airtouch.detector.evaluation import folds
-from airtouch.detector.evaluation.dataset import Condition, FlightFile, collect, day_of
+from airtouch.detector.evaluation.data import folds
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile, collect, day_of
 from airtouch.errors import AirTouchError
 
 

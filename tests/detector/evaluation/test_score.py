@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore, match, over_platform, score_edges, score_flight
 from airtouch.detector.evaluation.summary import by_height, summarise
 from airtouch.detector.trace import Detection

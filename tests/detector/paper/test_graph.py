@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import correlate
 
 from airtouch.detector.paper.graph import CONV, DENSE, GRAPH, INPUT_SHAPE, LAYERS, MAX_POOL, OPERATIONS, Row, graph_of
-from airtouch.reference.int8_network import OPERATIONS as INT8
+from airtouch.reference.networks.int8_network import OPERATIONS as INT8
 from skips import needs
 
 

@@ -8,13 +8,13 @@ import pytest
 
 from airtouch import logs
 from airtouch.detector import paper
-from airtouch.detector.evaluation.dataset import collect
+from airtouch.detector.evaluation.data.dataset import collect
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper import normalisation, rolling
 from airtouch.detector.paper.features import feature_windows, flight_features
 from airtouch.errors import AirTouchError
 from airtouch.kernels.rolling import rolling_size
-from airtouch.reference import int8_network
+from airtouch.reference.networks import int8_network
 from detector.paper.test_training import made_flight
 
 

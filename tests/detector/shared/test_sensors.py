@@ -10,7 +10,7 @@ from airtouch import logs
 from airtouch.detector import best
 from airtouch.detector.best import batches, sensor_note
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.dataset import Condition, FlightFile
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import GYRO
@@ -102,7 +102,7 @@ def test_landings_and_take_offs_are_in_the_crops():
 
 @pytest.mark.parametrize("sensor", sensors.SENSORS)
 def test_sample_by_sample_is_the_same_as_at_once(sensor):
-    from airtouch.crazyflie.host_detector import HostDetector
+    from airtouch.crazyflie.view.host_detector import HostDetector
 
     log = sensors.without(made_flight(4, 1500), (sensor,))
     pieces = HostDetector(missing=sensors.missing(log))

@@ -7,9 +7,9 @@ from airtouch.detector.shared.c_source import float_literal, golden_header, gold
 from airtouch.detector.shared.vehicle_header import thrust_text
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
-from airtouch.reference.int8_network import quantise
 from airtouch.reference.motion_channels import MotionConfig
-from airtouch.reference.stream_int8 import StreamNetwork, run_stream
+from airtouch.reference.networks.int8_network import quantise
+from airtouch.reference.networks.stream_int8 import StreamNetwork, run_stream
 
 GOLDEN = 700  #: samples of the golden flight, more than the network looks back
 PREFIX = "AIRTOUCH_STREAM_GOLDEN"

@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from airtouch import logs
-from airtouch.detector.evaluation import dataset, evaluate
+from airtouch.detector.evaluation import evaluate
+from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
-from airtouch.logs.clock import sample_period
+from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
 
 

@@ -22,7 +22,7 @@ from airtouch.detector.shared import archive
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.reference.edge_decoder import DecoderConfig
-from airtouch.reference.stream_int8 import StreamNetwork
+from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 FORMAT = 1
 SHIPPED = "best.npz"

@@ -10,7 +10,7 @@ import numpy as np
 
 from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.outputs import OUTPUTS
-from airtouch.reference.stream_graph import StreamLayer, follow
+from airtouch.reference.networks.stream_graph import StreamLayer, follow
 
 if TYPE_CHECKING:
     import keras

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from airtouch.reference.stream_graph import StreamLayer, taps_of
+from airtouch.reference.networks.stream_graph import StreamLayer, taps_of
 
 if TYPE_CHECKING:
     import keras

@@ -8,7 +8,7 @@ from airtouch.detector.best.network import Weights, window_logits
 from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.shared.tensorflow import convert, read_weighted
-from airtouch.reference.stream_int8 import StreamNetwork, int8_layer
+from airtouch.reference.networks.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
 FEW = 5  #: windows of a flight; with fewer the two at its ends, on the ground, would be a large share

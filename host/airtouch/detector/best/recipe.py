@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from airtouch.detector.best.operations import CONV, HEAD
 from airtouch.reference.edge_decoder import LOGITS
 from airtouch.reference.motion_channels import NAMES, MotionConfig
-from airtouch.reference.stream_graph import StreamLayer, receptive_samples
+from airtouch.reference.networks.stream_graph import StreamLayer, receptive_samples
 
 CHANNELS = len(NAMES)  #: values a sample
 STRIDE = 2  #: samples between two rows that are computed: 50 Hz

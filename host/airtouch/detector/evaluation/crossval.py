@@ -10,8 +10,8 @@ from typing import Any
 
 from airtouch import __version__
 from airtouch.detector.evaluation import evaluate
-from airtouch.detector.evaluation.dataset import FlightFile
-from airtouch.detector.evaluation.folds import Folds, by_fold
+from airtouch.detector.evaluation.data.dataset import FlightFile
+from airtouch.detector.evaluation.data.folds import Folds, by_fold
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, Filtered, get
 from airtouch.detector.shared import sensors, training_set

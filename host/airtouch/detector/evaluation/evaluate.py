@@ -8,16 +8,16 @@ import numpy as np
 
 from airtouch import logs
 from airtouch.detector.evaluation import summary
-from airtouch.detector.evaluation.dataset import FlightFile
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import SAMPLE_PERIOD_S, FlightScore, score_flight
 from airtouch.detector.registry import Detector
 from airtouch.detector.shared import sensors, training_set
 from airtouch.detector.shared.channels import ACCELERATIONS, RATES, logged_channels
 from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
-from airtouch.logs.clock import sample_period
+from airtouch.logs.checks.clock import sample_period
+from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
-from airtouch.logs.quality import clock_steps, nothing_logged
 
 SHORTEST_S = 4.0  #: the band power's window, the network's, and one second in the air
 MOST_MISSING = 0.1  #: share of samples of a channel that may be NaN; they hold the last value

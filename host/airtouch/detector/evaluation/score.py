@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from airtouch.detector.evaluation.calibration import BINS, reliability
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.trace import Detection
 
 TOLERANCE_S = 1.5  #: a detection further than this from every true edge is false

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.detector.evaluation.bootstrap import Sums, bootstrap
 from airtouch.detector.evaluation.calibration import expected_calibration_error
-from airtouch.detector.evaluation.dataset import Condition
+from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import HIT_RADII_M, FlightScore
 
 #: Height classes also reported together: 75 to 85 mm, where the lift is too weak to carry the edge.

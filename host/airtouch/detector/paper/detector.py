@@ -27,7 +27,7 @@ from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, 
 from airtouch.kernels.rolling import probability_of_samples
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
-from airtouch.reference.int8_network import multiplications
+from airtouch.reference.networks.int8_network import multiplications
 
 #: What `tune` chooses from: P at entry, P at exit, samples between edges, samples an alert counts.
 ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)

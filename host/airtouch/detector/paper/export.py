@@ -11,7 +11,7 @@ from airtouch.kernels.network import arena_bytes, parameter_bytes
 from airtouch.kernels.rolling import rolling_size
 from airtouch.parameters import DEFAULT
 from airtouch.reference import z_score_window
-from airtouch.reference.int8_network import Int8Network, quantise, run
+from airtouch.reference.networks.int8_network import Int8Network, quantise, run
 
 GOLDEN = 16  #: windows with known answers
 GOLDEN_SAMPLES = 300  #: samples of the golden flight of a rolling network, three windows

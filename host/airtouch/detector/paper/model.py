@@ -22,7 +22,7 @@ from airtouch.detector.shared import archive
 from airtouch.errors import AirTouchError
 from airtouch.kernels.network import FloatLayer
 from airtouch.logs.files import write_bytes
-from airtouch.reference.int8_network import Int8Network
+from airtouch.reference.networks.int8_network import Int8Network
 
 FORMAT = 1
 

@@ -5,7 +5,7 @@ import numpy as np
 from airtouch.detector.paper.graph import GRAPH, INPUT_SHAPE, OPERATIONS
 from airtouch.detector.paper.network import KERNEL_SHAPES, WEIGHTED, Weights
 from airtouch.detector.shared.tensorflow import convert, read_weighted
-from airtouch.reference.int8_network import Int8Layer, Int8Network
+from airtouch.reference.networks.int8_network import Int8Layer, Int8Network
 
 REPRESENTATIVE = 500  #: windows that set the range of each activation
 

@@ -21,7 +21,7 @@ from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
 from airtouch.kernels.rolling import rolling_size
 from airtouch.logs.flight_log import FlightLog
-from airtouch.reference.int8_network import rolling_multiplications
+from airtouch.reference.networks.int8_network import rolling_multiplications
 
 STRIDE = 4  #: samples to one answer: what the two pools make together, so that no row is computed in vain
 SPARSITY = 0.96

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.reference.int8_network import Int8Layer
+from airtouch.reference.networks.int8_network import Int8Layer
 
 LARGEST = 8 << 20  #: bytes of the file, and of all its arrays
 REMEDY = "train it again with `airtouch train`"

@@ -5,7 +5,7 @@ import hashlib
 import numpy as np
 
 from airtouch.kernels.network import layer_shape, packed_weights
-from airtouch.reference.int8_network import KINDS, Int8Layer
+from airtouch.reference.networks.int8_network import KINDS, Int8Layer
 
 
 def layer(name: str, of: Int8Layer) -> tuple[str, str]:

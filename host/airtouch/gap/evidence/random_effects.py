@@ -17,8 +17,9 @@ from airtouch.gap.loop.controller import AXES
 from airtouch.gap.loop.loop_model import spectra
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
-from airtouch.simulation import filters, rigid_body
+from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
+from airtouch.simulation.sensors import filters
 
 SEEDS = 4
 LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by

@@ -6,16 +6,16 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights import motion
-from airtouch.logs.clock import lost_samples, true_period
+from airtouch.logs.checks.clock import lost_samples, true_period
+from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
-from airtouch.logs.quality import nothing_logged
 from airtouch.logs.resample import resample
 from airtouch.logs.segments import KINDS, PLATFORM_STEP_M, segments
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
+from airtouch.simulation.body.rotation import as_matrix
 from airtouch.simulation.flight import prepare
-from airtouch.simulation.rotation import as_matrix
 from airtouch.vehicle import Vehicle
 
 PERIOD_S = 0.01

@@ -21,7 +21,7 @@ from airtouch.gap.sealed.blind_draw import KINDS
 from airtouch.gap.signatures.candidates import twins_of
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation.in_order import in_order
+from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import load
 
 Say = Callable[[str], None]

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from airtouch.simulation import cluster
 from airtouch.simulation.effects import load_text
-from airtouch.simulation.in_order import in_order
+from airtouch.simulation.workers import cluster
+from airtouch.simulation.workers.in_order import in_order
 
 AHEAD = 64  #: flights sent out and not yet back
 

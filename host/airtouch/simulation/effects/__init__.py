@@ -18,14 +18,23 @@ __all__ = ["EFFECTS", "Active", "Effect", "Parameter", "activate", "get", "load_
            "register",
            "source_of", "unregister", "wrench"]
 
-NAMES = (
-    "ground_effect", "rotor_drag", "wind", "gust", "blade_flapping", "motor_lag", "motor_noise",
-    "thrust_coefficient", "weak_motor", "battery_sag", "mass", "com_offset", "inertia", "slung_load",
-    "imu_bias", "imu_noise", "vibration", "sensor_latency", "actuator_delay", "time_jitter",
-    "packet_loss", "range_step", "range_bias", "flow_scale", "flow_latency", "controller_gain", "downwash",
-)
+#: Effects in the order in which they are applied, and the folder of each one's file
+FOLDER_OF = {
+    "ground_effect": "air", "rotor_drag": "air", "wind": "air", "gust": "air", "blade_flapping": "air",
+    "motor_lag": "motors", "motor_noise": "motors", "thrust_coefficient": "motors", "weak_motor": "motors",
+    "battery_sag": "motors",
+    "mass": "body", "com_offset": "body", "inertia": "body", "slung_load": "body",
+    "imu_bias": "sensing", "imu_noise": "sensing", "vibration": "sensing", "sensor_latency": "sensing",
+    "actuator_delay": "motors",
+    "time_jitter": "logging", "packet_loss": "logging",
+    "range_step": "sensing", "range_bias": "sensing", "flow_scale": "sensing", "flow_latency": "sensing",
+    "controller_gain": "sensing",
+    "downwash": "air",
+}
+NAMES = tuple(FOLDER_OF)
 EFFECTS: dict[str, Effect] = {
-    name: importlib.import_module(f"airtouch.simulation.effects.{name}").EFFECT for name in NAMES}
+    name: importlib.import_module(f"airtouch.simulation.effects.{folder}.{name}").EFFECT
+    for name, folder in FOLDER_OF.items()}
 
 
 def register(effect: Effect) -> Effect:

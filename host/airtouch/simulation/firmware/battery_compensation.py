@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.simulation import motors
+from airtouch.simulation.body import motors
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.firmware.mixer import MOST
 from airtouch.simulation.firmware.settings import CUBIC, NO_COMPENSATION, OF_VEHICLE, QUADRATIC

@@ -1,0 +1,192 @@
+"""`airtouch collect`: fly a mission with a Crazyflie and write the flight logs."""
+
+import signal
+import sys
+import threading
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import click
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import check_free
+
+
+def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if not value:
+        return
+    from airtouch.crazyflie import mission
+
+    for name in mission.names():
+        click.echo(mission.load(name).describe())
+    ctx.exit()
+
+
+@click.command("collect")
+@click.option("--uri", help="Of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850.")
+@click.option("--mission", "mission_name",
+              help="A ready mission, a scenario or a .toml file (the same that `simulate` flies).")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False),
+              help="Folder for the logs.")
+@click.option("--name", help="Of the files; the mission's if left out.")
+@click.option("--flights", "-n", default=1, show_default=True,
+              help="Number of flights; they are numbered after those in the folder.")
+@click.option("--number", type=click.IntRange(min=1),
+              help="Number of the first flight, instead of the next free one.")
+@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True, help="Written into the log.")
+@click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
+              help="Set a parameter of the drone first.")
+@click.option("--min-battery", default=3.7, show_default=True, metavar="V",
+              help="Least voltage on the ground.")
+@click.option("--link-timeout", default=3.0, show_default=True, metavar="S",
+              help="Silence after which it lands as soon as it is heard again.")
+@click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
+@click.option("--cache", type=click.Path(path_type=Path),
+              help="Folder for the drone's tables, to connect faster; ~/.cache/airtouch if left out.")
+@click.option("--yes", "-y", is_flag=True, help="Take off without asking.")
+@click.option("--force", is_flag=True, help="Replace a flight that has the number already.")
+@click.option("--recover", is_flag=True, help="Only finish what killed flights left in --out.")
+@click.option("--list-missions", is_flag=True, is_eager=True, expose_value=False, callback=_list_missions,
+              help="Every ready mission, and exit.")
+def command(uri: str | None, mission_name: str | None, out: Path, name: str | None, flights: int,
+            number: int | None, vehicle: str, settings: tuple[str, ...], min_battery: float,
+            link_timeout: float, seed: int, cache: Path | None, yes: bool, force: bool,
+            recover: bool) -> None:
+    """Fly a mission with the drone's high-level commander and log it at 100 Hz.
+
+    \b
+    airtouch collect --uri radio://0/80/2M/E7E7E7E7E7 --mission there-and-back --out flights
+    airtouch collect --uri udp://127.0.0.1:19850 --mission sweep.toml --out flights   # beside `airtouch sitl`
+
+    Ctrl-C lands. Every row is on the disk at once, in NAME_0001.csv.gz.part until the flight is over.
+    Exit code 1 when a flight ended early; its log is kept and listed as messy.
+    """
+    from airtouch.crazyflie import collect, mission, recorder
+    from airtouch.crazyflie.checks import parse_setting
+    from airtouch.crazyflie.connection.link import default_cache
+
+    if recover:
+        recovered, unreadable = collect.recover(out)
+        lines = [f"recovered: {path}" for path in recovered] + unreadable
+        click.echo("\n".join(lines) or f"{out}: nothing to recover")
+        sys.exit(2 if unreadable else 0)
+    if not uri or not mission_name:
+        raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
+    if flights < 1 or link_timeout <= 0:
+        raise AirTouchError("--flights must be 1 or more, --link-timeout more than 0")
+    first = mission.load(mission_name, seed, number or 0)
+    name = name or Path(first.name).name
+    plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
+                        link_timeout, force)
+    collect.prepare_folder(out, click.echo)
+    first_number = number or recorder.next_number(out, name)
+    check_free(recorder.flight_path(out, name, first_number), force)
+    click.echo(first.describe())
+    asked = sys.stdin.isatty() and not yes
+    early = 0
+    with stopping() as stop:
+        drone = collect.Drone(uri, cache or default_cache())
+        try:
+            for flight_number in range(first_number, first_number + flights):
+                if flight_number == first_number:
+                    ready = collect.make_ready(drone, plan, click.echo)
+                if asked:
+                    click.confirm(f"flight {flight_number}: drone at the start, nose along x, room clear?",
+                                  abort=True)
+                flown = mission.load(mission_name, seed, flight_number)
+                with _shown(flown.seconds) as show:
+                    outcome = collect.fly(drone, ready, flown, plan, flight_number, stop=stop,
+                                          say=click.echo, show=show)
+                _report(outcome)
+                early += not outcome.planned
+                if early:
+                    break
+        finally:
+            drone.close()
+    sys.exit(1 if early else 0)
+
+
+@contextmanager
+def stopping(quiet: bool = False):
+    """An event that Ctrl-C, SIGTERM and SIGHUP set instead of ending the process."""
+    stop = threading.Event()
+
+    def asked(*_) -> None:
+        first = not stop.is_set()
+        stop.set()
+        if first and not quiet:
+            with suppress(OSError):  # the terminal may be gone
+                click.echo("landing; the log is kept", err=True)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+    before = {s: signal.signal(s, asked) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _shown(seconds: float):
+    """A status line with leg, time, battery and losses; without a terminal one line for each leg."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        seen = []
+
+        def plain(flight) -> None:
+            label = _label(flight)
+            if seen[-1:] != [label]:
+                seen.append(label)
+                click.echo(f"{_flown(flight):6.1f} s  {label}")
+
+        yield plain
+        return
+    with Progress(TextColumn("{task.fields[leg]:9}"), BarColumn(), TextColumn("{task.fields[text]}"),
+                  console=console, transient=True) as bar:
+        task = bar.add_task("flight", total=seconds, leg="", text="")
+
+        def live(flight) -> None:
+            i = flight.intake
+            bar.update(task, completed=_flown(flight), leg=_label(flight),
+                       text=f"{_flown(flight):5.1f} s  {i.latest.get('vbat_V', float('nan')):.2f} V  "
+                            f"{100 * i.lost / max(i.received + i.lost, 1):.1f} % lost")
+
+        yield live
+
+
+def _label(flight) -> str:
+    pilot = flight.pilot
+    return pilot.leg.kind if pilot.phase == "mission" and pilot.leg else pilot.phase
+
+
+def _flown(flight) -> float:
+    i = flight.intake
+    return 0.0 if i.first_ms is None else (i.newest_ms - i.first_ms) / 1000.0
+
+
+def _report(outcome) -> None:
+    from airtouch import logs
+
+    log = outcome.log
+    if not len(log):
+        click.echo(f"{outcome.ended}: nothing was received, no file written")
+        return
+    total = len(log) + log.meta["lost_samples"]
+    click.echo(f"{outcome.path}: {outcome.ended}; {len(log)} samples, {log.meta['lost_samples']} lost "
+               f"({log.meta['lost_samples'] / total:.1%}), longest gap {log.meta['longest_gap_s']:.2f} s")
+    start = log["t_s"][0]
+    edges = logs.true_edges(log)
+    if outcome.use == "free-air":
+        click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the "
+                   "mission sweep does over its own")
+    for edge in edges:
+        click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: "
+                   f"down range {edge.height_before_m:.2f} to {edge.height_after_m:.2f} m")
+    if not edges:
+        click.echo("no true edge: the down range never stepped by more than 0.30 m in flight")

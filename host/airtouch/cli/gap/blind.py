@@ -1,0 +1,99 @@
+"""`airtouch gap blind`: sealed sets of flights whose effect is withheld."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.cli import Suggesting
+from airtouch.cli.gap.options import check_free, runner, written
+from airtouch.cli.shared import scores
+
+
+@click.group("blind", cls=Suggesting)
+def blind() -> None:
+    """Sealed sets of flights whose effect is withheld: make them, score a diagnosis of them."""
+
+
+@blind.command("make")
+@click.argument("out", type=click.Path(path_type=Path, file_okay=False))
+@click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1),
+              help="How many flights.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Where the key goes; "
+              "default: OUT.key.json beside OUT.")
+@click.option("--force", is_flag=True, help="Replace a set in OUT.")
+def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool) -> None:
+    """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart."""
+    from airtouch.cli.gap import show
+    from airtouch.gap.sealed import blind as sealed
+
+    with show.Bar() as bar:
+        written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
+    click.echo(f"{flights} flights in {out}; the key in {written}")
+
+
+@blind.command("score")
+@click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
+@click.argument("answers", type=click.Path(path_type=Path, exists=True))
+@click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Default: beside FOLDER.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write every figure.")
+@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write the confusion matrix and the reliability to this PNG.")
+@click.option("--force", is_flag=True, help="Replace the files.")
+def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path | None, plot: Path | None,
+                force: bool) -> None:
+    """Open the key of the set in FOLDER and score the diagnoses in ANSWERS, a folder or a file."""
+    from airtouch.extras import need
+    from airtouch.gap.sealed import blind as sealed
+
+    need("plots", "scoring a sealed set")
+    check_free(json_path, plot, force)
+    _scored(sealed.score(folder, answers, key), json_path, plot, force)
+
+
+@blind.command("run")
+@click.argument("out", type=click.Path(path_type=Path, file_okay=False))
+@click.option("--flights", "-n", default=480, show_default=True, type=click.IntRange(1),
+              help="How many flights; 42 % have one effect, 42 % none, the rest two.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
+@click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler, instead of processes here.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
+              help="Write every figure; default: OUT/figures.json.")
+def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None, json_path: Path | None) -> None:
+    """The whole check in the folder OUT: make a set, diagnose it, open the key, score.
+
+    Goes on where it was broken off. Single effects are then diagnosed once more with the
+    effect left out, where `unknown` is right.
+    """
+    from airtouch.cli.gap import show
+    from airtouch.extras import need
+    from airtouch.gap.sealed import blind_run as check
+
+    need("plots", "scoring a sealed set")
+    spread = runner(dask, ()) if dask else None
+    with show.Bar() as bar:
+        figures = check.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
+    _scored(figures, json_path or out / "figures.json", out / "figures.png", True)
+
+
+def _scored(found: dict[str, Any], json_path: Path | None, plot: Path | None, force: bool) -> None:
+    """Print the score of a blind check, and write it to files."""
+    from rich.table import Table
+
+    from airtouch.logs.files import write_bytes
+    from airtouch.report import blind_figures
+
+    for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.rows(found)),
+                        (("effect", "top-1", "top-3", "parameter error"), blind_figures.effect_rows(found))):
+        table = Table(*heads)
+        for row in rows:
+            table.add_row(*row)
+        scores.console().print(table)
+    if json_path:
+        scores.write_json(json_path, found, force)
+    if plot:
+        write_bytes(blind_figures.picture(found), plot, force)
+    written(json_path, plot)

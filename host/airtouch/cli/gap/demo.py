@@ -1,0 +1,47 @@
+"""`airtouch gap demo`: a diagnosis of flights of the package."""
+
+from pathlib import Path
+
+import click
+
+from airtouch.cli.gap.options import check_free
+from airtouch.cli.shared import scores
+
+
+@click.command("demo")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/gap-demo"),
+              show_default=True, help="Folder for the report and the JSON.")
+@click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
+def demo_command(out: Path, force: bool) -> None:
+    """Diagnose a flight of the package whose effect is withheld, and compare the answer with the effect.
+
+    Needs no drone, no network and no TensorFlow; about a minute, most of it compiling the first time.
+    """
+    import time
+
+    from airtouch.cli.gap import show
+    from airtouch.gap import example
+    from airtouch.gap.answer import words
+    from airtouch.gap.diagnose import diagnose
+    from airtouch.logs import read
+    from airtouch.report import gap_report
+    from airtouch.vehicle import load
+
+    report, json_path = out / "report.html", out / "diagnosis.json"
+    check_free(report, json_path, force)
+    began = time.monotonic()
+    line = f"airtouch gap diagnose {example.real()} --baseline {example.FOLDER / 'nominal_*.csv.gz'} --report {report}"
+    click.echo(f"This is: {line}")
+    nominal = [read(p) for p in example.nominal()]
+    with show.Steps(began) as say:
+        say("reading and compiling")
+        diagnosis = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
+                             pictures=True)
+    scores.write_json(json_path, diagnosis.plain(), force)
+    gap_report.write_diagnosis(report, diagnosis, command="airtouch gap demo", force=force)
+    show.diagnosis(scores.console(), diagnosis)
+    true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
+    answer = words.joined([e.name for e in diagnosis.effects]) or diagnosis.verdict
+    click.echo(f"\nSwitched on when the flight was made: {'; '.join(f'{n} ({p})' for n, p in true.items())}; found: "
+               f"{answer}.")
+    click.echo(f"{time.monotonic() - began:.0f} s; open {report} in a browser")

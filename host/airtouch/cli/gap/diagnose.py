@@ -1,0 +1,104 @@
+"""`airtouch gap diagnose`: which effect the simulator lacks."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.cli.gap.options import Greedy, check_free, inputs_and_outputs, runner, typed, written
+from airtouch.cli.shared import scores
+from airtouch.errors import AirTouchError
+
+
+@click.command("diagnose", cls=Greedy)
+@inputs_and_outputs
+@click.option("--without", multiple=True, metavar="EFFECT", help="Exclude a candidate; may be repeated.")
+@click.option("--effects-file", "--effect-file", "effect_files", multiple=True, metavar="FILE",
+              help="Python file with effects of your own; may be repeated.")
+@click.option("--each", is_flag=True, help="Diagnose each flight alone.")
+def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
+                     report: Path | None, json_path: Path | None, dask: str | None, force: bool,
+                     without: tuple[str, ...], effect_files: tuple[str, ...], each: bool) -> None:
+    """Find the unmodelled effect that REAL flights have in common, and the part of the gap that it explains.
+
+    REAL and --baseline are log files, folders or patterns; give REAL first. One flight is enough. The exit
+    code is 0 for any verdict.
+    """
+    from airtouch.cli.gap import files, show
+    from airtouch.simulation import effects
+
+    check_free(report, json_path, force)
+    if each and report:
+        raise AirTouchError("--report shows one diagnosis; leave --each out")
+    if dask and not each:
+        raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each")
+    for path in effect_files:
+        effects.load_file(path)
+    for name in without:
+        effects.get(name)
+    flights, nominal = files.Flights(real), files.Flights(baseline)
+    vehicle = files.vehicle_of(vehicle_name, flights)
+    case = _case(vehicle, list(nominal), without)
+    if each:
+        _each(flights, case, json_path, runner(dask, effect_files), force)
+    else:
+        logs = list(flights)
+        if not logs:
+            raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
+        with show.Bar() as bar:
+            diagnosis = case(logs, progress=bar, pictures=bool(report))
+        if json_path:
+            scores.write_json(json_path, diagnosis.plain(), force)
+        if report:
+            from airtouch.report import gap_report
+
+            gap_report.write_diagnosis(report, diagnosis, command=typed("diagnose", real, baseline, vehicle_name),
+                                       force=force)
+        show.diagnosis(scores.console(), diagnosis)
+    show.left_out([*flights.failed.values(), *nominal.failed.values()])
+    written(json_path, report)
+
+
+def _case(vehicle: Any, nominal: list, without: tuple[str, ...]) -> Callable:
+    """A function that diagnoses flights, with all other arguments fixed."""
+    from functools import partial
+
+    from airtouch.gap import diagnose
+
+    return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without))
+
+
+def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> None:
+    """Diagnose each flight alone and print one row for each."""
+    from functools import partial
+
+    from rich.table import Table
+
+    from airtouch.cli.gap import show
+    from airtouch.gap.answer import words
+
+    table = Table("flight", "verdict", "effects", "probability")
+    rows = []
+    with show.Bar(len(flights)) as bar:
+        for diagnosis in run(partial(_alone, case), flights):
+            if isinstance(diagnosis, str):
+                show.left_out([diagnosis])
+                continue
+            bar(diagnosis.flights[0])
+            first = diagnosis.ranking[0]
+            table.add_row(Path(diagnosis.flights[0]).name, diagnosis.verdict,
+                          "; ".join(words.effect_in_words(e) for e in diagnosis.effects),
+                          f"{first.probability:.0%}")
+            rows.append(diagnosis.plain())
+    scores.console().print(table)
+    if json_path:
+        scores.write_json(json_path, {"cases": rows}, force)
+
+
+def _alone(case: Callable, log: Any) -> Any:
+    try:
+        return replace(case([log]), held=None, map=None)  # which need not travel
+    except AirTouchError as error:
+        return str(error)

@@ -1,0 +1,87 @@
+"""Flights and vehicle that `airtouch gap` is given: files, folders, patterns."""
+
+import glob
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import click
+
+from airtouch import logs, vehicle
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.formats.rosbag import is_bag
+from airtouch.vehicle import Vehicle
+
+ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")
+DEFAULT = "crazyflie-2.1-flow"
+MANIFEST = "manifest.csv"
+
+
+class Flights:
+    """Log files that are read as they are needed, one at a time, any number of times.
+
+    Of several, those that cannot be read are left out, with their reason in `failed`; a
+    single one raises AirTouchError.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.paths = files_of(names)
+        self.failed: dict[Path, str] = {}
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __iter__(self) -> Iterator[FlightLog]:
+        for path in self.paths:
+            try:
+                log = logs.read(path)
+            except AirTouchError as error:
+                if len(self.paths) == 1:
+                    raise
+                self.failed[path] = str(error)
+                continue
+            yield log
+
+
+def files_of(names: Sequence[str]) -> list[Path]:
+    """Files named, logs in folders named, and what patterns match; each once, in order.
+
+    Raises AirTouchError for a name that is none of these.
+    """
+    files: dict[Path, None] = {}
+    for name in names:
+        path = Path(name)
+        if path.is_dir() and is_bag(path):
+            paths = [path]
+        elif path.is_dir():
+            paths = [p for p in sorted(path.iterdir())
+                    if p.name.endswith(ENDINGS) and p.name != MANIFEST]
+        elif path.exists():
+            if path.name == MANIFEST:  # which a shell's *.csv names too
+                if len(names) == 1:
+                    raise AirTouchError(f"{name}: a list of flights, not a flight; name its folder")
+                continue
+            paths = [path]
+        else:
+            paths = [Path(p)
+                    for p in sorted(glob.glob(name, recursive=True)) if Path(p).is_file() and Path(p).name != MANIFEST]
+        if not paths:
+            raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
+        files.update(dict.fromkeys(paths))
+    return list(files)
+
+
+def vehicle_of(named: str | None, flights: Flights) -> Vehicle:
+    """The vehicle named, else the one that the first log names, else the Crazyflie with flow deck."""
+    if named:
+        return vehicle.load(named)
+    first = next(iter(flights), None)
+    name = str(first.meta.get("vehicle") or "") if first is not None else ""
+    if not name:
+        return vehicle.load(DEFAULT)
+    try:
+        return vehicle.load(name)
+    except AirTouchError:
+        click.echo(f"airtouch: the log names vehicle {name!r}, of which no file is known; {DEFAULT} is used, "
+                   "--vehicle names another", err=True)
+        return vehicle.load(DEFAULT)

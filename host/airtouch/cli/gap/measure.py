@@ -1,0 +1,42 @@
+"""`airtouch gap measure`: where flights and model differ."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from airtouch.cli.gap.options import Greedy, check_free, inputs_and_outputs, typed, written
+from airtouch.cli.shared import scores
+
+
+@click.command("measure", cls=Greedy)
+@inputs_and_outputs
+def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
+                    report: Path | None, json_path: Path | None, dask: str | None, force: bool) -> None:
+    """Map the gap between REAL flights and the model, by channel, band, phase and regime.
+
+    REAL and --baseline are log files, folders or patterns; give REAL first.
+    """
+    from airtouch.cli.gap import files, show
+    from airtouch.gap import measure
+    from airtouch.gap.sealed import on_cluster
+
+    check_free(report, json_path, force)
+    flights, nominal = files.Flights(real), files.Flights(baseline)
+    vehicle = files.vehicle_of(vehicle_name, flights)
+    run = on_cluster.mapper(dask) if dask else map
+    with show.Bar(len(flights) + bool(baseline)) as bar:
+        measurement = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
+    failed = (*flights.failed.values(), *nominal.failed.values())
+    measurement = replace(measurement, left_out=(*failed, *measurement.left_out))
+    if json_path:
+        scores.write_json(json_path, measurement.plain(), force)
+    if report:
+        from airtouch.gap.answer import pictures
+        from airtouch.report import gap_report
+
+        gap_report.write_measurement(report, measurement, pictures.of_measurement(measurement, flights, vehicle),
+                                     force=force, command=typed("measure", real, baseline, vehicle_name))
+    show.measurement(scores.console(), measurement)
+    show.left_out(measurement.left_out)
+    written(json_path, report)

@@ -1,0 +1,73 @@
+"""Options that commands of `airtouch gap` share, and the lines that they all print."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from airtouch.logs import files
+
+
+class Greedy(click.Command):
+    """A command whose --baseline takes all words up to the next option, so that a shell pattern works."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        spread: list[str] = []
+        taking = False
+        for word in args:
+            if word.startswith("-"):
+                taking = word == "--baseline"
+                spread += [] if taking else [word]
+            else:
+                spread += ["--baseline", word] if taking else [word]
+        if args and args[-1] == "--baseline":
+            spread.append("--baseline")  # click says that its value is missing
+        return super().parse_args(ctx, spread)
+
+
+def inputs_and_outputs(function: Callable) -> Callable:
+    """Add the options that `measure` and `diagnose` share."""
+    path = click.Path(path_type=Path, dir_okay=False)
+    for option in (
+        click.option("--force", is_flag=True, help="Replace the files."),
+        click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler."),
+        click.option("--json", "json_path", type=path, help="Write every figure to this file."),
+        click.option("--report", type=path, help="Write a report to this HTML file."),
+        click.option("--baseline", multiple=True, metavar="NOMINAL...",
+                     help="Flights without any unmodelled effect, up to the next option."),
+        click.option("--vehicle", "vehicle_name", metavar="V",
+                     help="Name or .toml file; else the one that the log names."),
+        click.argument("real", nargs=-1, required=True),
+    ):
+        function = option(function)
+    return function
+
+
+def check_free(report: Path | None, json_path: Path | None, force: bool) -> None:
+    """Refuse, before the work, to replace a file without --force."""
+    for path in (report, json_path):
+        files.check_free(path, force)
+
+
+def typed(name: str, real: tuple[str, ...], baseline: tuple[str, ...], vehicle: str | None) -> str:
+    """The command as typed, for the report, with long lists of files shortened."""
+    def few(names: tuple[str, ...]) -> str:
+        return " ".join(names[:4]) + (f" [and {len(names) - 4} more]" if len(names) > 4 else "")
+
+    return (f"airtouch gap {name} {few(real)}" + (f" --vehicle {vehicle}" if vehicle else "")
+            + (f" --baseline {few(baseline)}" if baseline else ""))
+
+
+def written(*paths: Path | None) -> None:
+    """Print the files that were written."""
+    for path in filter(None, paths):
+        click.echo(f"written: {path}")
+
+
+def runner(dask: str | None, effect_files: tuple[str, ...]) -> Callable:
+    """`map`, or the same on a cluster whose workers know the effects of these files."""
+    if not dask:
+        return map
+    from airtouch.gap.sealed import on_cluster
+
+    return on_cluster.mapper(dask, [Path(p).read_text(encoding="utf-8") for p in effect_files])

@@ -1,0 +1,1 @@
+"""Commands that train, export and compare detectors, and fit the simulator."""

@@ -1,0 +1,147 @@
+"""`airtouch adapt`: a detector for the drone that flew some flights."""
+
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.cli.shared.progress import Bar
+from airtouch.errors import AirTouchError
+from airtouch.extras import need
+from airtouch.logs.files import check_free
+
+MORE = 5  #: further flights whose benefit is estimated
+
+
+@click.command(name="adapt")
+@click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), default=Path("mine.npz"), show_default=True,
+              help="Model file to write.")
+@click.option("--twin", "twin_folder", type=click.Path(path_type=Path, file_okay=False),
+              help="Folder of `airtouch twin`; one is fitted to the flights if left out.")
+@click.option("--vehicle", metavar="NAME", help="Vehicle that this fit starts from, a name or a .toml file; default "
+              "crazyflie-2.1-flow.")
+@click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
+              help="Weights to start from: shipped, scratch, or a model file.")
+@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
+              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N",
+              help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
+@click.option("--withhold-range", is_flag=True,
+              help="Use no labels in the last stage, to measure the benefit of unlabelled flights.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
+              help="Fixes every bit of the result on one machine.")
+@click.option("--force", is_flag=True, help="Replace the model file.")
+def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehicle: str | None, origin: str,
+            speed: float | None, folds: tuple[int, ...], hold_out: bool, withhold_range: bool, seed: int,
+            force: bool) -> None:
+    """Train a detector for the drone that flew FLIGHTS: logs, or folders (the clean flights of a manifest.csv).
+
+    \b
+    airtouch adapt my-flights --out mine.npz
+    airtouch evaluate new-flights --model mine.npz
+    airtouch export mine.npz --out model
+
+    It starts from the shipped weights, trains in the twin, and then on the flights themselves: their down range
+    labels them. Flights without down range are labelled by the detector from the twin. With four flights or more
+    over a platform, each is held out in turn to measure what to expect. Finished stages are stored beside --out, in a
+    folder that ends in .adapt: the same command continues after a stop.
+    """
+    from airtouch import vehicle as vehicles
+    from airtouch.detector import best
+    from airtouch.detector.evaluation import summary
+    from airtouch.detector.evaluation.data import dataset
+    from airtouch.detector.shared import sensors
+    from airtouch.twin import adapt
+    from airtouch.twin.fitting import calibrate
+
+    need("train", "training")
+    started = time.monotonic()
+    check_free(out, force)
+    if twin_folder and vehicle:
+        raise AirTouchError("--twin has a vehicle of its own; leave --vehicle out")
+    start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
+    files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
+    with Bar("reading") as bar:
+        usable, left_out = adapt.readable(files, progress=bar)
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    if not usable:
+        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, with "
+                            "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
+    labelled = [f for f in usable if f.labelled]
+    work = out.with_suffix(".adapt")
+    twin = calibrate.of_folder(twin_folder) if twin_folder else calibrate.of_flights(
+        [f.file.path for f in labelled if not sensors.missing(f.log)], vehicles.load(vehicle) if vehicle else
+        vehicles.load(), work, speed_mps=speed, seed=seed, bar=Bar)
+    click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
+               f"{twin.what}")
+    typed = shlex.join(["airtouch", *sys.argv[1:]])
+    with Stages() as stages:
+        adapted = adapt.adapt(usable, twin.scenario, twin.vehicle, work, start=start, seed=seed, hold_out=hold_out,
+                              withhold=withhold_range, progress=stages, command=typed)
+    adapted.model.save(out, force)
+    _say(adapted, adapt, summary, len(labelled), hold_out)
+    click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
+
+
+def _say(adapted: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:
+    """Print what to expect of the detector."""
+    rows = {"twin only": adapted.twin_only, "held out, half of the others": adapted.held_out_half,
+            "held out, all others": adapted.held_out}
+    for name, scores in rows.items():
+        if scores:
+            click.echo(f"{name}: {in_words(summary.summarise(scores))}")
+    if any(s.in_training for s in adapted.twin_only):
+        click.echo("the weights it started from have seen some of these flights: these figures are too good; "
+                   "--from scratch measures without them")
+    if not hold_out:
+        click.echo("nothing was held out, as asked: what to expect of new flights is not known")
+        return
+    if not adapted.held_out:
+        click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.FEWEST} are needed to say "
+                   "what to expect")
+        return
+    ahead = adapt.outlook(adapted, labelled, MORE)
+    if ahead:
+        click.echo(f"the next {MORE} flights: {ahead['now_m']:.3f} m would become about {ahead['then_m']:.3f} m "
+                   f"(from {ahead['half_m']:.3f} m with half of the flights; a guess, see the intervals)")
+
+
+def in_words(table: dict[str, Any]) -> str:
+    """Error, missed and false edges with intervals and sample size."""
+    def cell(name: str, scale: float, form: str) -> str:
+        if table[name] is None:
+            return "-"
+        ends = table["intervals"].get(name)
+        said = format(scale * table[name], form)
+        return said + (f" ({format(scale * ends[0], form)} to {format(scale * ends[1], form)})" if ends else "")
+
+    return (f"error {cell('mean_abs_error_m', 1, '.3f')} m, missed {cell('missed', 100, '.1f')} %, false "
+            f"{cell('false_per_minute', 1, '.2f')} a minute; {table['flights']} flights, {table['edges']} edges, "
+            "95 % by flight")
+
+
+class Stages:
+    """One progress bar for each stage: call it with (stage, done, total, note)."""
+
+    def __init__(self) -> None:
+        self.name = ""
+        self.bar: Bar | None = None
+
+    def __enter__(self) -> "Stages":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self.bar is not None:
+            self.bar.__exit__(*error)
+
+    def __call__(self, stage: str, done: int, total: int, note: str) -> None:
+        if stage != self.name or self.bar is None:
+            self.__exit__(None, None, None)
+            self.name, self.bar = stage, Bar(stage).__enter__()
+        self.bar(done, total, note)

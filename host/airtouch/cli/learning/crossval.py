@@ -1,0 +1,114 @@
+"""`airtouch crossval`: cross-validate a detector by flight."""
+
+import json
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from airtouch.cli.shared import scores as show
+from airtouch.cli.shared.flights import need_flights
+from airtouch.detector.best import free_air as free_air_flights
+from airtouch.detector.evaluation import crossval, evaluate
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.evaluation.data import folds as folds_of
+from airtouch.detector.shared import sensors
+from airtouch.logs.files import check_free
+from airtouch.logs.flight_log import FlightLog
+
+
+@click.command(name="crossval")
+@click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
+@click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
+              help="Drop edges without an FR-CFAR alert.")
+@click.option("--epochs", type=click.IntRange(1),
+              help="Training epochs; the detector's own number if left out.")
+@click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
+@click.option("--by", type=click.Choice(["fold", "day"]), default="fold", show_default=True,
+              help="What is held out together: the manifest's folds, or whole days in five groups.")
+@click.option("--without", metavar="GROUP", help="One split only: the flights of the folder or day GROUP are scored by "
+              "a model of all others.")
+@click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
+              help="best: remove this sensor from the scored flights.")
+@click.option("--silence-training", is_flag=True, help="With --silence: remove it from the training flights too.")
+@click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
+              help="best: also train on the flights of this folder, which have no edges. May be repeated.")
+@click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+              help="Commanded speed of flights without one in their manifest.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
+@click.option("--random-windows", is_flag=True,
+              help="Also score the paper's random split of windows, which leaks (paper's network only).")
+@click.option("--random-epochs", type=click.IntRange(1), default=60, show_default=True,
+              help="Training epochs of that split.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/crossval"), show_default=True,
+              help="Folder for finished folds; a second run continues from it.")
+@click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
+@click.option("--force", is_flag=True, help="Replace the JSON file.")
+@click.option("--ledger", type=click.Path(path_type=Path),
+              help="Append a line to this file: how often the folds were looked at.")
+def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epochs: int | None, steps: int | None,
+            by: str, without: str | None, silence: tuple[str, ...],
+            silence_training: bool, free_air: tuple[Path, ...], speed: float | None, seed: int,
+            random_windows: bool, random_epochs: int, out: Path, json_path: Path | None, force: bool,
+            ledger: Path | None) -> None:
+    """Cross-validate a detector over FLIGHTS, folders with a manifest.csv, split by flight.
+
+    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights. Weights, thresholds and lag come from the
+    training flights of each fold alone. Exit code 2 when a flight was left out.
+    """
+    check_free(json_path, force)
+    if detector != "best" and (steps or silence or free_air):
+        raise click.UsageError("--steps, --silence and --free-air are for --detector best")
+    files = dataset.collect(flights or [need_flights()], speed)
+    split = folds_of.only(files, without) if without else folds_of.by_day(files) if by == "day" else None
+    options = {name: value for name, value in {"epochs": epochs, "steps": steps}.items() if value is not None}
+    air = _free_air(free_air)
+    scores, folds, left_out = crossval.crossval(
+        detector, files, out, folds=split, seed=seed, options=options, physical_filter=physical_filter,
+        silenced=silence, silent_training=silence_training, free_air=air, tell=lambda line: click.echo(line, err=True))
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    title = ", ".join([detector, *([] if physical_filter else ["physical filter off"]),
+                       *(f"no {sensor}" for sensor in silence), *([f"trained without {without}"] if without else []),
+                       *(["whole days held out"] if by == "day" and not without else []),
+                       *([f"{len(air)} flights in free air"] if air else [])])
+    result = evaluate.as_json(title, scores, left_out, [f["lag_s"] for f in folds], {})
+    result["folds"] = folds
+    screen = show.console()
+    screen.print(show.table({title: result, **result["by_height"]},
+                            f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}"))
+    if random_windows:
+        from airtouch.detector.evaluation import variants
+
+        leak = variants.random_windows(list(crossval.readable_flights(files)[0].values()), seed=seed,
+                                       epochs=random_epochs)
+        result["random_windows"] = leak
+        screen.print("random split of windows (leaks): balanced window accuracy "
+                     f"{leak['balanced_accuracy']:.1%} on {leak['windows']} windows "
+                     f"after {leak['epochs']} epochs; "
+                     f"by flight {result['balanced_accuracy']:.1%}")
+    if json_path:
+        show.write_json(json_path, result, force)
+        screen.print(f"written: {json_path}")
+    if ledger:
+        note(ledger, title, result)
+    show.left_out(left_out, len(scores))
+    if left_out:
+        sys.exit(2)
+
+
+def _free_air(folders: tuple[Path, ...]) -> list[FlightLog]:
+    if not folders:
+        return []
+    return free_air_flights.read(folders, lambda line: click.echo(f"left out of free air: {line}", err=True))
+
+
+def note(ledger: Path, title: str, result: dict) -> None:
+    """Append a line to the ledger of looks at the folds."""
+    named = ("mean_abs_error_m", "missed", "false_per_minute", "balanced_accuracy")
+    figures = {key: result[key] for key in named}
+    line = f"- {datetime.now(UTC):%Y-%m-%d %H:%M} UTC, {title}: {json.dumps(figures)}\n"
+    with ledger.open("a", encoding="utf-8") as handle:
+        handle.write(line)

@@ -1,0 +1,160 @@
+"""`airtouch train`: train a detector on recorded flights, or on simulated ones."""
+
+import shlex
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from airtouch.cli.shared.flights import need_flights
+from airtouch.detector import registry
+from airtouch.detector.best import free_air as air
+from airtouch.detector.evaluation import crossval, evaluate
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.shared import sensors
+from airtouch.errors import AirTouchError
+from airtouch.extras import need
+from airtouch.logs.files import check_free
+from airtouch.logs.flight_log import FlightLog
+
+
+@click.command(name="train")
+@click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
+@click.option("--detector", default="best", show_default=True,
+              help="Which detector to train: best, paper or paper-stream.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("model.npz"), show_default=True,
+              help="Model file to write.")
+@click.option("--epochs", type=click.IntRange(1), help="paper: most training epochs; its own number if left out.")
+@click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
+@click.option("--start", type=click.Path(path_type=Path), metavar="MODEL.npz",
+              help="best: train this model further; 300 steps if --steps is left out.")
+@click.option("--labelled", type=click.IntRange(1), metavar="K",
+              help="best: train on K of the flights only, drawn by --seed.")
+@click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
+              help="best: remove this sensor from the flights, for logs that lack it.")
+@click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
+              help="best: also train on the flights of this folder, which have no edges. May be repeated.")
+@click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
+              help="Share of zeros: paper, in the first dense layer; best, in the dilated layers.")
+@click.option("--block", type=click.Choice(["1", "4"]),
+              help="paper: prune single weights or blocks of four; 4 if left out.")
+@click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="paper: weight of the disturbance-force loss.")
+@click.option("--simulated", type=click.IntRange(1), metavar="N", help="Train on N simulated flights instead.")
+@click.option("--scenario", metavar="NAME", help="With --simulated: what is flown; paper-mixed if left out.")
+@click.option("--without", multiple=True, metavar="EFFECT",
+              help="With --simulated: an effect of the scenario to switch off; may be repeated.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
+              help="Fixes every bit of the result on one machine, simulated flights included.")
+@click.option("--force", is_flag=True, help="Replace the model file.")
+def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
+            start: Path | None, labelled: int | None, silence: tuple[str, ...],
+            free_air: tuple[Path, ...], sparsity: float | None,
+            block: str | None, df_lambda: float | None, simulated: int | None,
+            scenario: str | None, without: tuple[str, ...], seed: int, force: bool) -> None:
+    """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
+
+    Without FLIGHTS: AIRTOUCH_FLIGHTS or ../shared/flights; with --simulated N, simulated flights. Flights that
+    cannot be used are listed and left out, and the exit code is 2. `paper` holds out 15 % of the flights, to stop
+    early and to choose its thresholds. `best` trains on all flights; its state is stored beside --out, in a folder
+    that ends in .training, and the same command continues after a stop.
+    """
+    if simulated and flights:
+        raise click.UsageError("either FLIGHTS or --simulated, not both")
+    if not simulated and (scenario or without):
+        raise click.UsageError("--scenario and --without need --simulated N")
+    if detector != "best" and (start or labelled or free_air or silence):
+        raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
+    need("train", "training")
+    check_free(out, force)
+    module = registry.get(detector)
+    if detector == "baseline":
+        raise AirTouchError("baseline has nothing to train; --detector best or paper")
+    settings = {"epochs": epochs, "steps": steps, "sparsity": sparsity, "block": block and int(block),
+                "df_lambda": df_lambda, "most_flights": labelled}
+    options: dict[str, Any] = {name: value for name, value in settings.items() if value is not None}
+    what: dict[str, Any] | None = None
+    if start:
+        options["start"] = module.load(start)
+    if free_air:
+        options["free_air"] = air.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True))
+    began = time.monotonic()
+    if not simulated:
+        chosen, failures = _read(flights, evaluate.spare_of(module))
+    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                  TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def progress(stage: str, done: int, total: int, note: str) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, note="")
+            bar.update(tasks[stage], completed=done, note=note)
+
+        if simulated:
+            chosen, what = _simulate(simulated, scenario, without, seed, progress)
+            failures = 0
+        if detector == "best":
+            options["work"] = out.with_suffix(".training")
+        model = module.fit([sensors.without(log, silence) for log in chosen], seed=seed, progress=progress,
+                           command=_command(), **options)
+    if what:
+        model = replace(model, metadata={**model.metadata, "simulated": what})
+    model.save(out, force)
+    work = options.get("work")
+    if work and work.is_dir() and not any(work.iterdir()):
+        work.rmdir()
+    _report(model.metadata, time.monotonic() - began)
+    click.echo(f"written: {out} ({out.stat().st_size} bytes)")
+    if failures:
+        click.echo(f"airtouch: {len(chosen)} flights used, {failures} left out (see above)", err=True)
+        sys.exit(2)
+
+
+def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
+    """The logs that can be trained on with at most `spare` sensors missing, and the number of the others."""
+    logs, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    chosen, failures = list(logs.values()), len(left_out)
+    if not chosen:
+        raise AirTouchError("no flight that can be trained on")
+    return chosen, failures
+
+
+def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: int,
+              progress: Callable[[str, int, int, str], None]) -> tuple[list[FlightLog], dict[str, Any]]:
+    """Simulated flights and their description for the model's metadata."""
+    from airtouch.detector.evaluation.data import simulated
+
+    return simulated.training_flights(count, scenario or simulated.SCENARIO, without=without, seed=seed,
+                                      progress=progress)
+
+
+def _report(metadata: dict, seconds: float) -> None:
+    held = set(metadata.get("held_out", ()))
+    fitted = [name for name in metadata["flights"][metadata.get("flights_before", 0):] if name not in held]
+    click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
+    if held:
+        click.echo(f"held out ({len(held)}): {', '.join(sorted(held))}")
+    if "simulated" in metadata:
+        flown = metadata["simulated"]
+        click.echo(f"simulated: {flown['scenario']}, seed {flown['seed']}, effects: {', '.join(flown['effects'])}")
+    score = metadata.get("held_out_accuracy", {})
+    if score.get("float") is not None:
+        click.echo(f"balanced window accuracy on held-out flights: float {score['float']:.1%}, "
+                   f"int8 {score['int8']:.1%} (n = {score['windows']} windows)")
+
+
+def _command() -> str:
+    """The command as typed, without the folder of the `airtouch` program."""
+    return shlex.join(["airtouch", *sys.argv[1:]])
+
+
+def _stderr():
+    from rich.console import Console
+
+    return Console(stderr=True)

@@ -1,0 +1,111 @@
+"""`airtouch twin`: fit the simulator to recorded flights of one drone."""
+
+import json
+import shlex
+import sys
+from dataclasses import asdict
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import click
+
+from airtouch.cli.shared.progress import Bar
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import write_bytes
+
+SUMMARY, REPORT = "twin.json", "report.html"
+
+
+@click.command(name="twin")
+@click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("twin"), show_default=True,
+              help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
+@click.option("--vehicle", default="crazyflie-2.1-flow", show_default=True,
+              help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
+@click.option("--speed", type=click.FloatRange(0, 1, min_open=True), metavar="M/S",
+              help="Commanded speed over the platform; else the manifest's, else from the logs.")
+@click.option("--fold", "folds", type=int, multiple=True, metavar="N",
+              help="Only flights of this fold of the manifest; may be repeated.")
+@click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
+@click.option("--batch", type=click.IntRange(40), default=240, show_default=True, help="Simulated flights a round.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes the result.")
+@click.option("--workers", type=click.IntRange(1), help="Threads; default one a core.")
+@click.option("--resume", is_flag=True, help="Continue a fit that stopped.")
+@click.option("--force", is_flag=True, help="Replace the twin in --out.")
+def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | None, folds: tuple[int, ...],
+            rounds: int, batch: int, seed: int, workers: int | None, resume: bool, force: bool) -> None:
+    """Fit the simulator to FLIGHTS of one drone: logs, or folders (the clean flights of a manifest.csv).
+
+    \b
+    airtouch twin my-flights --out twin
+    airtouch simulate twin/scenario.toml --vehicle twin/vehicle.toml --flights 100 --out simulated
+    airtouch gap diagnose my-flights --vehicle twin/vehicle.toml
+
+    What to fly: take off, hover for at least 5 s, fly straight over a table or a box and half a metre further, and
+    land. Fly at least four flights, better twenty, at two or three heights over the box (2 to 10 cm). Log
+    acceleration, gyro, motor commands and the down range at 100 Hz. Heights, times and speeds come from the logs.
+
+    \b
+    report.html    recorded and simulated signals overlaid; medians around edges; AUROC of a classifier of the
+                   two, by phase (0.5 is closed); the remaining differences, largest first
+    vehicle.toml   and scenario.toml: the twin, for simulate, gap and train
+    """
+    from airtouch.extras import need
+
+    need("train", "comparing the twin with the drone")
+    from airtouch import vehicle as vehicles
+    from airtouch.report import twin_report
+    from airtouch.twin import files
+    from airtouch.twin.comparison import compare, words
+    from airtouch.twin.comparison.curves import curves
+    from airtouch.twin.fitting import calibrate, levers
+    from airtouch.twin.recorded import flights as recordings
+
+    _check_free(out / calibrate.FIT, resume, force)
+    craft = vehicles.load(vehicle)
+    with Bar("reading") as bar:
+        recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
+    for _, reason in recorded.left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    fitted = calibrate.calibrate(recorded, craft, out, rounds=rounds, flights=batch, seed=seed, workers=workers,
+                                 bar=Bar)
+    with Bar("flying the twin") as bar:
+        flown, lost = compare.flown(recorded.courses, craft, fitted.levers, fitted.values, seed, levers.FIXED,
+                                    progress=bar)
+    with Bar("telling apart") as bar:
+        phase = count(1)
+        comparison = compare.compare(recorded, fitted.aim, flown, lost, seed, lambda name: bar(next(phase), 6, name))
+    typed = shlex.join(["airtouch", *sys.argv[1:]])
+    by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
+    summary = _summary(comparison, by_name, fitted.history, recorded, typed)
+    write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
+    twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flown), fitted.levers,
+                             fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
+    click.echo(f"{len(recorded.courses)} flights; misfit in scatters: "
+               f"{calibrate.in_words(fitted.history[0]['misfit'])} -> {calibrate.in_words(comparison.misfit)}")
+    for a in comparison.auroc:
+        click.echo(f"{a.phase:7} AUROC {a.value:.3f} ({a.low:.3f} to {a.high:.3f}), {a.real_flights} flights, "
+                   f"{a.windows} windows; tells: {a.telling[0]}")
+    click.echo("largest differences:")
+    for gap in comparison.gaps[:5]:
+        where, what, difference, scatters, n = words.gap_row(gap)
+        click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
+    click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
+
+
+def _check_free(fit_file: Path, resume: bool, force: bool) -> None:
+    if fit_file.exists() and not (resume or force):
+        raise AirTouchError(f"{fit_file.parent}: holds a twin already; --resume goes on with it, --force starts anew")
+    if force and not resume:
+        fit_file.unlink(missing_ok=True)
+
+
+def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
+    """The content of the report as plain values for JSON."""
+    return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
+            "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.lost,
+            "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,
+                      "difference": g.difference, "scatters": g.scatters, "flights": g.flights}
+                     for g in comparison.gaps],
+            "levers": levers, "history": history}

@@ -1,0 +1,1 @@
+"""What several commands share: the folder of flights, the progress bar, tables of scores."""

@@ -1,0 +1,45 @@
+"""The drone's clock, 24-bit milliseconds in every log packet, and the gaps that it shows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.logs.checks.clock import Gap
+
+WRAP_MS = 1 << 24  #: ms after which the counter wraps, 4 h 39 min
+LATEST_MS = 2000  #: ms that a packet may be late; a larger step back means that the drone restarted
+
+
+class Restarted(Exception):
+    """The drone's clock started again from zero: it was switched off, or it reset itself."""
+
+
+@dataclass
+class Ticks:
+    """Unwraps the time stamps of packets in order of arrival."""
+
+    newest_ms: int | None = None
+
+    def unwrap(self, stamp: int) -> int:
+        """The time of a 24-bit stamp in ms, without wraps. Raises Restarted if it is over LATEST_MS in the past."""
+        if self.newest_ms is None:
+            self.newest_ms = stamp
+            return stamp
+        step = (stamp - self.newest_ms + WRAP_MS // 2) % WRAP_MS - WRAP_MS // 2
+        if step < -LATEST_MS:
+            raise Restarted
+        at = self.newest_ms + step
+        self.newest_ms = max(self.newest_ms, at)
+        return at
+
+
+def gaps(times_ms: np.ndarray, period_ms: int = 10) -> list[Gap]:
+    """Gaps in a sorted clock, (n,) ms, of samples at this period."""
+    steps = np.diff(np.asarray(times_ms, dtype=np.int64))
+    missing = (steps + period_ms // 2) // period_ms - 1
+    return [Gap(int(i) + 1, int(missing[i]), float(steps[i]) / 1000.0) for i in np.flatnonzero(missing > 0)]
+
+
+def in_order(times_ms: np.ndarray) -> np.ndarray:
+    """Indices that sort a clock, (n,) ms, without duplicates."""
+    return np.unique(np.asarray(times_ms), return_index=True)[1]

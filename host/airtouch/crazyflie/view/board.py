@@ -1,0 +1,137 @@
+"""The live view of a flight, its data and its layout: the same for a drone and for a recorded flight."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from airtouch.crazyflie.view.sparkline import sparkline, text_map
+
+SECONDS = 10.0  #: s of signals shown
+WIDTH = 50
+#: label -> (function of the columns, lower and upper end of the scale, unit)
+SIGNALS = {
+    "P(over)": (None, 0.0, 1.0, ""),
+    "acc z": (lambda c: c.get("acc_z_mps2", c.get("acc_world_z_mps2")), 8.8, 10.8, "m/s²"),
+    "rates": (lambda c: np.sqrt(sum(c[f"gyro_{a}_radps"] ** 2 for a in "xyz")), 0.0, 1.0, "rad/s"),
+    "m4 - m1": (lambda c: c["m4_pwm"] - c["m1_pwm"], -8000.0, 8000.0, "PWM"),
+    "down": (lambda c: c.get("zrange_m"), 0.0, 1.2, "m"),
+}
+
+
+@dataclass(frozen=True)
+class Felt:
+    """A detected edge: kind, time of its report (s from the start), position (m), and probability."""
+
+    kind: str
+    at_s: float
+    x_m: float
+    y_m: float
+    probability: float
+
+
+@dataclass
+class Link:
+    """State of the link: rate (Hz), fraction of lost samples, lateness, round trip and silence (s)."""
+
+    rate_hz: float = float("nan")
+    lost: float = 0.0
+    late_s: float = float("nan")
+    round_trip_s: float = float("nan")
+    silent_s: float = 0.0
+
+    def __str__(self) -> str:
+        if self.silent_s > 1.0:
+            return f"SILENT for {self.silent_s:.1f} s"
+        if not np.isfinite(self.rate_hz):
+            return "waiting for data"
+        ways = [f"{self.rate_hz:.0f} Hz", f"{100 * self.lost:.1f} % lost"]
+        if np.isfinite(self.late_s):
+            ways.append(f"late {1000 * self.late_s:.0f} ms")
+        if np.isfinite(self.round_trip_s):
+            ways.append(f"round trip {1000 * self.round_trip_s:.0f} ms")
+        return ", ".join(ways)
+
+
+@dataclass
+class Board:
+    """Data of the live view: signals of the last SECONDS, track, edges, link.
+
+    lag_s: delay from a crossing to its report; an edge is placed on the track that much earlier.
+    """
+
+    title: str
+    detector: str
+    lag_s: float = 0.0
+    link: Link | None = None
+    status: str = ""
+    now_s: float = 0.0
+    felt: list[Felt] = field(default_factory=list)
+    latest: dict[str, float] = field(default_factory=dict)
+    _signals: dict[str, deque] = field(
+        default_factory=lambda: {name: deque(maxlen=int(100 * SECONDS)) for name in SIGNALS})
+    _track: list[tuple[float, float, float]] = field(default_factory=list)
+
+    def add(self, times_s: np.ndarray, columns: Mapping[str, np.ndarray], probability: np.ndarray) -> None:
+        """Append rows: seconds from the start, SI columns, and P(over a platform) or NaN; each (n,)."""
+        if not len(times_s):
+            return
+        self.now_s = float(times_s[-1])
+        self.latest = {name: float(values[-1]) for name, values in columns.items()}
+        for name, (make, *_) in SIGNALS.items():
+            values = probability if make is None else make(columns)
+            self._signals[name].extend(np.full(len(times_s), np.nan) if values is None else values)
+        if "x_m" in columns:
+            self._track += zip(times_s[::5], columns["x_m"][::5], columns["y_m"][::5], strict=True)
+
+    def feel(self, kind: str, at_s: float, probability: float) -> Felt:
+        """Add an edge reported at `at_s`. Its position is that of the drone one lag earlier."""
+        known = [p for p in self._track if np.isfinite(p[1])]
+        times = np.array([p[0] for p in known])
+        i = int(np.searchsorted(times, at_s - self.lag_s)) if known else 0
+        x, y = known[min(i, len(known) - 1)][1:] if known else (float("nan"), float("nan"))
+        felt = Felt(kind, at_s, float(x), float(y), probability)
+        self.felt.append(felt)
+        return felt
+
+    def line(self) -> str:
+        """The view as one line, for output that is no terminal."""
+        value = self.latest.get
+        parts = [f"{self.now_s:7.1f} s", f"P {self._last('P(over)'):.2f}",
+                 f"down {value('zrange_m', np.nan):.2f} m", f"{len(self.felt)} edges"]
+        parts += [f"{value('vbat_V'):.2f} V"] if np.isfinite(value("vbat_V", np.nan)) else []
+        parts += [str(self.link)] if self.link else []
+        return "  ".join(parts + ([self.status] if self.status else []))
+
+    def render(self):
+        """The whole view as a renderable of rich."""
+        from rich.columns import Columns
+        from rich.panel import Panel
+        from rich.table import Table
+        from rich.text import Text
+
+        signals = Table.grid(padding=(0, 1))
+        for name, (_, low, high, unit) in SIGNALS.items():
+            signals.add_row(name, Text(sparkline(self._signals[name], WIDTH, low, high), style="cyan"),
+                            f"{self._last(name):8.2f} {unit}")
+        if np.isfinite(self.latest.get("vbat_V", np.nan)):
+            signals.add_row("battery", "", f"{self.latest['vbat_V']:8.2f} V")
+        edges = [f"{f.kind:5} {f.at_s:6.2f} s  x {f.x_m:+.2f} y {f.y_m:+.2f} m  P {f.probability:.2f}"
+                 for f in self.felt[-6:]]
+        below = "\n".join([f"edges ({len(self.felt)}, {self.detector})", *edges])
+        track = np.array([(x, y) for _, x, y in self._track]).reshape(-1, 2)
+        plan = Text("\n".join(text_map(track, [(f.x_m, f.y_m, f.kind) for f in self.felt])))
+        foot = "   ".join(part for part in (str(self.link) if self.link else "", self.status) if part)
+        panels = [Panel(signals, title=f"last {SECONDS:g} s"),
+                  Panel(plan, title="from above: [ entry  ] exit  o drone"), Panel(below)]
+        return Panel(Columns(panels), title=f"{self.title}   {self.now_s:.1f} s", subtitle=foot)
+
+    def _last(self, name: str) -> float:
+        return float(self._signals[name][-1]) if self._signals[name] else float("nan")
+
+
+def edge_line(felt: Felt) -> str:
+    """A detected edge as one line of text."""
+    place = f", x {felt.x_m:+.2f} m, y {felt.y_m:+.2f} m" if np.isfinite(felt.x_m) else ""
+    return f"{felt.kind} felt at {felt.at_s:.2f} s{place} (P {felt.probability:.2f})"

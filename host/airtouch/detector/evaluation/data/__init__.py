@@ -1,0 +1,1 @@
+"""Flights to train and test on: under which conditions, held out with which, recorded or simulated."""

@@ -1,1 +1,0 @@
-../../../firmware/app/src/app_types.h

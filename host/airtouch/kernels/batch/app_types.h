@@ -1,0 +1,1 @@
+../../../../firmware/app/src/app_types.h

@@ -1,0 +1,1 @@
+../../../../firmware/kernels/kernel_types.h

@@ -1,1 +1,0 @@
-../../../firmware/kernels/kernel_types.h

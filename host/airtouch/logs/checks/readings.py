@@ -1,0 +1,77 @@
+"""Limits of values and times. Every log that is read from a file passes `checked` once."""
+
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError, shown
+from airtouch.logs.checks.clock import FASTEST_S, LATEST_S, SLOWEST_S
+from airtouch.logs.flight_log import FlightLog
+
+LARGEST = float(np.finfo(np.float32).max)  #: the firmware's variables are float32 or smaller
+
+
+def checked(log: FlightLog) -> FlightLog:
+    """The log with impossible values as NaN and without impossible metadata, with a warning for each kind.
+
+    Every value is then NaN or within float32, and n samples span less than n times 5 s. So time and
+    memory of any later step are bounded by the size of the log. Raises AirTouchError for a clock that
+    is not in seconds, or that is mostly impossible.
+    """
+    meta, warnings = _checked_meta(log.meta)
+    columns = {}
+    for name, values in log.columns.items():
+        with np.errstate(invalid="ignore"):
+            bad = np.abs(values) > LARGEST
+        columns[name] = _without(values, bad, f"{name}: no sensor reads", warnings)
+    if "t_s" in columns:
+        columns["t_s"] = _without(columns["t_s"], _impossible_times(columns["t_s"], log.source),
+                                  "t_s: not of this flight", warnings)
+    return FlightLog(columns, meta | {"warnings": warnings})
+
+
+def _without(values: np.ndarray, bad: np.ndarray, problem: str, warnings: list[str]) -> np.ndarray:
+    """The values with NaN where `bad`, (n,) both; adds a warning with their number."""
+    where = np.flatnonzero(bad)
+    if not len(where):
+        return values
+    warnings.append(f"{problem} {values[where[0]]:g} (sample {where[0]}); {len(where)} of {len(values)} values "
+                    "were taken as missing")
+    return np.where(bad, np.nan, values)
+
+
+def _impossible_times(time_s: np.ndarray, source: str) -> np.ndarray:
+    """True for times outside the interval of n times 5 s that holds the most times, (n,) bool."""
+    with np.errstate(invalid="ignore"):
+        wrong = np.abs(time_s) > LATEST_S
+    there = ~np.isnan(time_s)
+    possible = time_s[there & ~wrong]
+    if not len(possible):
+        return wrong
+    first = np.sort(possible)
+    last = first + SLOWEST_S * len(time_s)
+    most = np.argmax(np.searchsorted(first, last, side="right") - np.arange(len(first)))
+    wrong |= (time_s < first[most]) | (time_s > last[most])
+    if wrong.sum() > 0.5 * len(time_s) or _step(time_s[there & ~wrong]) > SLOWEST_S:
+        raise AirTouchError(f"{source}: {_step(possible):g} s from sample to sample, and {wrong.sum()} of "
+                            f"{len(time_s)} times cannot be; give t_s in seconds, correct it or leave it out")
+    return wrong
+
+
+def _step(time_s: np.ndarray) -> float:
+    """Median of the clock's forward steps in seconds; 0 without any."""
+    steps = np.diff(time_s)
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+
+
+def _checked_meta(meta: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """The metadata without known keys of a wrong type or value, and all warnings so far."""
+    meta, warnings = dict(meta), list(meta["warnings"])
+    period = meta.get("sample_period_s", 0.01)
+    if isinstance(period, bool) or not isinstance(period, (int, float)) or not FASTEST_S <= period <= SLOWEST_S:
+        warnings.append(f"sample_period_s: {shown(str(period))} is not {FASTEST_S:g} to {SLOWEST_S:g} s; left out")
+        del meta["sample_period_s"]
+    if meta.get("acc_frame", "body") not in ("body", "world"):
+        warnings.append(f"acc_frame: {shown(str(meta['acc_frame']))} is neither body nor world; taken as body")
+        meta["acc_frame"] = "body"
+    return meta, warnings

@@ -1,0 +1,1 @@
+"""What moves: rigid body, motors, battery, legs, and the forces on them."""

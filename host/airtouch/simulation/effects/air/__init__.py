@@ -1,0 +1,1 @@
+"""Effects of the air: on the rotors, on the body, near the ground, under another vehicle."""

@@ -1,0 +1,1 @@
+"""Effects of what the vehicle weighs, how that is spread, and what hangs below it."""

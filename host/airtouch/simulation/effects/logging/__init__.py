@@ -1,0 +1,1 @@
+"""Effects of how the log is written: they change no flight."""

@@ -1,0 +1,1 @@
+"""Effects of motors, propellers and battery."""

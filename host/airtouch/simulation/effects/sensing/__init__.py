@@ -1,0 +1,1 @@
+"""Effects of sensors, estimator and controller."""

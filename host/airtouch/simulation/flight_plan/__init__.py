@@ -1,0 +1,1 @@
+"""What a scenario asks for: the floor and platforms, the steps of a mission, values that are drawn."""

@@ -1,0 +1,150 @@
+"""From the steps of a mission to one set-point a logged row (100 Hz)."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.simulation.firmware import setpoint as c
+from airtouch.simulation.flight_plan.world import NONE, World, first_below, top_at
+
+RATE_HZ = 100
+MAX_SPEED_MPS = 1.0  #: the firmware's own limit (PID_POS_VEL_X_MAX)
+KEYS = {
+    "wait": {"time_s"}, "take-off": {"height_m", "time_s"}, "hover": {"time_s", "pulse_mps", "every_s"},
+    "go": {"to_m", "distance_m", "direction_deg", "height_m", "speed_mps"},
+    "zigzag": {"size_m", "spacing_m", "speed_mps"}, "land": {"time_s"},
+}
+NEEDED = {"take-off": {"height_m"}, "hover": {"time_s"}, "wait": {"time_s"}, "go": {"speed_mps"},
+          "zigzag": {"size_m", "spacing_m", "speed_mps"}}
+MAX_FLIGHT_S = 3600.0
+PULSE_ROWS = 2  #: set-point rows of a velocity pulse in hover: 20 ms, as of the authors' pilot program
+
+
+class _Pen:
+    """Draws set-points row after row."""
+
+    def __init__(self, start: Sequence[float], yaw_rad: float, position: bool, world: World) -> None:
+        self.rows: list[np.ndarray] = []
+        self.world = world
+        self.at = np.array([start[0], start[1], self.top(start)])
+        self.yaw, self.position = yaw_rad, position
+        self.motors = 0.0
+
+    def top(self, place: Sequence[float] | np.ndarray) -> float:
+        """Height of the surface at (x, y), m."""
+        return top_at(self.world, place[0], place[1])
+
+    def move(self, to: np.ndarray, seconds: float) -> None:
+        n = max(int(round(seconds * RATE_HZ)), 1)
+        share = np.arange(1, n + 1)[:, None] / n
+        places = self.at + share * (to - self.at)
+        block = np.zeros((n, c.SETPOINT_SIZE))
+        block[:, c.MODE] = float(self.position)
+        block[:, c.X:c.Z + 1] = places
+        block[:, c.VX:c.VY + 1] = (to - self.at)[:2] * RATE_HZ / n
+        block[:, c.YAW], block[:, c.MOTORS] = self.yaw, self.motors
+        self.rows.append(block)
+        self.at = to.copy()
+
+    @property
+    def count(self) -> int:
+        return sum(len(r) for r in self.rows)
+
+
+def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarray:
+    """Set-points (rows, 8) of a mission whose values are drawn.
+
+    mission: start_m, yaw_deg, control ("velocity" as the paper's flights, or "position"),
+    step: a list of tables with `do`. Raises AirTouchError for unknown or missing keys, for
+    a path through a surface and for speeds beyond the firmware's limit.
+    """
+    unknown = set(mission) - {"start_m", "yaw_deg", "control", "step"}
+    if unknown:
+        raise AirTouchError(f"{where}: mission has no key {', '.join(sorted(unknown))}")
+    control = mission.get("control", "velocity")
+    if control not in ("velocity", "position"):
+        raise AirTouchError(f"{where}: control is velocity or position, not {control!r}")
+    start = _pair(mission.get("start_m", [0.0, 0.0]), where, "start_m")
+    pen = _Pen(start, math.radians(mission.get("yaw_deg", 0.0)), control == "position", world)
+    if not mission.get("step"):
+        raise AirTouchError(f"{where}: a mission needs steps")
+    for i, step in enumerate(mission["step"]):
+        place = f"{where}: step {i + 1}"
+        kind = step.get("do")
+        if kind not in KEYS:
+            raise AirTouchError(f"{place}: no step {kind!r}; known: {', '.join(KEYS)}")
+        wrong = set(step) - KEYS[kind] - {"do"}
+        missing = NEEDED.get(kind, set()) - set(step)
+        if wrong or missing:
+            said, keys = ("does not take", wrong) if wrong else ("needs", missing)
+            raise AirTouchError(f"{place}: {kind} {said} {', '.join(sorted(keys))}")
+        for key in ("time_s", "speed_mps", "spacing_m"):
+            if key in step and not 0.0 < float(step[key]) < MAX_FLIGHT_S:
+                raise AirTouchError(f"{place}: {key} = {step[key]} must be positive")
+        if step.get("speed_mps", 0.0) > MAX_SPEED_MPS:
+            raise AirTouchError(f"{place}: {step['speed_mps']:g} m/s is faster than the firmware flies, "
+                                f"{MAX_SPEED_MPS:g} m/s")
+        first = pen.count
+        _run(pen, kind, step, place)
+        if kind in ("hover", "go", "zigzag"):
+            _check_path(pen, first, place)
+    return np.ascontiguousarray(np.concatenate(pen.rows))
+
+
+def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
+    if kind == "wait":
+        pen.motors = 0.0
+        pen.move(pen.at, step["time_s"])
+    elif kind == "take-off":
+        pen.motors = 1.0
+        pen.move(np.array([pen.at[0], pen.at[1], step["height_m"]]), step.get("time_s", 2.0))
+    elif kind == "hover":
+        pen.move(pen.at, step["time_s"])
+        if step.get("pulse_mps"):
+            if pen.position or step.get("every_s", 0.0) < 0.1:
+                raise AirTouchError(f"{place}: pulses need velocity control and every_s of 0.1 or more")
+            place_in = np.arange(len(pen.rows[-1])) % round(step["every_s"] * RATE_HZ)
+            pen.rows[-1][place_in >= place_in.max() + 1 - PULSE_ROWS, c.VX] = step["pulse_mps"]
+    elif kind == "go":
+        to = pen.at.copy()
+        if "to_m" in step:
+            to[:2] = _pair(step["to_m"], place, "to_m")
+        elif "distance_m" in step:
+            angle = math.radians(step.get("direction_deg", 0.0))
+            to[:2] += step["distance_m"] * np.array([math.cos(angle), math.sin(angle)])
+        to[2] = step.get("height_m", to[2])
+        pen.move(to, np.linalg.norm(to - pen.at) / step["speed_mps"])
+    elif kind == "zigzag":
+        length, width = _pair(step["size_m"], place, "size_m")
+        corner = pen.at.copy()
+        lines = int(width // step["spacing_m"]) + 1
+        for line in range(lines):
+            y = corner[1] + line * step["spacing_m"]
+            for x in ((0.0, length) if line % 2 == 0 else (length, 0.0)):
+                to = np.array([corner[0] + x, y, corner[2]])
+                pen.move(to, np.linalg.norm(to - pen.at) / step["speed_mps"])
+    else:
+        pen.move(np.array([pen.at[0], pen.at[1], pen.top(pen.at) - 0.1]), step.get("time_s", 3.0))
+        pen.motors = 0.0
+        pen.move(pen.at, 0.5)
+
+
+def _check_path(pen: _Pen, first: int, place: str) -> None:
+    rows = np.concatenate(pen.rows)[first::5]
+    if rows[0, c.MOTORS] == 0.0:
+        raise AirTouchError(f"{place}: it has not taken off")
+    struck = first_below(pen.world, rows[:, c.X:c.Z + 1])
+    if struck != NONE:
+        x, y, z = rows[struck, c.X:c.Z + 1]
+        raise AirTouchError(f"{place}: at ({x:.2f}, {y:.2f}) m it would fly "
+                            f"{z:.2f} m high through a surface {pen.top((x, y)):.2f} m high")
+
+
+def _pair(value: Any, place: str, key: str) -> tuple[float, float]:
+    if not (isinstance(value, (list, tuple)) and len(value) == 2 and all(isinstance(v, (int,
+            float)) for v in value)):
+        raise AirTouchError(f"{place}: {key} must be two numbers")
+    return float(value[0]), float(value[1])

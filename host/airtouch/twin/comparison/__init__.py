@@ -1,0 +1,1 @@
+"""How the fitted twin and the recorded flights differ: figures, curves, a classifier, sentences."""

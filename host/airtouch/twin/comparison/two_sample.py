@@ -1,0 +1,189 @@
+"""Classifier two-sample test of simulated against recorded flights: AUROC by phase, 0.5 if they are alike.
+
+Features of windows of one second (levels, slopes, band powers, correlations) are classified by gradient boosting,
+and scored on held-out flights. Source: Lopez-Paz, Oquab, Revisiting Classifier Two-Sample Tests, 2017.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.twin.recorded import channels as ch
+from airtouch.twin.recorded.channels import NAMES, RATE_HZ
+from airtouch.twin.recorded.course import PHASES, Course
+from airtouch.twin.recorded.features import PAIRS
+
+WINDOW, HOP = 100, 50  #: samples
+BANDS_HZ = ((0.5, 2.5), (2.5, 5), (5, 9), (9, 15), (15, 25), (25, 50))
+USED = ch.DOWN  #: number of channels that the classifier gets: all except the down range, which no detector gets
+FOLDS = 5
+STEPS = 255  #: bins of each feature, scikit-learn's maximum
+REPLICATES = 500  #: draws of the bootstrap
+LEVEL = 0.95
+FEWEST = 4  #: least number of flights of each kind in a phase
+
+
+@dataclass(frozen=True)
+class Auroc:
+    """AUROC of a phase on held-out flights, its interval by flight, and sample sizes."""
+
+    phase: str
+    value: float
+    low: float
+    high: float
+    real_flights: int
+    simulated_flights: int
+    windows: int
+    telling: tuple[str, ...]  #: the features that separate best, from the best
+
+
+@dataclass(frozen=True)
+class Windows:
+    """values (windows, numbers) with phase, flight (an index) of each; the same flight number in a real and a
+
+    simulated set means the same course: both are held out together.
+    """
+
+    values: np.ndarray
+    phase: np.ndarray
+    flight: np.ndarray
+
+
+def number_names() -> list[str]:
+    """Names of a window's features."""
+    out = []
+    for name in NAMES[:USED]:
+        out += [f"{name} level", f"{name} slope"] + [f"{name} {a:g}-{b:g} Hz" for a, b in BANDS_HZ]
+    return out + [f"correlation {NAMES[i]}, {NAMES[k]}" for i, k in PAIRS]
+
+
+def windows(flights: Sequence[tuple[np.ndarray, Course, int]]) -> Windows:
+    """Windows of flights, each given as (channels (n, 12), course, flight number).
+
+    Levels are relative to the median in the flight's own free air, so that trims do not count.
+    """
+    values, phases, numbers = [], [], []
+    for x, course, number in flights:
+        x = x[:, :USED] - np.median(x[course.free, :USED], axis=0)
+        for p, name in enumerate(PHASES):
+            span = course.phases()[name]
+            for start in range(span.start, min(span.stop, len(x)) - WINDOW + 1, HOP):
+                values.append(_numbers(x[start:start + WINDOW]))
+                phases.append(p)
+                numbers.append(number)
+    return Windows(np.array(values).reshape(-1, len(number_names())), np.array(phases), np.array(numbers))
+
+
+def _numbers(x: np.ndarray) -> np.ndarray:
+    t = np.linspace(-1.0, 1.0, len(x))
+    level = x.mean(axis=0)
+    slope = t @ x / (t @ t)
+    rest = x - level - t[:, None] * slope
+    power = np.abs(np.fft.rfft(rest * np.hanning(len(x))[:, None], axis=0)) ** 2
+    f = np.fft.rfftfreq(len(x), 1.0 / RATE_HZ)
+    bands = [np.log(power[(f >= a) & (f < b)].mean(axis=0) + 1e-9) for a, b in BANDS_HZ]
+    size = np.sqrt((rest * rest).sum(axis=0)) + 1e-9
+    pairs = [(rest[:, i] @ rest[:, k]) / (size[i] * size[k]) for i, k in PAIRS]
+    return np.r_[np.column_stack([level, slope, *bands]).ravel(), pairs]
+
+
+def two_sample(real: Windows, simulated: Windows, seed: int = 0,
+               progress: Callable[[str], None] = lambda _: None) -> list[Auroc]:
+    """AUROC of each phase in which both sets have FEWEST flights. The same arguments give the same result.
+
+    Raises AirTouchError without scikit-learn.
+    """
+    results = []
+    for p, name in enumerate(PHASES):
+        a, b = real.phase == p, simulated.phase == p
+        if min(len(np.unique(real.flight[a])), len(np.unique(simulated.flight[b]))) < FEWEST:
+            continue
+        progress(name)
+        x = np.vstack([real.values[a], simulated.values[b]])
+        kind = np.r_[np.zeros(a.sum(), int), np.ones(b.sum(), int)]
+        flight = np.r_[real.flight[a], simulated.flight[b]]
+        score, fold, telling = _out_of_fold(x, kind, flight, seed)
+        low, high = _interval(score, kind, flight, fold, seed)
+        results.append(Auroc(name, area_within(score, kind, fold), low, high, len(np.unique(real.flight[a])),
+                             len(np.unique(simulated.flight[b])), len(x), telling))
+    return results
+
+
+def area(score: np.ndarray, kind: np.ndarray) -> float:
+    """Area under the ROC curve: fraction of (1, 0) pairs in which the 1 scores higher; ties count half."""
+    order = np.sort(score[kind == 0])
+    ones = score[kind == 1]
+    below = np.searchsorted(order, ones, "left") + np.searchsorted(order, ones, "right")
+    return float(below.mean() / (2.0 * len(order)))
+
+
+def area_within(score: np.ndarray, kind: np.ndarray, fold: np.ndarray) -> float:
+    """`area` over pairs within a fold, because scores of different models cannot be compared."""
+    pairs, total = 0.0, 0.0
+    for k in np.unique(fold):
+        here = fold == k
+        count = float(kind[here].sum()) * float((1 - kind[here]).sum())
+        if count:
+            pairs, total = pairs + count, total + count * area(score[here], kind[here])
+    return total / pairs if pairs else float("nan")
+
+
+def _boosting(seed: int) -> Any:
+    try:
+        from sklearn.ensemble import HistGradientBoostingClassifier
+    except ImportError:
+        raise AirTouchError("the two-sample test needs scikit-learn: pip install 'airtouch[train]'") from None
+    return HistGradientBoostingClassifier(max_iter=80, learning_rate=0.1, max_leaf_nodes=12, min_samples_leaf=10,
+                                          l2_regularization=1.0,
+                                          class_weight="balanced", early_stopping=False, random_state=seed)
+
+
+def _steps(known: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """x (rows, features) in STEPS bins of each feature's distribution in `known`; trees need the order only.
+
+    Scikit-learn's own binning takes a hundred times as long for weighted rows.
+    """
+    edges = np.quantile(known, np.arange(1, STEPS) / STEPS, axis=0)
+    binned = [np.searchsorted(edge, column) for edge, column in zip(edges.T, x.T, strict=True)]
+    return np.column_stack(binned).astype(float)
+
+
+def _out_of_fold(x: np.ndarray, kind: np.ndarray, flight: np.ndarray, seed: int,
+                 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Score of each window by a model trained without its flight, its fold, and the features that separate best."""
+    numbers = np.random.default_rng(seed).permutation(np.unique(flight))
+    kinds = {number: (kind[flight == number].min(), kind[flight == number].max()) for number in numbers}
+    ordered = sorted(numbers, key=lambda number: kinds[number])  # each fold gets flights of both kinds
+    fold_of = {number: i % FOLDS for i, number in enumerate(ordered)}
+    fold = np.array([fold_of[number] for number in flight])
+    score, drop = np.zeros(len(x)), np.zeros(x.shape[1])
+    for k in range(FOLDS):
+        test, train = fold == k, fold != k
+        if not test.any() or len(np.unique(kind[train])) < 2:
+            continue
+        steps = _steps(x[train], x)
+        model = _boosting(seed).fit(steps[train], kind[train])
+        score[test] = model.predict_proba(steps[test])[:, 1]
+    for i in range(x.shape[1]):  # how well each feature separates alone
+        single = area(x[:, i], kind)
+        drop[i] = abs(single - 0.5)
+    listed = number_names()
+    best = np.argsort(-drop)[:3]
+    return score, fold, tuple(f"{listed[i]} ({0.5 + drop[i]:.2f} alone)" for i in best)
+
+
+def _interval(score: np.ndarray, kind: np.ndarray, flight: np.ndarray, fold: np.ndarray,
+              seed: int) -> tuple[float, float]:
+    rng = np.random.default_rng([seed, 1])
+    rows = {number: np.flatnonzero(flight == number) for number in np.unique(flight)}
+    numbers = list(rows)
+    values = []
+    for _ in range(REPLICATES):
+        take = np.concatenate([rows[numbers[i]] for i in rng.integers(len(numbers), size=len(numbers))])
+        values.append(area_within(score[take], kind[take], fold[take]))
+    tail = 50.0 * (1.0 - LEVEL)
+    low, high = np.nanpercentile(values, [tail, 100.0 - tail])
+    return float(low), float(high)

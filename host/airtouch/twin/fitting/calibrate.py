@@ -1,0 +1,111 @@
+"""A twin fitted to recorded flights: first the rounds of the fit, then the levers that act at edges, then the files."""
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch import vehicle as vehicles
+from airtouch.simulation import scenario
+from airtouch.simulation.batch import available_cores
+from airtouch.simulation.scenario import Scenario
+from airtouch.twin import files
+from airtouch.twin.fitting import edge_fit, fit
+from airtouch.twin.fitting import levers as lever_set
+from airtouch.twin.fitting.fit import Target
+from airtouch.twin.fitting.levers import Lever
+from airtouch.twin.recorded import flights as recordings
+from airtouch.twin.recorded.flights import Recorded
+from airtouch.vehicle import Vehicle
+
+FIT = "fit.json"
+ROUNDS, BATCH = 8, 160  #: rounds, and flights per round, of a twin that is fitted for a detector
+BARE = "paper-mixed"  #: scenario to train in if no twin can be fitted
+#: bar(stage) is a context manager; its value is called with (done, total, note)
+Bars = Callable[[str], AbstractContextManager[Callable[[int, int, str], None]]]
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A fit: its target, its levers and their values (levers,), and the misfit of each round."""
+
+    aim: Target
+    levers: tuple[Lever, ...]
+    values: np.ndarray
+    history: list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A twin: scenario, vehicle, and a description of their origin."""
+
+    scenario: Scenario
+    vehicle: Vehicle
+    what: str
+
+
+def of_folder(folder: Path) -> Twin:
+    """The twin in a folder that `airtouch twin` wrote. Raises AirTouchError if it cannot be read."""
+    return Twin(scenario.load(folder / files.SCENARIO), vehicles.load(str(folder / files.VEHICLE)), f"twin of {folder}")
+
+
+def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps: float | None = None, seed: int = 0,
+               bar: Bars) -> Twin:
+    """A twin fitted to flights over a platform that have every sensor; the plain simulator if there are too few.
+
+    work: folder for the fit; the same call does not fit again. speed_mps: commanded speed of flights without one in
+    their manifest.
+    """
+    if len(paths) < recordings.FEWEST:
+        return Twin(scenario.load(BARE), vehicle, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
+                    f"acceleration, gyro, motors and down range, here are {len(paths)}; simulator as it is")
+    with bar("reading again") as told:
+        recorded = recordings.recorded(paths, speed_mps=speed_mps,
+                                       progress=lambda done, total: told(done, total, ""))
+    out = work / f"twin_{key(recorded, vehicle, flights=BATCH, seed=seed)}"
+    calibrate(recorded, vehicle, out, rounds=ROUNDS, flights=BATCH, seed=seed, bar=bar)
+    return Twin(scenario.load(out / files.SCENARIO), vehicles.load(str(out / files.VEHICLE)),
+                f"twin fitted to {len(recorded.courses)} of them")
+
+
+def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, flights: int, seed: int, bar: Bars,
+              workers: int | None = None) -> Calibrated:
+    """Fit a twin and write vehicle.toml, scenario.toml and fit.json to a folder. The same arguments give the same twin.
+
+    Finished rounds are in fit.json, so that the same call continues after a stop. Raises AirTouchError if fit.json is
+    a fit of other flights or settings.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    workers = workers or available_cores()
+    aim, levers, asked = _asked(recorded, vehicle, flights, seed)
+    with bar("fitting") as told:
+        state = fit.fit(aim, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
+                        fixed=lever_set.FIXED, kept=out / FIT,
+                        progress=lambda done, total, now: told(done, total, f"misfit {fit.total(now):.2f}"))
+    if state.refined is None:
+        with bar("edges") as told:
+            state.refined = edge_fit.refine(
+                aim, vehicle, levers, fit.best(state), flights=edge_fit.share(flights), seed=seed, workers=workers,
+                fixed=lever_set.FIXED, progress=lambda done, total: told(done, total, "")).values
+        fit.save(out / FIT, state, asked)
+    files.write(out, vehicle, levers, state.refined, recorded.courses, lever_set.FIXED, force=True)
+    return Calibrated(aim, levers, state.refined, state.history)
+
+
+def key(recorded: Recorded, vehicle: Vehicle, *, flights: int, seed: int) -> str:
+    """Hash, of twelve digits, of the flights, the vehicle and the settings of a fit."""
+    return _asked(recorded, vehicle, flights, seed)[2]
+
+
+def _asked(recorded: Recorded, vehicle: Vehicle, flights: int, seed: int) -> tuple[Target, tuple[Lever, ...], str]:
+    aim = fit.target(recorded.courses, recorded.features)
+    levers = lever_set.default(vehicle, recorded.near)
+    return aim, levers, fit.key(aim, vehicle, levers, flights=flights, seed=seed, fixed=lever_set.FIXED)
+
+
+def in_words(misfit: dict[str, float]) -> str:
+    """Each group with its misfit in scatters, as text."""
+    return ", ".join(f"{name} {value:.2f}" for name, value in misfit.items())

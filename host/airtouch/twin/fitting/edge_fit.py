@@ -1,0 +1,119 @@
+"""Last stage of a fit: the levers that act at edges, by paired simulated flights.
+
+The rounds of `fit` draw all levers at once, and few of the flights are high ones: their edges hardly enter. Here each
+lever is moved alone, with the same courses and random numbers, as many high flights as low ones. The difference of two
+such flights is what the lever does, nearly without noise (common random numbers; Glasserman, Monte Carlo Methods in
+Financial Engineering, 2003, chapter 7). Gauss-Newton steps follow, each kept only if the misfit falls.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from airtouch.twin.fitting import fit, fly
+from airtouch.twin.fitting import levers as lever_set
+from airtouch.twin.fitting.fit import Target
+from airtouch.twin.fitting.levers import Lever
+from airtouch.twin.recorded.course import Course
+from airtouch.twin.recorded.features import CLASSES, height_class
+from airtouch.vehicle import Vehicle
+
+#: effects whose levers are moved; motors and their delay are felt in each answer to an edge
+EFFECTS = ("ground_effect", "flow_scale", "flow_latency", "range_bias", "range_step", "motor_lag", "actuator_delay")
+FLIGHTS = 60  #: of each comparison
+STEPS = 4  #: Gauss-Newton steps
+SHRINK = 0.5  #: of a step that did not help
+FIRST = 500_000  #: number of the first flight; larger than that of any flight of the rounds
+
+
+@dataclass(frozen=True)
+class EdgeFit:
+    """A fit: values (levers,), and the cost before each step and after the last (weighted squared misfits)."""
+
+    values: np.ndarray
+    misfit: list[float]
+
+
+def refine(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, *, seed: int = 0,
+           fixed: Mapping[str, Any] | None = None, workers: int = 1, flights: int = FLIGHTS,
+           progress: Callable[[int, int], None] = lambda *_: None) -> EdgeFit:
+    """Fit the levers of EFFECTS to the recorded edges. The same arguments give the same result.
+
+    values: (levers,) to start from. The cost is that of `fit.best`, on `flights` flights that all comparisons share.
+    """
+    moved = [k for k, lever in enumerate(levers) if lever.of in EFFECTS]
+    some = [levers[k] for k in moved]
+    steps = np.array([lever.step for lever in some])
+    of = balanced(aim.courses, flights, np.random.default_rng([seed, 17]))
+    total = 1 + len(moved) + STEPS
+    done = 0
+
+    def apart(now: np.ndarray) -> np.ndarray:
+        nonlocal done
+        flown = fly.flown_features([aim.courses[i] for i in of], vehicle, levers, np.tile(now, (len(of), 1)), seed,
+                                   FIRST, fixed, workers)
+        progress(done := done + 1, total)
+        return np.clip((flown - aim.features[of]) / aim.scatter, -fit.CLIP, fit.CLIP)
+
+    values = lever_set.clipped(levers, values)
+    here = apart(values)
+    jacobian = np.column_stack([_mean(apart(_moved(values, k, levers[k])) - here) / _sign(values[k], levers[k])
+                                for k in moved])
+    recorded = np.maximum(np.isfinite(aim.features).sum(axis=0), 1)
+    history = [_cost(_mean(here))]
+    share = 1.0
+    for _ in range(STEPS):
+        step = share * fit.least_squares_step(np.nan_to_num(jacobian), _mean(here), _variance(here) + 1.0 / recorded,
+                                              some, values[moved], steps)
+        tried = values.copy()
+        tried[moved] += steps * step
+        tried = lever_set.clipped(levers, tried)
+        there = apart(tried)
+        history.append(_cost(_mean(there)))
+        if history[-1] < min(history[:-1]):
+            values, here = tried, there
+        else:
+            share *= SHRINK
+    return EdgeFit(values, history)
+
+
+def share(batch: int) -> int:
+    """Flights of a comparison, in proportion to the `batch` flights of a round: FLIGHTS for 160."""
+    return FLIGHTS * batch // 160
+
+
+def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) -> np.ndarray:
+    """Numbers of courses, (count,), with equal numbers of each height class and of each course within a class."""
+    height = [height_class(c.clearance_m) for c in courses]
+    classes = [rng.permutation([i for i, h in enumerate(height) if h == name]) for name in CLASSES if name in height]
+    classes = classes or [np.arange(len(courses))]
+    chosen = [(classes[n % len(classes)], n // len(classes)) for n in range(count)]
+    return np.array([some[n % len(some)] for some, n in chosen])
+
+
+def _sign(value: float, lever: Lever) -> float:
+    """The direction in which a lever is moved: 1, or -1 if 1 is out of bounds."""
+    return 1.0 if value + lever.step <= lever.high else -1.0
+
+
+def _moved(values: np.ndarray, k: int, lever: Lever) -> np.ndarray:
+    out = values.copy()
+    out[k] += _sign(values[k], lever) * lever.step
+    return out
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    count = np.isfinite(values).sum(axis=0)
+    return np.where(count >= fit.FEWEST, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
+
+
+def _variance(values: np.ndarray) -> np.ndarray:
+    count = np.isfinite(values).sum(axis=0)
+    off = values - _mean(values)
+    return np.where(count >= fit.FEWEST, np.nansum(off * off, axis=0) / np.maximum(count, 1) ** 2, np.nan)
+
+
+def _cost(gap: np.ndarray) -> float:
+    return fit.total(fit.misfit(gap)) ** 2

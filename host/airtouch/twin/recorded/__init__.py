@@ -1,0 +1,1 @@
+"""Recorded flights: read, their course worked out from the log alone, their features."""

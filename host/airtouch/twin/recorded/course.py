@@ -1,0 +1,215 @@
+"""The course of a flight, from its log alone: heights, times, speed, phases.
+
+A course is the input with which the simulator repeats the flight: hover, a velocity step, a platform,
+a stop. The platform follows from the steps of the down range.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from airtouch.detector.shared.channels import level_acceleration
+from airtouch.errors import AirTouchError
+from airtouch.logs.checks.clock import sample_period
+from airtouch.logs.edges import Edge, true_edges
+from airtouch.logs.flight_log import ACC, GYRO, PWM, VELOCITY, FlightLog
+from airtouch.logs.in_flight import airborne
+from airtouch.logs.segments import LEVEL_PART, PLATFORM_STEP_M
+from airtouch.twin.recorded import pulses
+
+RATE_HZ = 100.0
+LEAST_FREE_S = 3.0  #: s, least free air before the platform; spectra need it
+LEAST_FREE_M = 0.25  #: m, down range above which there is no ground effect
+SETTLED_S = 1.0  #: s after the climb until level flight counts as free air
+STEP_S = 1.5  #: s, longest duration of a velocity step
+RISE_S = 0.35  #: s from a velocity step to half of its speed, Crazyflie with the firmware's gains
+PHASES = ("hover", "cruise", "entry", "over", "exit", "after")
+AROUND_S = (0.5, 1.0)  #: s before and after an edge that belong to the edge's phase
+
+
+@dataclass(frozen=True)
+class Course:
+    """One flight. Times in s, heights in m as the down range shows them, samples of the log.
+
+    cruise_m: level height before the platform. clearance_m: median height over the platform. before_m, entered_m: just
+    before and just after the entry. climb_s: from the motors' start to level flight; hover_s: to the velocity step;
+    before_s: to the entry; over_s: to the exit; stop_s: to the end of the forward flight; after_s: from the exit to
+    the landing. speed_mps: of the velocity step; speed_from: "stated",
+    "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated. pulse_s: period of
+    velocity pulses in the hover, 0: none. top_m: height of the platform where other flights tell it (`near_range`), 0:
+    not known.
+    """
+
+    source: str
+    cruise_m: float
+    clearance_m: float
+    before_m: float
+    entered_m: float
+    climb_s: float
+    hover_s: float
+    before_s: float
+    over_s: float
+    stop_s: float
+    after_s: float
+    speed_mps: float
+    speed_from: str
+    angle_deg: float
+    start: int
+    level: int
+    step: int
+    entry: int
+    exit: int
+    landing: int
+    pulse_s: float = 0.0
+    top_m: float = 0.0
+
+    def as_dict(self) -> dict[str, float | int | str]:
+        """The fields as plain values, for files."""
+        return asdict(self)
+
+    def phases(self) -> dict[str, slice]:
+        """Phase of PHASES -> samples."""
+        before, behind = (int(s * RATE_HZ) for s in AROUND_S)
+        settled = int(SETTLED_S * RATE_HZ)
+        step = max(min(self.step, self.entry - before), self.level + settled)
+        spans = {"hover": (self.level + settled, step),
+                 "cruise": (step, self.entry - before),
+                 "entry": (self.entry - before, min(self.entry + behind, self.exit)),
+                 "over": (self.entry + 20, self.exit - 10),
+                 "exit": (self.exit - before, min(self.exit + behind, self.landing)),
+                 "after": (self.exit + behind, self.landing)}
+        return {name: slice(a, max(a, b)) for name, (a, b) in spans.items()}
+
+    @property
+    def free(self) -> slice:
+        """Samples of level flight in free air before the platform."""
+        return slice(self.level + int(SETTLED_S * RATE_HZ), self.entry - int(AROUND_S[0] * RATE_HZ))
+
+
+def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | None = None) -> Course:
+    """The course of a flight over one platform, the first one.
+
+    speed_mps, angle_deg: from a manifest, if it states them. Raises AirTouchError, with what to fly, for a log
+    without down range, platform or free air.
+    """
+    check(log)
+    edges = platform_edges(log)
+    down = median_filter(_held(log["zrange_m"]), 5)
+    flying = airborne(log)
+    entry = next((e for e in edges if e.kind == "entry"), None)
+    leave = next((e for e in edges if entry and e.kind == "exit" and e.sample > entry.sample), None)
+    if entry is None or leave is None:
+        raise AirTouchError(f"{log.source}: no platform in its down range; fly straight over a table's or a "
+                            "box's two edges, at least 12 cm higher than the floor")
+    start = _last_start(flying, entry.sample)
+    last = len(log) if flying[leave.sample:].all() else leave.sample + int(np.argmin(flying[leave.sample:]))
+    cruise = float(np.median(down[max(entry.sample - 150, start):entry.sample - 3]))
+    level = start + int(np.argmax(down[start:entry.sample] > LEVEL_PART * cruise))
+    free_s = (entry.sample - level) / RATE_HZ - SETTLED_S - AROUND_S[0]
+    if free_s < LEAST_FREE_S or cruise < LEAST_FREE_M:
+        raise AirTouchError(f"{log.source}: {max(free_s, 0.0):.1f} s of level flight in free air before the "
+                            f"platform; hover {LEAST_FREE_S + 2:g} s at {LEAST_FREE_M:g} m or higher first")
+    behind = down[leave.sample + 10:last] < LEVEL_PART * cruise
+    landing = leave.sample + 10 + (int(np.argmax(behind)) if behind.any() else len(behind))
+    step, measured, how = _velocity_step(log, level, entry.sample)
+    stop = _stop(log, step, leave.sample, landing)
+    speed = speed_mps if speed_mps is not None else measured
+    over = (leave.sample - entry.sample) / RATE_HZ
+    clearance = float(np.median(down[entry.sample + min(20, int(30 * over)):leave.sample - 3]))
+    before = float(np.median(down[max(entry.sample - 30, level):entry.sample - 4]))
+    return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ,
+                  (step - level) / RATE_HZ, (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
+                  (landing - leave.sample) / RATE_HZ, speed,
+                  "stated" if speed_mps is not None else how, angle_deg or 0.0, start, level, step,
+                  entry.sample, leave.sample, landing, pulses.period(log, level, step))
+
+
+def platform_edges(log: FlightLog) -> list[Edge]:
+    """True edges of a log; without any, the edges of platforms of at least 12 cm."""
+    return true_edges(log) or true_edges(log, PLATFORM_STEP_M)
+
+
+def check(log: FlightLog) -> None:
+    """Raise AirTouchError, in one line with the remedy, for a log that cannot be used to fit a twin."""
+    log.require(*ACC, *GYRO, *PWM)
+    if not log.has("zrange_m") or not np.isfinite(log["zrange_m"]).any():
+        raise AirTouchError(f"{log.source}: no down range in this log; log range.zrange (flow deck or Z-ranger) too")
+    period = sample_period(log)
+    if abs(period - 1.0 / RATE_HZ) > 0.02 / RATE_HZ:
+        raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, a twin needs 100 Hz: "
+                            "airtouch logs convert --rate 100")
+
+
+def one_vehicle(logs: Sequence[FlightLog]) -> str:
+    """The vehicle of all the logs; "" if none names one. Raises AirTouchError for two different ones."""
+    names = {str(log.meta["vehicle"]): log.source for log in logs if log.meta.get("vehicle")}
+    if len(names) > 1:
+        (first, one), (second, other) = list(names.items())[:2]
+        raise AirTouchError(f"two vehicles: {first} flew {one}, {second} flew {other}; fit one twin for each")
+    return next(iter(names), "")
+
+
+def _last_start(flying: np.ndarray, entry: int) -> int:
+    grounded = np.flatnonzero(~flying[:entry])
+    return int(grounded[-1]) + 1 if len(grounded) else 0
+
+
+def _held(values: np.ndarray) -> np.ndarray:
+    good = np.isfinite(values)
+    return np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+
+
+def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, str]:
+    """Sample of the forward velocity step before an entry, its speed in m/s, and the source of the speed.
+
+    The source is the logged velocity, or without one the horizontal acceleration, less its mean in level
+    flight, integrated over STEP_S; accurate to about 0.07 m/s.
+    """
+    settled = min(level + int(SETTLED_S * RATE_HZ), entry - 50)
+    if log.has(*VELOCITY[:2]):
+        speed = _speed(log)
+        final = float(np.median(speed[max(entry - 50, settled):entry - 5]))
+        slow = np.flatnonzero(speed[settled:entry] < 0.5 * final)
+        half = settled + (int(slow[-1]) if len(slow) else 0)
+        return max(half - int(RISE_S * RATE_HZ), settled), final, "velocity"
+    gained = _gain(_horizontal(log, settled, entry))
+    first = int(np.argmax(np.hypot(*gained.T)))
+    reached = float(np.hypot(*gained[first]))
+    total = np.hypot(*np.cumsum(_horizontal(log, settled, entry)[first:], axis=0).T) / RATE_HZ
+    half = first + int(np.argmax(total > 0.5 * reached))
+    return max(settled + half - int(RISE_S * RATE_HZ), settled), reached, "acceleration"
+
+
+def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:
+    """Sample after an exit at which the forward flight ends: that of the largest loss of speed."""
+    if landing - leave < int(STEP_S * RATE_HZ):
+        return landing
+    if log.has(*VELOCITY[:2]):
+        speed = _speed(log)
+        fast = np.flatnonzero(speed[leave:landing] > 0.5 * np.median(speed[step:leave]))
+        half = leave + (int(fast[-1]) if len(fast) else 0)
+    else:
+        forward = _gain(_horizontal(log, step, leave))[0]
+        lost = _gain(_horizontal(log, leave, landing)) @ (forward / max(np.hypot(*forward), 1e-9))
+        half = leave + int(np.argmin(lost)) + int(RISE_S * RATE_HZ)
+    return min(max(half - int(RISE_S * RATE_HZ), leave), landing)
+
+
+def _speed(log: FlightLog) -> np.ndarray:
+    return np.hypot(*(np.nan_to_num(log[c]) for c in VELOCITY[:2]))
+
+
+def _gain(acc: np.ndarray) -> np.ndarray:
+    """Gain of speed over STEP_S (or half of the interval) from each sample on, (m, 2) m/s, of acc (n, 2)."""
+    n = max(min(int(STEP_S * RATE_HZ), len(acc) // 2), 1)
+    total = np.vstack([np.zeros(2), np.cumsum(acc, axis=0)]) / RATE_HZ
+    return total[n:] - total[:-n]
+
+
+def _horizontal(log: FlightLog, start: int, stop: int) -> np.ndarray:
+    """Horizontal specific force of samples start to stop - 1 less its median, (n, 2) m/s^2, with gaps filled."""
+    acc = level_acceleration(log)[start:stop, :2]
+    acc = np.column_stack([_held(a) for a in acc.T])
+    return acc - np.median(acc, axis=0)
