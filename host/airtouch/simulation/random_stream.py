@@ -6,6 +6,7 @@ Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64); Marsaglia, Tsang, The 
 for Generating Random Variables, 2000.
 """
 
+import functools
 import math
 import zlib
 
@@ -39,8 +40,12 @@ _HEIGHT = np.exp(-0.5 * _EDGE**2)
 
 def stream(seed: int, flight: int, name: str) -> np.ndarray:
     """The state (1,) uint64 of the stream `name` of a flight."""
-    key = np.random.SeedSequence([seed, flight, zlib.crc32(name.encode())])
-    return key.generate_state(1, np.uint64)
+    return np.array([_begin(seed, flight, name)])
+
+
+@functools.lru_cache(512)
+def _begin(seed: int, flight: int, name: str) -> np.uint64:
+    return np.random.SeedSequence([seed, flight, zlib.crc32(name.encode())]).generate_state(1, np.uint64)[0]
 
 
 @jit(float64(STREAM))

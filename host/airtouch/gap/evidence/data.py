@@ -136,13 +136,14 @@ def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, n
 
 def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    return _cached(data, "_spectra", active, lambda: [_replay(data, *pair, active)
-                                                      for pair in zip(data.flights, data.first, strict=True)])
+    kept = data.__dict__.setdefault("_ungated", [{} for _ in data.flights])
+    return _cached(data, "_spectra", active, lambda: [
+        _replay(data, *each, active) for each in zip(data.flights, data.first, kept, strict=True)])
 
 
-def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], active: Sequence[Active],
+def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], kept: dict, active: Sequence[Active],
             ) -> dict[str, np.ndarray]:
-    rest = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active))
+    rest = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), kept)
     return {r: blocks(rest, first[r], r) for r in first}
 
 

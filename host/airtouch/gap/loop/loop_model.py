@@ -3,7 +3,7 @@
 The controllers are those of `gap.loop.controller`. Commands are in newtons per motor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -26,13 +26,17 @@ CUT_POWER = 0.6  #: attitude gains of 0.5 to 1.5 and rate gains of 0.8 to 1.3
 CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1
 
 
+#: what `loop_parts` gives
+Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
 def of_loop(row: Any, axis: str) -> tuple[float, ...]:
     """All that a plant row gives the loop of one axis beside its controller: rows alike in this have the same spectra.
 
     The controller itself, where it is the firmware's, is `firmware(row, axis)`.
     """
     lags = [float(row[name]) for name in ("actuator_delay", "motor_rise", "motor_fall", "sensor_delay")]
-    gains = [float(np.mean(row["gain"])), *(float(row[name]) for name in (
+    gains = [_mean_of_rotors(row["gain"]), *(float(row[name]) for name in (
         "height_gain", "rate_gain", "attitude_gain", "position_gain", "gravity", "mass"))]
     if axis == "thrust":
         return (*lags, *gains)
@@ -42,7 +46,13 @@ def of_loop(row: Any, axis: str) -> tuple[float, ...]:
 
 def _arm(row: Any, i: int) -> float:
     """Mean distance of the rotors from the axis of roll (0) or pitch (1), m."""
-    return float(np.mean(np.abs(row["rotor_y" if i == 0 else "rotor_x"])))
+    return _mean_of_rotors(np.abs(row["rotor_y" if i == 0 else "rotor_x"]))
+
+
+def _mean_of_rotors(values: np.ndarray) -> float:
+    """Mean (4,); NumPy's own takes ten times as long."""
+    a, b, c, d = values.tolist()
+    return (a + b + c + d) / 4.0
 
 
 def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
@@ -116,19 +126,39 @@ def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarra
     for noise of given strengths (..., sources) and steps; width: of neighbouring bins of f that are
     smoothed over, standard deviation.
     """
-    cross, power = _spectra_of_turning(c, row, axis, f)
-    cross, power = strengths @ cross, strengths @ power
-    if step.power:
-        logged, turned = _stepped(c, row, axis, np.maximum(f, 0.05), step.kick)
-        cross, power = cross + step.power * turned * logged.conj(), power + step.power * np.abs(logged) ** 2
+    return turnings_per_command(c, row, axis, strengths, f, width, [step])[0]
+
+
+def turnings_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, width: float,
+                         steps: Sequence[Step]) -> list[np.ndarray]:
+    """`turning_per_command` for each of several steps."""
+    at = np.maximum(f, 0.05)
+    parts = loop_parts(c, row, axis, at)
+    cross, power = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
+    made = {NO_STEP: (cross, power)}
+    known = [s for s in dict.fromkeys(steps) if s.power]
+    for s, stepped in zip(known, _stepped(c, row, at, parts, [s.kick for s in known]), strict=True):
+        made[s] = _with_steps(cross, power, s.power, *stepped)
+    crosses, powers = (np.array(x) for x in zip(*made.values(), strict=True))
     if width > 0.0:
-        cross, power = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (cross, power))
-    return cross / power
+        crosses, powers = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (crosses, powers))
+    each = dict(zip(made, crosses / powers, strict=True))
+    return [each[s if s.power else NO_STEP] for s in steps]
 
 
-def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """S_yu and S_uu (sources, bins) of the angular acceleration and the logged command for noise of unit power."""
-    logged, turned = _transfers(c, row, axis, np.maximum(f, 0.05))
+def _with_steps(cross: np.ndarray, power: np.ndarray, amount: float, logged: np.ndarray, turned: np.ndarray,
+                ) -> tuple[np.ndarray, np.ndarray]:
+    """S_yu and S_uu of noise, `cross` and `power`, and of steps of a power `amount` beside it (`_stepped`)."""
+    return cross + amount * turned * logged.conj(), power + amount * np.abs(logged) ** 2
+
+
+def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray, parts: Parts,
+                        ) -> tuple[np.ndarray, np.ndarray]:
+    """S_yu and S_uu (sources, bins) of the angular acceleration and the logged command for noise of unit power.
+
+    parts: of the loop at f, no lower than 0.05 Hz.
+    """
+    logged, turned = _transfers(c, row, np.maximum(f, 0.05), parts)
     cross, aliases = turned * logged.conj(), _aliases(c, row, axis, f)
     for k, folded in zip(FOLDS[1:], aliases, strict=False):  # noise of the gyro folds into log and command alike
         beyond = f + k / PERIOD_S
@@ -147,13 +177,15 @@ def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.nda
     known = (turning != 0.0) & (f > STEP_HZ[0]) & (f < STEP_HZ[1])
     if not known.any():
         return NO_STEP
-    noise = strengths @ _spectra_of_turning(c, row, axis, f)[1]
+    at = np.maximum(f, 0.05)
+    parts = loop_parts(c, row, axis, at)
+    cross, noise = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
     best, least = NO_STEP, np.inf
-    for kick in KICKS:
-        logged, _ = _stepped(c, row, axis, np.maximum(f, 0.05), kick)
+    for kick, (logged, turned) in zip(KICKS, _stepped(c, row, at, parts, KICKS), strict=True):
         step = Step(float(np.median(((over - 1.0) * noise / np.abs(logged) ** 2)[known])), float(kick))
         if step.power > 0.0:
-            made = turning_per_command(c, row, axis, strengths, f, step=step)
+            both, power = _with_steps(cross, noise, step.power, logged, turned)
+            made = both / power
             misfit = float((np.abs(made[known] / turning[known] - 1.0) ** 2).sum())
             if misfit < least:
                 best, least = step, misfit
@@ -191,14 +223,14 @@ def _plant(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     s = fixed.s
     motor = _delayed(float(row["actuator_delay"]), 0.0, f.shape, f.tobytes()) * fixed.hold * 0.5 * (
         1.0 / (1.0 + s * float(row["motor_rise"])) + 1.0 / (1.0 + s * float(row["motor_fall"])))
-    lift = 4.0 * float(np.mean(row["gain"]))
+    lift = 4.0 * _mean_of_rotors(row["gain"])
     if axis == "thrust":
         return lift / float(row["mass"]) * motor / s
     i = AXES.index(axis) - 1
     return lift * _arm(row, i) / float(row["inertia"][i]) * motor / s
 
 
-def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, ...]:
+def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> Parts:
     """Transfer functions at frequencies f, Hz, each complex and as long as f: plant, rate path, angle path, velocity
     path and the whole controller.
 
@@ -213,32 +245,37 @@ def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     if axis == "thrust":
         k = float(row["height_gain"])
         late = late * renewed / fixed.acc
-        climb = k * c.gain * (1.0 + c.integral / s) * late
-        height = climb * c.angle * k * (1.0 + c.angle_integral / s) / s
+        climb = k * c.gain * fixed.integral * late
+        height = climb * c.angle * k * fixed.angle_integral / s
         return plant, climb, height, 0.0 * s, climb + height
     k = c.gain * float(row["rate_gain"])
-    change = c.derivative * fixed.change
     filtered = late / fixed.lowpass / fixed.chip
-    rate = k * (1.0 + c.integral / s + change) * filtered
-    angle = k * (1.0 + c.integral / s + (change if c.on_error else 0.0)) * c.angle * float(row["attitude_gain"])
-    angle = angle * (1.0 + c.angle_integral / s)
-    velocity = angle * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
-    angle, velocity = angle * filtered * renewed / s, velocity * renewed * float(row["gravity"]) / s ** 2 * late
+    rate = k * fixed.whole * filtered
+    angle = k * (fixed.whole if c.on_error else fixed.integral) * c.angle * float(row["attitude_gain"])
+    angle = angle * fixed.angle_integral
+    velocity = angle * c.velocity * float(row["position_gain"]) * fixed.velocity_integral
+    angle, velocity = angle * filtered * renewed / s, velocity * renewed * float(row["gravity"]) / fixed.s2 * late
     return plant, rate, angle, velocity, rate + angle + velocity
 
 
 class Fixed(NamedTuple):
     """What no gain and no vehicle changes in the loop at some frequencies: arrays of their shape, or 1.
 
-    s: 2 pi i f; hold: of the motors' commands; renewed: of the estimator's attitude, velocity and height, which hold
-    between two predictions; change, outer: differences over a run of the controller and of the outer loop, 1/s;
-    lowpass, chip, acc: by which the controller's low-pass, the gyro's own and that of the acceleration divide.
+    s: 2 pi i f; s2: its square; hold: of the motors' commands; renewed: of the estimator's attitude, velocity and
+    height, which hold between two predictions; integral, angle_integral, velocity_integral: 1 and the integral of the
+    error, in the three loops; whole: with the derivative, in the innermost; outer: differences over a run of the outer
+    loop, 1/s; lowpass, chip, acc: by which the controller's low-pass, the gyro's own and that of the acceleration
+    divide.
     """
 
     s: np.ndarray
+    s2: np.ndarray
     hold: np.ndarray
     renewed: np.ndarray
-    change: np.ndarray
+    integral: np.ndarray
+    angle_integral: np.ndarray
+    velocity_integral: np.ndarray
+    whole: np.ndarray
     outer: np.ndarray
     lowpass: np.ndarray | float
     chip: np.ndarray | float
@@ -246,19 +283,23 @@ class Fixed(NamedTuple):
 
 
 def _fixed(c: Controller, f: np.ndarray) -> Fixed:
-    return _fixed_at(c.period_s, c.hold_s, c.lowpass_hz, c.chip_hz, c.acc_hz, f.shape, f.tobytes())
+    return _fixed_at(c.period_s, c.hold_s, (c.lowpass_hz, c.chip_hz, c.acc_hz),
+                     (c.integral, c.angle_integral, c.velocity_integral, c.derivative), f.shape, f.tobytes())
 
 
 @lru_cache(256)
-def _fixed_at(period: float, hold: float, lowpass: float, chip: float, acc: float, shape: tuple[int, ...],
-              frequencies: bytes) -> Fixed:
+def _fixed_at(period: float, hold: float, filters: tuple[float, float, float],
+              shares: tuple[float, float, float, float], shape: tuple[int, ...], frequencies: bytes) -> Fixed:
     f = np.frombuffer(frequencies).reshape(shape)
     s = 2j * np.pi * f
-    runs = round(hold / period) if lowpass else 1
+    runs = round(hold / period) if filters[0] else 1
     held = sum(np.exp(-s * k * period) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
-    return Fixed(s, np.sinc(f * period) * np.exp(-0.5 * s * period), held * np.exp(-0.5 * s * IMU_S) if hold else held,
-                 (1.0 - np.exp(-s * period)) / period, (1.0 - np.exp(-s * OUTER_S)) / period,
-                 _butterworth(s, lowpass), _butterworth(s, chip), _butterworth(s, acc))
+    lowpass, chip, acc = (_butterworth(s, cutoff) for cutoff in filters)
+    integral, angle_integral, velocity_integral = (1.0 + share / s for share in shares[:3])
+    return Fixed(s, s ** 2, np.sinc(f * period) * np.exp(-0.5 * s * period),
+                 held * np.exp(-0.5 * s * IMU_S) if hold else held, integral, angle_integral, velocity_integral,
+                 integral + shares[3] * ((1.0 - np.exp(-s * period)) / period), (1.0 - np.exp(-s * OUTER_S)) / period,
+                 lowpass, chip, acc)
 
 
 def _open_loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
@@ -278,15 +319,18 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
         if c.range_gains[0]:
             sources += _range_errors(c, row, f, size)
         return np.array(sources)
-    return np.abs(_transfers(c, row, axis, f)[0]) ** 2
+    return np.abs(_transfers(c, row, f, loop_parts(c, row, axis, f))[0]) ** 2
 
 
-def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration."""
-    s, low = 2j * np.pi * f, np.maximum(f, 0.3)
-    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
+def _transfers(c: Controller, row: Any, f: np.ndarray, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
+    """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration.
+
+    parts: of the loop at f.
+    """
+    fixed, low = _fixed(c, f), np.maximum(f, 0.3)
+    s = fixed.s
+    plant, rate, angle, velocity, whole = parts
     size = 1.0 / (1.0 + plant * whole)
-    fixed = _fixed(c, f)
     kick = _kick(c, fixed)
     tilt, speed = _paths(c, row, fixed)
     wandering = [speed / (low ** 2 + FLOW_HZ ** 2)] if c.lowpass_hz else [tilt, speed / low]
@@ -301,27 +345,30 @@ def _transfers(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.nd
     return logged, turned
 
 
-def _stepped(c: Controller, row: Any, axis: str, f: np.ndarray, passed: float) -> tuple[np.ndarray, np.ndarray]:
+def _stepped(c: Controller, row: Any, f: np.ndarray, parts: Parts, passed: Iterable[float],
+             ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Of roll or pitch, (bins,) each: steps of the velocity's set-point to logged command and angular acceleration.
 
-    passed: share of the first sample's derivative that the command's limits leave; what follows is too small for them.
+    parts: of the loop at f. passed: shares of the first sample's derivative that the command's limits leave, a pair
+    for each; what follows is too small for them.
     """
     fixed = _fixed(c, f)
-    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
+    plant, rate, angle, velocity, whole = parts
     step = _paths(c, row, fixed)[1] / np.maximum(f, 0.3)
     turned = plant * step / (1.0 + plant * whole)
-    return _kick(c, fixed, passed) * step - (rate + _kick(c, fixed) * (angle + velocity)) * turned, fixed.s * turned
+    later, turning = (rate + _kick(c, fixed) * (angle + velocity)) * turned, fixed.s * turned
+    for share in passed:
+        yield _kick(c, fixed, share) * step - later, turning
 
 
 def _paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray]:
     """Command (bins,) for an angle and for a velocity of 1 that the controller is asked for."""
-    s = fixed.s
     k = c.gain * float(row["rate_gain"])
-    tilt = k * (1.0 + c.integral / s) * c.angle * float(row["attitude_gain"])
+    tilt = k * fixed.integral * c.angle * float(row["attitude_gain"])
     if c.on_error:
-        tilt = tilt * (1.0 + c.integral / s + c.derivative * fixed.change) / (1.0 + c.integral / s)
-    speed = tilt * c.velocity * float(row["position_gain"]) * (1.0 + c.velocity_integral / s)
-    return tilt * (1.0 + c.angle_integral / s), speed
+        tilt = tilt * fixed.whole / fixed.integral
+    speed = tilt * c.velocity * float(row["position_gain"]) * fixed.velocity_integral
+    return tilt * fixed.angle_integral, speed
 
 
 def _kick(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | float:
@@ -331,8 +378,7 @@ def _kick(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | floa
     """
     if not c.on_error:
         return 1.0
-    plain = 1.0 + c.integral / fixed.s
-    return (plain + passed * c.derivative * fixed.outer) / (plain + c.derivative * fixed.change)
+    return (fixed.integral + passed * c.derivative * fixed.outer) / fixed.whole
 
 
 def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:

@@ -29,7 +29,7 @@ from airtouch.gap.loop.loop_model import (
     step_of,
     step_under,
     torque_per_command,
-    turning_per_command,
+    turnings_per_command,
 )
 from airtouch.logs.segments import KINDS
 from airtouch.simulation.effects import Active
@@ -115,9 +115,20 @@ class Twin:
 
         A controller no faster than the log folds nothing: there the motors alone count.
         """
-        if not self.changes_loop(active):
+        row, changed = self._plant(active)
+        if not changed:
             return None
-        row, first = self._row(active), self._plain
+        cache = self.__dict__.setdefault("_changes", {})
+        key = row.tobytes(), f.tobytes()
+        if key not in cache:
+            if len(cache) >= PLANTS:
+                cache.clear()
+            cache[key] = self._change(row, f)
+        return cache[key]
+
+    def _change(self, row: Any, f: np.ndarray) -> Change:
+        """`torque_change` of the effects that make a plant row."""
+        first = self._plain
         after, before = self._shares(row, f), self._shares(first, f)
         share = after / before if self.by_firmware else np.ones_like(before)
         motors = self._torque(row, AXES[1], f) / self._torque(first, AXES[1], f)
@@ -166,9 +177,8 @@ class Twin:
         """`_shares` of axis i, complex (3, bins)."""
         usual = self.steps[i - 1]
         step = step_under(usual, controller, self._plain, row)
-        each = {x: turning_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, x)
-                for x in {NO_STEP, step, usual}}
-        return np.stack([each[x] for x in (NO_STEP, step, usual)]) / self._torque(row, AXES[i], f)
+        each = turnings_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, (NO_STEP, step, usual))
+        return np.stack(each) / self._torque(row, AXES[i], f)
 
     def with_steps(self, told: np.ndarray, over: np.ndarray, f: np.ndarray) -> "Twin":
         """The same with `steps`, from blocks of nominal flights in which a set-point stepped.

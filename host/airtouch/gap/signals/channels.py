@@ -41,6 +41,7 @@ CHANNELS = (
 )
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)
+KEPT = 12  #: residuals of one flight that gates are put together from
 
 
 def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
@@ -53,24 +54,39 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
 
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
-             controller: Twin | None = None, seed: int = 0) -> np.ndarray:
+             controller: Twin | None = None, seed: int = 0, kept: dict | None = None) -> np.ndarray:
     """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
 
     `active`: effects that the model has. On the ground with motors off the model is a
     vehicle at rest. Without a gyro the angular acceleration is taken as zero, which holds
-    at low frequency (the floor says how low).
+    at low frequency (the floor says how low). kept: what a gate puts together, for the next gate of the same
+    effects in this flight.
     """
-    out = np.full((len(flight), COUNT), np.nan)
     gated = [a for a in active if a.gate]
-    if gated:
-        always = [a for a in active if not a.gate]
-        out = residual(flight, vehicle, always, controller, seed)
-        for a in gated:
-            acts = inside(a.gate, flight)
-            if acts.any():
-                out[acts] += (residual(flight, vehicle, [*always, replace(a, gate=())], controller, seed)
-                              - residual(flight, vehicle, always, controller, seed))[acts]
-        return out
+    if not gated:
+        return _steady(flight, vehicle, active, controller, seed)
+    always, made = [a for a in active if not a.gate], {} if kept is None else kept
+
+    def of(some: Sequence[Active]) -> np.ndarray:
+        key = tuple((a.effect.name, *a.values.values()) for a in some)
+        if key not in made:
+            if len(made) >= KEPT:
+                made.clear()
+            made[key] = _steady(flight, vehicle, some, controller, seed)
+        return made[key]
+
+    out = of(always).copy()
+    for a in gated:
+        acts = inside(a.gate, flight)
+        if acts.any():
+            out[acts] += of([*always, replace(a, gate=())])[acts] - of(always)[acts]
+    return out
+
+
+def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controller: Twin | None, seed: int,
+            ) -> np.ndarray:
+    """`residual` of effects that always act."""
+    out = np.full((len(flight), COUNT), np.nan)
     plant = prepare(vehicle, active)[0]
     row = plant[0]
     seen = flight.signals.copy()

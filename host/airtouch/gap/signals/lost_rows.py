@@ -54,9 +54,13 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
     return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], WIDTH, axis=1, mode="nearest")
 
 
-def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active]) -> np.ndarray:
-    """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor."""
-    return held(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active)))
+def bridged_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], kept: dict | None = None,
+                     ) -> np.ndarray:
+    """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor.
+
+    kept: see `residual`.
+    """
+    return held(np.where(flight.bridged[:, None], np.nan, residual(flight, vehicle, active, kept=kept)))
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:
