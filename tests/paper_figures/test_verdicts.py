@@ -42,7 +42,9 @@ def flights(error_m, missed=0.0, count=20, seed=0, balanced=0.9, **condition):
 
 
 @pytest.fixture
-def job(tmp_path):
+def job(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorded, "said", lambda *_: "Recorded flights.")
+    monkeypatch.setattr(recorded, "left_out", lambda _: "")
     return Job(tmp_path, tmp_path / "work")
 
 
@@ -131,6 +133,15 @@ def test_a_quick_run_does_not_judge_what_it_trains_too_briefly_for(tmp_path, mon
     assert verdict(components.df_loss(quick), "df-epochs") == UNTESTABLE
     monkeypatch.setattr(recorded, "varied", None)
     assert verdict(vision_figures.network_size(quick), "network-airtouch") == UNTESTABLE
+
+
+def test_a_caption_names_the_flights_that_are_missing(tmp_path):
+    names = [f"f{i}.csv" for i in range(5)]
+    (tmp_path / "manifest.csv").write_text("file,fold,speed_mps\n" + "".join(f"{n},{i},0.3\n" for i, n in
+                                                                           enumerate(names)))
+    told = recorded.said(Job(tmp_path, tmp_path / "work"), 87, 174)
+    assert "in 5 folds. Left out: " in told and all(str(tmp_path / n) in told for n in names[:3])
+    assert told.endswith("; and 2 more.") and "f3.csv" not in told
 
 
 def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):

@@ -118,4 +118,4 @@ def _caption(job: Job, rows: dict[Any, dict[str, Any]]) -> str:
     row = next(iter(rows.values()))
     epochs = QUICK_EPOCHS if job.quick else EPOCHS
     return (f"Recorded flights, {row['flights']} held out by flight ({row['edges']} edges), float networks without "
-            f"pruning, {epochs} epochs of one cycle.")
+            f"pruning, {epochs} epochs of one cycle.{recorded.left_out(job)}")

@@ -17,6 +17,7 @@ QUICK: dict[str, dict[str, Any]] = {"best": {"steps": 300}, "paper": {"epochs": 
 QUICK_FOLD = 0  #: the only fold that a quick run holds out
 QUICK_SCORED, QUICK_TRAINED = 2, 3  #: a quick run scores every second flight of it, and trains on every third other one
 ABLATION_FOLDS = (0, 1)  #: folds that ablations hold out in turn
+SHOWN = 3  #: flights left out that a caption names
 AIR = ("neuralswarm/flights", "crazypad", "imrclab")  #: folders, beside the flights, of flights without edges
 
 
@@ -73,8 +74,19 @@ def _air(flights: Path) -> list[Path]:
 
 
 def said(job: Job, flights: int, edges: int) -> str:
-    """The sentence of a caption on the number of flights and edges and how they were split."""
+    """The sentences of a caption on the number of flights and edges, how they were split, and what was left out."""
     if job.quick:
         return (f"Recorded flights, {flights} of one fold ({edges} edges), by models of the other folds, briefly "
-                "trained (--quick).")
-    return f"{flights} recorded flights of the paper's authors, {edges} edges, cross-validated by flight in five folds."
+                f"trained (--quick).{left_out(job)}")
+    return (f"{flights} recorded flights of the paper's authors, {edges} edges, cross-validated by flight in "
+            f"{len(folds.by_fold(files(job)))} folds.{left_out(job)}")
+
+
+@cache
+def left_out(job: Job) -> str:
+    """" Left out: ..." of the flights of the manifest that are missing or cannot be scored; "" if there are none."""
+    _, unread = crossval.readable_flights(files(job))
+    if not unread:
+        return ""
+    more = f"; and {len(unread) - SHOWN} more" if len(unread) > SHOWN else ""
+    return f" Left out: {'; '.join(reason for _, reason in unread[:SHOWN])}{more}."
