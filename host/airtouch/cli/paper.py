@@ -35,7 +35,7 @@ Figures, by the paper's labels:
 @click.option("--power-log", type=click.Path(path_type=Path, dir_okay=False),
               help="An INA219's log with a column of stages, for table1; an estimate if left out.")
 @click.option("--quick", is_flag=True, help="Fewer flights, one fold, short trainings.")
-@click.option("--workers", type=click.IntRange(1), help="Processes, each with up to 2 GB; one a core, four at most, if "
+@click.option("--workers", type=click.IntRange(1), help="Processes, each with up to 3 GB; one a core, four at most, if "
                                                         "left out.")
 @click.option("--force", is_flag=True, help="Make figures again that are there, and replace those of other settings.")
 def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: Path | None, quick: bool,

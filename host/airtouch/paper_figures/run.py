@@ -102,7 +102,7 @@ def _side_by_side(groups: Sequence[Sequence[str]], job: Job, out: Path, key: str
             for future in as_completed(futures):
                 future.result()
         except BrokenProcessPool:
-            raise AirTouchError("a worker process died (memory? two need 4 GB); call the same command again to "
+            raise AirTouchError("a worker process died (memory? each needs up to 3 GB); call the same command again to "
                                 "continue, with --workers 1 if it dies again") from None
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
