@@ -3,7 +3,7 @@
     python tools/gap_peers.py [FLIGHTS/peers]
 
 Each case is held against the two `cal` flights of its vehicle; the diagnosis never sees the label.
-Twins (`candidates.TWINS`) count as one.
+Names of one thing (`candidates.ALIKE`) count as one.
 """
 
 import csv

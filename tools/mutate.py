@@ -42,7 +42,7 @@ GROUPS = {
         "reference/test_multiplications.py", "kernels/test_network.py", "kernels/test_stream.py",
         "gap8/test_requantise.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
-    "selection": Group(("gap/naming/select.py", "gap/naming/judging.py"),
+    "selection": Group(("gap/naming/select.py", "gap/naming/judging.py", "gap/naming/rounds.py"),
                        ("gap/naming/test_select.py", "gap/naming/test_select_beside.py")),
 }
 #: mutmut's exit codes, by what they say

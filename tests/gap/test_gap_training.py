@@ -12,7 +12,7 @@ from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
-from airtouch.gap.diagnose import with_random_part
+from airtouch.gap.answer.named_effects import with_random_part
 from airtouch.gap.result import Found, Quantity
 from airtouch.gap.signatures.candidates import random_part_of
 from airtouch.logs.flight_log import PWM

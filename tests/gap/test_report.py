@@ -16,7 +16,7 @@ from airtouch.cli.shared import scores
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.pictures import of, of_measurement
-from airtouch.gap.diagnose import agreeing
+from airtouch.gap.answer.ranking import agreeing
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measure import measure
 from airtouch.gap.nominal import calibrate

@@ -8,16 +8,17 @@ Where each decision is made; a folder imports only those above it:
 - `flights`, a log made ready: `flight`, `motion`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: `candidates` says how it is fitted, `nominal_scatter` how strong it seems
   where there is none.
-- `loop`, the closed loop: `controller`, `loop_model`, `twin`; at edges: `edge_response`.
-- `signals`, what is compared: `channels`, `spectra`, `twin_view`; what raises the floor: `response`, `lost_rows`.
+- `loop`, the closed loop: `controller`, `loop_model`, `closed_loop`; at edges: `edge_response`.
+- `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, `problem`, `fit` with `least_squares`,
   `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show,
   `generic` with `basis` what has no name.
-- `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `select` adds
-  effects one by one; `selection` holds what was found, with its probabilities.
+- `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does
+  both for every candidate, `select` adds effects one by one; `selection` holds what was found, with its probabilities.
 - `nominal`, what the baseline flights say: `calibrate` (vehicle, floors), `apparent` (strengths where there is none).
 - `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
-- `answer`: how far: `shrink`; what stays open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.
+- `answer`: the verdict and the `ranking`; the `named_effects` with their intervals; how far: `shrink`; what stays
+  open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_draw`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.

@@ -14,7 +14,7 @@ from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, Flight, ready
 from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
 from airtouch.gap.flights.motion import held
-from airtouch.gap.loop import twin
+from airtouch.gap.loop import closed_loop
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.signals.channels import residual
@@ -39,7 +39,7 @@ class Measurement:
 
     gap: rms over the floor of all cells in the air, for the vehicle as declared and, with
     baseline flights, as calibrated on them; spectra: of the commands, as flown and as
-    nominal flights have them (twin view), N^2/Hz.
+    nominal flights have them (command view), N^2/Hz.
     """
 
     vehicle: str
@@ -217,25 +217,25 @@ def _rotors(found: Sequence[np.ndarray | None]) -> tuple[dict[str, float], ...]:
 
 
 def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicle: Vehicle) -> dict[str, Any]:
-    """The twin view: mean spectra of the commands, as flown and as nominal flights have them."""
+    """The command view: mean spectra of the commands, as flown and as nominal flights have them."""
     return _spectra(*([_command_power(f, vehicle) for f in some] for some in (flights, nominal)))
 
 
 def _command_power(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Sum of the commands' spectra over blocks and their number, (bins, 4): three axes and the count."""
-    blocks = twin.block_spectra(flight, vehicle)[1]
+    blocks = closed_loop.block_spectra(flight, vehicle)[1]
     power = (np.abs(blocks) ** 2).sum(axis=0)
     return np.column_stack([power, np.full(len(power), float(len(blocks)))])
 
 
 def _spectra(flown: Sequence[np.ndarray], nominal: Sequence[np.ndarray]) -> dict[str, Any]:
-    """The twin view: mean spectra of the commands, empty without a steady stretch in flight."""
+    """The command view: mean spectra of the commands, empty without a steady stretch in flight."""
     total = np.sum(flown, axis=0)
     if not len(flown) or not total[0, -1]:
         return {}
-    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": twin.frequencies().tolist()}
+    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": closed_loop.frequencies().tolist()}
     usual = np.sum(nominal, axis=0) if len(nominal) else None
-    for i, axis in enumerate(twin.AXES):
+    for i, axis in enumerate(closed_loop.AXES):
         made[axis] = {"flown": (total[:, i] / total[0, -1]).tolist()}
         if usual is not None and usual[0, -1]:
             made[axis]["nominal"] = (usual[:, i] / usual[0, -1]).tolist()

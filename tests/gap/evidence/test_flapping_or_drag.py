@@ -56,7 +56,7 @@ def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, apart):
                       for name in ("blade_flapping", "rotor_drag"))
     assert min(flapping, drag) > 40.0
     assert abs(flapping - drag) < apart
-    assert candidates.twins_of("rotor_drag")[0] == candidates.twins_of("blade_flapping")[0]
+    assert candidates.names_alike("rotor_drag")[0] == candidates.names_alike("blade_flapping")[0]
 
 
 def test_gusts_have_no_drag_of_their_own_when_drag_is_left_out():

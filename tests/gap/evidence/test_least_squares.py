@@ -28,9 +28,9 @@ def test_a_step_is_the_weighted_ridge_regression(system, offset):
     at = np.array([0.2, -0.1, 0.3])
     x, offsets = (at[:2], at[2:]) if offset else (at, np.zeros(0))
     n = len(x)
-    twin = NOTHING[0][:n], NOTHING[1][:n, :n]
+    commands = NOTHING[0][:n], NOTHING[1][:n, :n]
     free = np.full(n, -9.0), np.full(n, 9.0)
-    step, covariance = bounded_step(columns, prior, values, weights, x, offsets, *free, twin)
+    step, covariance = bounded_step(columns, prior, values, weights, x, offsets, *free, commands)
     expected = np.linalg.lstsq(rows, np.concatenate([aim, -at / prior]), rcond=None)[0]
     np.testing.assert_allclose(step, expected, rtol=1e-9)
     np.testing.assert_allclose(covariance, np.linalg.inv(rows.T @ rows)[:n, :n], rtol=1e-9)

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.diagnose import chosen_effects
+from airtouch.gap.answer.named_effects import chosen_effects
 from airtouch.gap.evidence import random_effects, vibration_lines
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight

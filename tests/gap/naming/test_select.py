@@ -11,7 +11,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import GROUPS, Part
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.naming import judging
+from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
 from airtouch.gap.naming.selection import Judged, probabilities
 from airtouch.gap.signals.channels import COUNT
@@ -44,7 +44,7 @@ def test_where_nothing_is_nothing_is_found():
     assert selection.singles["wind"].choice == pytest.approx(np.log(2.0))
 
 
-def test_a_steady_push_is_its_mass_and_its_twin_is_not_added(heavy):
+def test_a_steady_push_is_its_mass_and_its_other_name_is_not_added(heavy):
     selection, data = heavy
     (step,) = selection.steps
     assert step.name == "mass" and step.named and step.full and step.evidence == step.gain
@@ -151,9 +151,9 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
 def test_a_look_that_is_thorough_fits_what_promises_nothing():
     data = Data(FLOOR, [made(7)], slow=True)
     for thorough in (False, True):
-        judged = judging.round_of(judging.trial_of(data), chosen(["imu_noise", "mass"]), None, thorough=thorough)
+        judged = rounds.round_of(judging.trial_of(data), chosen(["imu_noise", "mass"]), None, thorough=thorough)
         assert judged["imu_noise"].full == thorough
-        assert judged["imu_noise"].gain < judging.HOPELESS and judged["imu_noise"].strength[0] < 0.05
+        assert judged["imu_noise"].gain < rounds.HOPELESS and judged["imu_noise"].strength[0] < 0.05
 
 
 def test_halves_share_no_block_and_leave_none_out():
@@ -179,8 +179,8 @@ def test_the_same_effect_is_not_added_twice_and_another_rotor_may_be():
     data = Data(FLOOR, [made(1, (0.0, 0.0, -DOWN))], slow=True)
     on = judging.trial_of(data)
     candidates = chosen(["mass", "thrust_coefficient", "weak_motor", "imu_noise"])
-    held = judging.round_of(on, candidates, None)["mass"]
-    beside = judging.round_of(on, candidates, held)
+    held = rounds.round_of(on, candidates, None)["mass"]
+    beside = rounds.round_of(on, candidates, held)
     assert set(beside) == {"weak_motor", "imu_noise"}
     for judged in beside.values():
         assert judged.terms[0].name == "mass" and judged.gain < held.gain + 12.0

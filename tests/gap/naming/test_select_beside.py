@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.naming import judging
+from airtouch.gap.naming import judging, rounds
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signatures.candidates import every
 from airtouch.simulation import effects
@@ -96,7 +96,7 @@ def test_what_only_the_commands_show_is_fitted_though_a_first_look_sees_nothing(
 def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
     data = Data(flying, flown(1, 62))
     on = judging.trial_of(data)
-    judged = judging.round_of(on, chosen(["controller_gain"]), None, thorough=True)["controller_gain"]
+    judged = rounds.round_of(on, chosen(["controller_gain"]), None, thorough=True)["controller_gain"]
     _, *alone = every()["controller_gain"]
     assert judged.strength.shape == judged.variance.shape == (len(alone),) == (4,)
     for i, terms in enumerate(alone):

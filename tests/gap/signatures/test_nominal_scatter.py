@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from airtouch.gap.signatures.candidates import TWINS
+from airtouch.gap.signatures.candidates import ALIKE
 from airtouch.gap.signatures.nominal_scatter import LEAST_RECORDED, Apparent, Scatter, measured, scatter_of, table
 from airtouch.simulation.effects import EFFECTS
 
@@ -16,7 +16,7 @@ def drawn(rng: np.random.Generator, rms: dict[str, np.ndarray], n: int) -> list[
                      float(rng.normal(1.5, 0.6) ** 2)) for _ in range(n)]
 
 
-SHARED = {n for group, _ in TWINS for n in group}  #: names of one thing, which have one scatter
+SHARED = {n for group, _ in ALIKE for n in group}  #: names of one thing, which have one scatter
 REAL = [n for n in table() if n != "simulated"]
 
 

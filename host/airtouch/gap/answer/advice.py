@@ -80,9 +80,9 @@ def collect(mission: str) -> str:
 
 def _apart(group: tuple[str, ...]) -> Step:
     """What tells the effects of a group from one another."""
-    twins = candidates.twins_of(group[0])
-    if twins and twins[0] <= frozenset(group):
-        return Step(f"To tell {' from '.join(sorted(twins[0]))}: {twins[1]}.")
+    alike_group = candidates.names_alike(group[0])
+    if alike_group and alike_group[0] <= frozenset(group):
+        return Step(f"To tell {' from '.join(sorted(alike_group[0]))}: {alike_group[1]}.")
     tell, mission = next((t for k, t in SEPARATES.items() if k <= frozenset(group)),
                          ("repeat the flight with other speeds and heights", "there-and-back"))
     return Step(f"To tell {' from '.join(group)}: {tell}.", collect(mission) if mission else "")

@@ -11,7 +11,7 @@ from airtouch.gap.balance.hover_balance import Hypothesis, Reference, evidence, 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import BASELINE, Cell, Diagnosis, Found, GapMap, Quantity, Ranked
-from airtouch.gap.signatures.candidates import twins_of
+from airtouch.gap.signatures.candidates import names_alike
 from airtouch.gap.where import summary
 from airtouch.simulation.effects import get
 from airtouch.vehicle import Vehicle
@@ -53,7 +53,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     effects = _found(every[best[first]], weights[best[first]]) if verdict == "effect" else ()
     cells = _cells(seen, base, vehicle, every[best[first]], weights[best[first]], len(flights))
     before, after = share[first][0]
-    alike = [tuple(sorted(twins[0])) for e in effects if (twins := twins_of(e.name))]
+    alike = [tuple(sorted(group[0])) for e in effects if (group := names_alike(e.name))]
     others = [n for n in names if n not in (first, "unknown") and total[n] > 0.5 * family[first]]
     if others:
         alike.append(tuple(sorted({first, *others})))

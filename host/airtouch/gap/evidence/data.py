@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop.twin import COMMAND_ONLY, Twin
+from airtouch.gap.loop.closed_loop import COMMAND_ONLY, ClosedLoop
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response
@@ -26,7 +26,7 @@ class Study:
 
     vehicle: Vehicle
     calibration: tuple[Active, ...]
-    controller: Twin | None
+    controller: ClosedLoop | None
     floor: Floor
     response: Response | None = None
     usual: Any = None  #: generic.Usual of the nominal flights
@@ -75,7 +75,7 @@ class Data:
 
 
 def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap with effects in the model, by flight and regime; commands are the twin view's.
+    """Spectra of the gap with effects in the model, by flight and regime; commands are the command view's.
 
     Where nominal flights tell how the gyro follows the commands, torque is compared with what that leaves to expect.
     """

@@ -130,7 +130,7 @@ def _start(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> 
     for t in mean:
         here = range(place, place + len(t.free))
         place += len(t.free)
-        if t.name not in LOOP or not len(problem.twin) or not np.isnan(known[here]).all():
+        if t.name not in LOOP or not len(problem.commands) or not np.isnan(known[here]).all():
             continue
         low, high = limits(mean)
         best = -np.inf
@@ -182,7 +182,7 @@ class Slopes:
             there[i] += step
             after = _active(self.mean, there)
             self.columns[i] = (self.problem.values(after) - values) / step
-            self.rises[i] = self.problem.twin.rise(before, after) / step
+            self.rises[i] = self.problem.commands.rise(before, after) / step
             self.doubts[i] = (self.problem.doubt(after) - doubt) / step
             self.bent[i] = self.problem.bends(before, after)
         self.at = x.copy() if anew else self.at
@@ -194,7 +194,7 @@ class Slopes:
         values, added: what is left, and the power over the floor, flattened.
         """
         problem = self.problem
-        gradient, information = problem.twin.slopes(_active(self.mean, x), np.array(self.rises), wide)
+        gradient, information = problem.commands.slopes(_active(self.mean, x), np.array(self.rises), wide)
         doubts = np.array(self.doubts)
         if doubts.any():
             push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))

@@ -22,21 +22,22 @@ def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) 
 
 
 def _normal(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray,
-            weights: np.ndarray, at: np.ndarray, twin: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+            weights: np.ndarray, at: np.ndarray, commands: tuple[np.ndarray, np.ndarray],
+            ) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and right-hand side of the ridge regression that lowers values + sum(step * column).
 
-    twin: gradient and information of the likelihood from the commands' spectra.
+    commands: gradient and information of the likelihood from the commands' spectra.
     """
     j = np.ascontiguousarray(columns, complex).view(float)  # real and imaginary parts side by side
     wj = j * np.repeat(weights, 2)
     normal = 2.0 * (wj @ j.T) + np.diag(1.0 / prior ** 2)
     slope = -2.0 * (wj @ np.ascontiguousarray(values, complex).view(float)) - at / prior ** 2
-    return normal + twin[1], slope + twin[0]
+    return normal + commands[1], slope + commands[0]
 
 
 def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, values: np.ndarray, weights: np.ndarray,
                  x: np.ndarray, offsets: np.ndarray, low: np.ndarray, high: np.ndarray,
-                 twin: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+                 commands: tuple[np.ndarray, np.ndarray], damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """A step that leaves parameters at a bound there when it would take them past it, and the covariance (n, n) of x.
 
     damping: share of the normal matrix's diagonal that is added to it for the step.
@@ -45,7 +46,7 @@ def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, 
     free = np.ones(len(at), bool)
     covariance = np.zeros((n, n))
     gradient, information = np.zeros(len(at)), np.zeros((len(at), len(at)))
-    gradient[:n], information[:n, :n] = twin
+    gradient[:n], information[:n, :n] = commands
     normal, slope = _normal(columns, prior, values, weights, at, (gradient, information))
     for _ in range(n + 1):
         change = np.zeros(len(at))

@@ -16,11 +16,11 @@ from scipy.special import exp1
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
-from airtouch.gap.loop.twin import COMMAND_ONLY
+from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
+from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
-from airtouch.gap.signals.twin_view import TwinView
 from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
 from airtouch.simulation.effects import Active
 
@@ -28,7 +28,7 @@ OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to fl
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
 DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
-REST_VIEW, TWIN_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
+REST_VIEW, COMMAND_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
 GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
 FREEDOM = 12.0  #: of the Student-like tail at most
 
@@ -49,10 +49,10 @@ class Problem:
         self._constant: list[tuple[np.ndarray, float]] | None = None
         self.keep = {r: judged(r) for r in (AIR, REST)}
         for keep in self.keep.values():
-            keep[:, COMMAND] = False  # the twin view judges them
+            keep[:, COMMAND] = False  # the command view judges them
         if data.slow:
             self.keep[AIR][FIRST_BIN:, TORQUE] = False
-        self.twin = TwinView(data.study.controller, data.flights, data.first, part.pieces)
+        self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
         self.power = self._gather([{r: data.study.floor.level(f, b[r], r) + (lost if r == AIR else 0.0) for r in b}
                                    for f, b, lost in zip(data.flights, data.first, data.bridging, strict=True)]).real
         self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
@@ -66,18 +66,18 @@ class Problem:
         counts = data.study.floor.blocks
         nu = [np.full(self._size(p), np.clip(3.0 * counts[p[1]], 2.0, FREEDOM)) for p in part.pieces]
         self.freedom = np.concatenate(nu) if nu else np.zeros(0)
-        self.own = len(self.base)  #: elements of the replay view; those of the twin view follow
+        self.own = len(self.base)  #: elements of the replay view; those of the command view follow
         self.torque = (self.channel >= TORQUE.start) & (self.channel < TORQUE.stop)
         #: number of the block in the air of each element, -1 for the others; begin, piece: of each such block the first
         self.block = self._blocks()  #: sample and the flight
-        twin = self.twin
-        self.power = np.concatenate([self.power, twin.floor])
-        self.base = np.concatenate([self.base, twin.values])
-        self.known = np.concatenate([self.known, np.ones(len(twin), bool)])
-        self.channel = np.concatenate([self.channel, twin.channel]).astype(int)
-        self.flight = np.concatenate([self.flight, twin.flight]).astype(int)
-        self.tail = np.concatenate([tail(self.freedom), twin.freedom])  #: the twin's floor has its tails in it
-        self.freedom = np.concatenate([self.freedom, twin.freedom])
+        commands = self.commands
+        self.power = np.concatenate([self.power, commands.floor])
+        self.base = np.concatenate([self.base, commands.values])
+        self.known = np.concatenate([self.known, np.ones(len(commands), bool)])
+        self.channel = np.concatenate([self.channel, commands.channel]).astype(int)
+        self.flight = np.concatenate([self.flight, commands.flight]).astype(int)
+        self.tail = np.concatenate([tail(self.freedom), commands.freedom])  #: the commands' floor has its tails in it
+        self.freedom = np.concatenate([self.freedom, commands.freedom])
 
     def _blocks(self) -> np.ndarray:
         out, begin, flights = [], [], []
@@ -90,7 +90,7 @@ class Problem:
                 flights += [i] * len(numbers)
             out.append(np.repeat(numbers, size))
         self.begin, self.piece = np.array(begin, int), np.array(flights, int)
-        return np.concatenate([*out, np.full(len(self.twin), -1)]).astype(int)
+        return np.concatenate([*out, np.full(len(self.commands), -1)]).astype(int)
 
     @functools.cached_property
     def groups(self) -> np.ndarray:
@@ -100,9 +100,10 @@ class Problem:
             band = np.digitize(frequencies(regime), BANDS_HZ) - 1
             table = band[:, None] * COUNT + np.arange(COUNT) + (1000 * REST_VIEW if regime == REST else 0)
             groups.append(np.tile(table[self.keep[regime]], int(chosen.sum())))
-        twin = np.digitize(self.twin.frequency, BANDS_HZ) * COUNT + self.twin.channel + 1000 * TWIN_VIEW \
-            if len(self.twin) else np.zeros(0)
-        return np.concatenate([*groups, twin]).astype(int) if groups else np.zeros(0, int)
+        own = self.commands
+        of_commands = np.digitize(own.frequency, BANDS_HZ) * COUNT + own.channel + 1000 * COMMAND_VIEW \
+            if len(own) else np.zeros(0)
+        return np.concatenate([*groups, of_commands]).astype(int) if groups else np.zeros(0, int)
 
     def _size(self, piece: tuple[int, str, np.ndarray]) -> int:
         return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
@@ -115,15 +116,17 @@ class Problem:
         """Spectra with effects in the model, flattened."""
         seen = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
         own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
-        return np.where(self.known, self._with_twin(own, self.twin.moved([a for a in active if not a.gate])), 0.0)
+        moved = self.commands.moved([a for a in active if not a.gate])
+        return np.where(self.known, self.with_commands(own, moved), 0.0)
 
-    def _with_twin(self, own: np.ndarray, twin: np.ndarray | float = 0.0) -> np.ndarray:
-        return np.concatenate([own, np.broadcast_to(twin, len(self.twin))])
+    def with_commands(self, own: np.ndarray, told: np.ndarray | float = 0.0) -> np.ndarray:
+        """Elements of the replay view, then one value or one each for those of the commands."""
+        return np.concatenate([own, np.broadcast_to(told, len(self.commands))])
 
     def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
-        """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: TwinView."""
-        power, cost = self.twin.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.doubt(active), power - self.twin.floor]), cost
+        """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: CommandView."""
+        power, cost = self.commands.power([a for a in active if not a.gate], wide)
+        return np.concatenate([self.doubt(active), power - self.commands.floor]), cost
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
         """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
@@ -170,14 +173,14 @@ class Problem:
                 ones[~flight.on_ground, c] = 1.0
                 made = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
                          for r in f} for j, f in enumerate(self.data.first)]
-                columns.append((self._with_twin(self._gather(made)), float(tell[c])))
+                columns.append((self.with_commands(self._gather(made)), float(tell[c])))
         return columns
 
     def random_power(self, terms: Sequence[Term]) -> np.ndarray:
         """PSD that random effects add, flattened."""
         total = np.zeros(len(self.base))
         for term in terms:
-            total += self._with_twin(self._gather(random_effects.power(self.data, term)).real)
+            total += self.with_commands(self._gather(random_effects.power(self.data, term)).real)
         return total
 
     def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
@@ -213,7 +216,7 @@ def cell_words(group: int) -> str:
     """The cell of a number of `Problem.groups`, in words: channel, band, and whether at rest."""
     view, place = divmod(group, 1000)
     band, channel = divmod(place, COUNT)
-    low, high = BANDS_HZ[max(band - (view == TWIN_VIEW), 0):][:2]
+    low, high = BANDS_HZ[max(band - (view == COMMAND_VIEW), 0):][:2]
     return f"{CHANNELS[channel].name} at {low:g} to {min(high, 50.0):g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 

@@ -107,12 +107,12 @@ def _gyro_share(study: Any) -> np.ndarray:
     """
     f = frequencies(AIR)
     share = np.zeros((len(f), 3))
-    twin = study.controller
-    if twin is None:
+    loop = study.controller
+    if loop is None:
         return share
     row = prepare(study.vehicle, study.calibration)[0][0]
     for i, axis in enumerate(AXES[1:]):
-        strength, made = twin.strengths[i + 1], spectra(twin.controllers[i + 1], row, axis, f)
+        strength, made = loop.strengths[i + 1], spectra(loop.controllers[i + 1], row, axis, f)
         share[:, i] = strength[0] * made[0] / np.maximum(strength @ made, 1e-300)
     return share
 

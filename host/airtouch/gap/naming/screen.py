@@ -13,7 +13,7 @@ from airtouch.gap.evidence.data import Data, spectra
 from airtouch.gap.evidence.fit import strongest
 from airtouch.gap.evidence.least_squares import bounded_step, limits, weights_of, without_offsets
 from airtouch.gap.evidence.problem import Part, Problem, problem_of
-from airtouch.gap.loop.twin import COMMAND_ONLY
+from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.signatures.candidates import MEAN, Term
 
 STEP = 0.25  #: of a parameter's natural step, at which the change is taken
@@ -42,7 +42,7 @@ class Screen:
             self.kept[key] = [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
                               for a, b in zip(after, before, strict=True)]
         gathered = problem._gather(self.kept[key])
-        return np.where(problem.known, problem._with_twin(gathered), 0.0)
+        return np.where(problem.known, problem.with_commands(gathered), 0.0)
 
     def shows(self, term: Term) -> bool:
         """Whether a term changes what the logged commands lead to expect, once `column` was asked for its parameters.

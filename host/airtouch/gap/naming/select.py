@@ -24,10 +24,10 @@ from airtouch.gap.naming.judging import (
     Trial,
     gain_of,
     price_of,
-    round_of,
     strength_of,
     trial_of,
 )
+from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, is_random

@@ -8,7 +8,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import strength_variance
 from airtouch.gap.evidence.gates import gated
 from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.naming.judging import at_bound, round_of, trial_of
+from airtouch.gap.naming.judging import at_bound, trial_of
+from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless, seconds
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, every, telling

@@ -170,9 +170,9 @@ def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Gener
 
 def alike(one: str, other: str) -> bool:
     """Whether two names stand for one thing in these logs."""
-    from airtouch.gap.signatures.candidates import twins_of
+    from airtouch.gap.signatures.candidates import names_alike
 
-    group = twins_of(one)
+    group = names_alike(one)
     return one == other or (group is not None and other in group[0])
 
 

@@ -18,7 +18,7 @@ from airtouch.gap.diagnose import brief
 from airtouch.gap.evidence.data import Study
 from airtouch.gap.sealed import blind, blind_score
 from airtouch.gap.sealed.blind_draw import KINDS
-from airtouch.gap.signatures.candidates import twins_of
+from airtouch.gap.signatures.candidates import names_alike
 from airtouch.logs.files import read, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.workers.in_order import in_order
@@ -54,7 +54,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     sealed = hashlib.sha256(json.dumps([json.loads(p.read_text()) for p in first], sort_keys=True).encode()).hexdigest()
     key = blind.open_key(out, sealed)["answers"]
     single = [(n, key[n]["effects"][0]["name"]) for n in names if len(key[n]["effects"]) == 1]
-    cases = [(n, tuple(sorted(group[0])) if (group := twins_of(e)) else (e,)) for n, e in single[:unknown]]
+    cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, spread)
     return blind.score(out, answers)
 

@@ -93,7 +93,7 @@ def wilson(hits: int, n: int, z: float = 1.959964) -> dict[str, float | None]:
 
 
 def top(case: Case | None, name: str, first: int) -> bool:
-    """Whether an effect, or its twin, is among the first of a ranking."""
+    """Whether an effect, or another name of it, is among the first of a ranking."""
     return case is not None and any(alike(name, r["name"]) for r in case["ranking"][:first])
 
 
@@ -202,7 +202,7 @@ def _named(case: Case | None) -> list[str]:
 
 
 def _same(named: Sequence[str], true: Sequence[str]) -> bool:
-    """Whether two lists of effects hold the same, twins counted as one."""
+    """Whether two lists of effects hold the same, names of one thing counted as one."""
     left = list(true)
     for n in named:
         match = next((t for t in left if alike(n, t)), None)

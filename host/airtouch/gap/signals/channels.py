@@ -1,6 +1,6 @@
 """The gap's channels: what was measured minus what the model says, sample by sample.
 
-Replay view: specific force (3), angular acceleration (3), and the gyro's mean (3). Twin
+Replay view: specific force (3), angular acceleration (3), and the gyro's mean (3). Command
 view: the controller's command (4), filtered to have the spectrum of nominal flights where
 the effects in the model are all that changed it.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.flights.motion import held
-from airtouch.gap.loop.twin import Twin
+from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active
@@ -29,15 +29,14 @@ class Channel:
     unit: str
     low_hz: float = 0.0
     high_hz: float = 50.0
-    view: str = "replay"
 
 
 CHANNELS = (
     *(Channel(f"force_{a}", "m/s^2") for a in "xyz"),
     *(Channel(f"torque_{a}", "rad/s^2") for a in "xyz"),
     *(Channel(f"rate_{a}", "rad/s", 0.0, 0.3) for a in "xyz"),
-    Channel("command_thrust", "N", 0.6, 30.0, "twin"),
-    *(Channel(f"command_{a}", "N", 0.6, 30.0, "twin") for a in ("roll", "pitch", "yaw")),
+    Channel("command_thrust", "N", 0.6, 30.0),
+    *(Channel(f"command_{a}", "N", 0.6, 30.0) for a in ("roll", "pitch", "yaw")),
 )
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)
@@ -54,7 +53,7 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
 
 
 def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
-             controller: Twin | None = None, seed: int = 0, kept: dict | None = None) -> np.ndarray:
+             controller: ClosedLoop | None = None, seed: int = 0, kept: dict | None = None) -> np.ndarray:
     """Measured minus modelled, (n, COUNT); NaN in channels that this flight cannot have.
 
     `active`: effects that the model has. On the ground with motors off the model is a
@@ -83,7 +82,7 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     return out
 
 
-def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controller: Twin | None, seed: int,
+def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controller: ClosedLoop | None, seed: int,
             ) -> np.ndarray:
     """`residual` of effects that always act."""
     out = np.full((len(flight), COUNT), np.nan)

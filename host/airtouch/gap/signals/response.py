@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.loop.twin import Change
+from airtouch.gap.loop.closed_loop import Change
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.spectra import squared
 

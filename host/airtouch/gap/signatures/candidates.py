@@ -49,7 +49,7 @@ SHAKES = frozenset({"downwash"})  #: effects that are only tried with their rand
 UNSTEADY = ("ground_effect", "downwash")  #: effects with a random part, where and when their mean part acts
 COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
 #: names for one thing in the logs at hand, with what would tell them apart
-TWINS = (
+ALIKE = (
     (frozenset({"mass", "thrust_coefficient"}),
      "add a fast climb or drop: the same thrust moves a heavier vehicle less, in proportion to its mass only "
      "where an outside force acts; weigh the vehicle, or run one motor on a scale"),
@@ -231,9 +231,9 @@ def term_of(effect: Found) -> Term:
     return replace(right, values={**right.values, **given}, gate=effect.seconds)
 
 
-def twins_of(name: str) -> tuple[frozenset[str], str] | None:
+def names_alike(name: str) -> tuple[frozenset[str], str] | None:
     """The set that an effect cannot be told from in these logs, and what would separate it."""
-    return next(((group, advice) for group, advice in TWINS if name in group), None)
+    return next(((group, advice) for group, advice in ALIKE if name in group), None)
 
 
 def _random(effect: Effect) -> bool:

@@ -20,7 +20,7 @@ from importlib import resources
 import numpy as np
 from scipy.stats import t as student
 
-from airtouch.gap.signatures.candidates import TWINS, is_random
+from airtouch.gap.signatures.candidates import ALIKE, is_random
 
 MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
@@ -135,7 +135,7 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
-    for group, _ in TWINS:  # one thing in the logs, as mass and thrust, scatters as the wider of its names
+    for group, _ in ALIKE:  # one thing in the logs, as mass and thrust, scatters as the wider of its names
         same = [rms[n] for n in group if n in rms]
         if len({len(x) for x in same}) == 1:
             rms |= {n: np.max(same, axis=0) for n in group if n in rms}

@@ -1,4 +1,4 @@
-"""Twin view: the closed loop seen in the power spectra of the commands.
+"""Command view: the closed loop seen in the power spectra of the commands.
 
 What the controller is told is driven by noise that no log holds, so commands cannot be
 predicted sample by sample; their spectra can. Flights declared nominal give the spectra
@@ -46,7 +46,7 @@ START_S = (0.8, 0.2)  #: the same around hover's end and beginning: set-points s
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
 FINE, REACH = 4, 2  #: points a bin, bins a window's leakage is followed
 UNSTABLE = 30.0  #: nepers of power per rad of phase beyond stability
-FEWEST = 6  #: blocks of nominal flights, for a twin view
+FEWEST = 6  #: blocks of nominal flights, for a command view
 FREEDOM = 20.0  #: of the tails of a block's power
 STEPPED = 5.0  #: times the usual power of its flight: a block in which a set-point stepped
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
@@ -76,7 +76,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Twin:
+class ClosedLoop:
     """The nominal loops: a controller, noise strengths (sources,) and floor (bins,) for each of AXES.
 
     floor: PSD of the commands, N^2/Hz, of `blocks` blocks as hard as nominal ones; slopes: of its power with how
@@ -180,7 +180,7 @@ class Twin:
         each = turnings_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, (NO_STEP, step, usual))
         return np.stack(each) / self._torque(row, AXES[i], f)
 
-    def with_steps(self, told: np.ndarray, over: np.ndarray, f: np.ndarray) -> "Twin":
+    def with_steps(self, told: np.ndarray, over: np.ndarray, f: np.ndarray) -> "ClosedLoop":
         """The same with `steps`, from blocks of nominal flights in which a set-point stepped.
 
         told (bins, 3): share of the commanded torque that turned the vehicle, 0 where it is not known; over (bins, 3):
@@ -345,7 +345,7 @@ def starts(flight: Flight) -> np.ndarray:
 
 def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
     """First samples and spectra (blocks, bins, AXES) of the commands, N/sqrt(Hz)."""
-    kept = flight.memory.get("twin")
+    kept = flight.memory.get("command spectra")
     if kept is None:
         first = starts(flight)
         window = np.hanning(LENGTH + 1)[:-1]
@@ -354,7 +354,7 @@ def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndar
         cut = told[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
         made = np.fft.rfft(cut * window[:, None], axis=1)[:, _kept()] * scale
         calm = _calm(np.abs(made) ** 2)
-        kept = flight.memory["twin"] = (first[calm], made[calm])
+        kept = flight.memory["command spectra"] = (first[calm], made[calm])
     return kept
 
 
@@ -366,7 +366,7 @@ def _calm(power: np.ndarray) -> np.ndarray:
     return ((power / np.maximum(usual, 1e-30)).mean(axis=1) < STEPPED).all(axis=1)
 
 
-def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> Twin | None:
+def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
     """Controller, noise and floor of flights declared nominal; None where they have too few blocks."""
     made = [block_spectra(f, vehicle) for f in flights]
     if sum(len(first) for first, _ in made) < FEWEST:
@@ -381,14 +381,14 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
     weight = 0.5 * len(every)
     by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
     chosen = documented if by_firmware else found
-    twin = Twin(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
+    loop = ClosedLoop(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
                 tuple(c[0] for c in chosen), power, len(every), slopes, floor_of(flights, vehicle, calibration))
-    model = twin._nominal()
-    return replace(twin, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
+    model = loop._nominal()
+    return replace(loop, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
 
 
 def typical(power: np.ndarray) -> np.ndarray:
-    """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), tails as TwinView has them.
+    """Power (bins, AXES) of highest likelihood for that of blocks (blocks, bins, AXES), tails as CommandView has them.
 
     The mean would follow the few blocks in which a set-point stepped.
     """

@@ -1,4 +1,4 @@
-"""Likelihood of the commands' spectra under a hypothesis: the twin view's part of a fit.
+"""Likelihood of the commands' spectra under a hypothesis: the command view's part of a fit.
 
 A hypothesis multiplies the floor by a ratio. What the floor may be wrong by (few nominal
 flights, other air on other days) is a few smooth shapes of its logarithm, each with a
@@ -12,7 +12,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import edge_response
-from airtouch.gap.loop.twin import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, Twin, frequencies, shapes
+from airtouch.gap.loop.closed_loop import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, ClosedLoop, frequencies, shapes
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
 from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
 from airtouch.simulation.effects import Active
@@ -26,19 +26,19 @@ SMALL = 1e-3  #: of a scaled parameter, over which the likelihood's slope is tak
 NOTHING = np.zeros(0)
 
 
-class TwinView:
+class CommandView:
     """Blocks of the commands of some flights: values (elements,) with their floor, ratio and slopes."""
 
-    def __init__(self, twin: Twin | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
+    def __init__(self, loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
                  pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
-        self._twin, self.kept = twin, {}
+        self._loop, self.kept = loop, {}
         self.spectra: list[np.ndarray] = []
         self.flights: list[int] = []
-        if twin is not None:
+        if loop is not None:
             for i, regime, chosen in pieces:
                 if regime != AIR or not chosen.any():
                     continue
-                begin, every = twin.spectra(flights[i])
+                begin, every = loop.spectra(flights[i])
                 middle = first[i][AIR] + AIR_LENGTH[AIR] // 2
                 nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1) if len(begin) else []
                 mine = every[chosen[nearest]] if len(begin) else every
@@ -47,7 +47,7 @@ class TwinView:
                     self.flights.append(i)
             self.shapes = shapes()
             self.spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1))
-        self.edges = [] if twin is None or twin.edges is None else [
+        self.edges = [] if loop is None or loop.edges is None else [
             (flights[i], i, e) for i, regime, chosen in pieces if regime == AIR and chosen.any()
             for e in edge_response.edges_of(flights[i])
             if chosen[np.argmin(np.abs(first[i][AIR] + AIR_LENGTH[AIR] // 2 - e.sample))]]
@@ -55,7 +55,7 @@ class TwinView:
         flat = [s.ravel() for s in self.spectra]
         flat += [edge_response.whitened(self._edge_floor, f, e).astype(complex) for f, _, e in self.edges]
         self.values = np.concatenate(flat) if flat else NOTHING.astype(complex)
-        self.floor = self._spread_out(lambda i: self.twin.floor)
+        self.floor = self._spread_out(lambda i: self.loop.floor)
         axis = np.arange(len(AXES)) + FIRST_CHANNEL
         self.channel = self._spread_out(lambda i: np.broadcast_to(axis, _shape(self.spectra[i])))
         self.frequency = self._spread_out(lambda i: np.repeat(frequencies()[:, None], len(AXES), axis=1))
@@ -74,16 +74,16 @@ class TwinView:
         return len(self.values)
 
     @property
-    def twin(self) -> Twin:
+    def loop(self) -> ClosedLoop:
         """The loop that the commands are held against; only asked for where there are any."""
-        assert self._twin is not None
-        return self._twin
+        assert self._loop is not None
+        return self._loop
 
     @property
     def _edge_floor(self) -> edge_response.EdgeFloor:
         """The same of responses at edges."""
-        assert self.twin.edges is not None
-        return self.twin.edges
+        assert self.loop.edges is not None
+        return self.loop.edges
 
     def _spread_out(self, table_of: Any) -> np.ndarray:
         """A table (bins, axes) for each flight, once for each of its blocks, flattened."""
@@ -105,7 +105,7 @@ class TwinView:
         """Expected power (elements,), the floor's own uncertainty found anew, and what that costs."""
         if not self.spectra:
             return self.floor, 0.0
-        ratio = self.twin.ratio(active)
+        ratio = self.loop.ratio(active)
         key = (ratio.tobytes(), wide)
         if key not in self.kept:
             if len(self.kept) > 300:
@@ -114,7 +114,7 @@ class TwinView:
             for s in self.sizes:
                 wrong, price, _, _ = self._shift(s, ratio, wide)
                 cost += price
-                made.append(np.broadcast_to(self.twin.floor * ratio * np.exp(wrong), s.shape).ravel())
+                made.append(np.broadcast_to(self.loop.floor * ratio * np.exp(wrong), s.shape).ravel())
             made.append(np.ones(len(self.edges) * edge_response.COUNT))
             self.kept[key] = (np.concatenate(made), cost)
         return self.kept[key]
@@ -123,7 +123,7 @@ class TwinView:
         """By how much the logarithm of the expected power rises (bins, axes) from one hypothesis to another."""
         if not self.spectra:
             return np.zeros((0, len(AXES)))
-        return np.log(self.twin.ratio(after) / self.twin.ratio(before))
+        return np.log(self.loop.ratio(after) / self.loop.ratio(before))
 
     def slopes(self, active: Sequence[Active], rise: np.ndarray, wide: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood for k parameters, each of which lets the log power
@@ -132,7 +132,7 @@ class TwinView:
         gradient, information = np.zeros(k), np.zeros((k, k))
         if not rise.any():
             return gradient, information
-        ratio = self.twin.ratio(active)
+        ratio = self.loop.ratio(active)
         for i in np.flatnonzero(rise.any(axis=(1, 2))):
             up, down = (self._level(ratio * np.exp(sign * SMALL * rise[i]), wide) for sign in (1.0, -1.0))
             gradient[i] = (up - down) / (2.0 * SMALL)
@@ -149,7 +149,7 @@ class TwinView:
         total = 0.0
         for s in self.sizes:
             wrong, cost, _, _ = self._shift(s, ratio, wide)
-            power = self.twin.floor * ratio * np.exp(wrong)
+            power = self.loop.floor * ratio * np.exp(wrong)
             tails = (FREEDOM + 1.0) * np.log1p(s / (power * FREEDOM))
             total -= OVERLAP_WEIGHT * float((np.log(power) + tails).sum()) + cost
         return total
@@ -159,7 +159,7 @@ class TwinView:
 
         amounts. s: power (blocks, bins, axes) of a flight.
         """
-        e0 = s / (self.twin.floor * ratio)
+        e0 = s / (self.loop.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)
         spread = np.hypot(spread, DOUBT * np.sqrt(np.mean(np.log(ratio) ** 2)))
         count = OVERLAP_WEIGHT * len(s)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from airtouch.gap.diagnose import best_shape
+from airtouch.gap.answer.named_effects import best_shape
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.signatures import candidates

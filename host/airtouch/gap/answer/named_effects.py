@@ -1,0 +1,96 @@
+"""The effects named: fitted to all the data, in the shape that gains most, with 90 % intervals."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import Fit, fit, judge, strength_variance
+from airtouch.gap.evidence.problem import Part, whole_of
+from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.result import Found
+from airtouch.gap.signatures.candidates import CLOCK, MEAN, SPECTRUM, Term
+
+SHAPE_PRICE = 1.0  #: log likelihood that another shape of an effect must gain on all the data
+ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
+
+
+def chosen_effects(data: Data, selection: Selection) -> list[Found]:
+    """The effects chosen, fitted anew on all the data, with 90 % intervals."""
+    judged = selection.whole
+    if selection.chosen is None or judged is None:
+        return []
+    others = [t for t in judged.terms if t.kind != CLOCK]
+    whole = whole_of(data)
+    fitted = (best_shape(data, whole, others, _middle(judged)) if others
+              else Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0))
+    chosen = {t.name for t in selection.chosen.terms}
+    out, place = [], 0
+    for t in fitted.terms:
+        part = slice(place, place + len(t.free)) if t.kind == MEAN else None
+        if part is not None:
+            place += len(t.free)
+        if t.name not in chosen:
+            continue
+        if t.companion:
+            out = [with_random_part(e, t) for e in out]
+            continue
+        x = fitted.scaled[part] if part is not None else t.scaled(t.values)
+        known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
+        spread = _spread(data.study.controller, judged, t, known)
+        out.append(Found(t.name, t.quantities(x, spread), t.gate))
+    for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
+        x = t.scaled(t.values)
+        n = sum(len(f) for f in data.flights)
+        out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
+    order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
+    return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
+
+
+def best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray | None) -> Fit:
+    """Effects fitted to all the data, in the shape that gains most; another than that found must earn its choice."""
+    best = fit(data, whole, terms, start)
+    for i, term in enumerate(terms):
+        level = judge(data, whole, best.terms) + SHAPE_PRICE
+        for shaped in term.shaped():
+            tried = fit(data, whole, [*terms[:i], shaped, *terms[i + 1:]], start)
+            gained = judge(data, whole, tried.terms)
+            if gained > level:
+                best, level = tried, gained
+    return best
+
+
+def with_random_part(effect: Found, part: Term) -> Found:
+    """An effect with its random part as fitted, so that it can be switched on as it stands.
+
+    The part was fitted at its own strength (1, of the published curve), while the effect has one strength for
+    mean and random part: the part's parameters are divided by it. A mean too weak to carry them within their
+    bounds is raised to the least that does.
+    """
+    if effect.name != part.name:
+        return effect
+    own, given = part.values["strength"], effect.parameters["strength"]
+    limits = {p.name: p.high for p in part.effect.parameters}
+    strength = max(given.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
+    raised = replace(given, value=strength, high=strength if given.high is None else max(given.high, strength))
+    scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
+    return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
+
+
+def _middle(chosen: Judged) -> np.ndarray | None:
+    scaled = [f.scaled for f in chosen.fits]
+    return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
+
+
+def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.ndarray) -> np.ndarray:
+    """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement and the model's doubt."""
+    pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
+             if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
+    apart = np.zeros((len(term.free), len(term.free)))
+    if len(pairs) == 2:
+        apart = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
+    assumed = term.kind == SPECTRUM or (law is not None and law.changes_loop((term.active(),)))
+    doubt = np.diag((ASSUMED * term.scaled(term.values)) ** 2) if assumed else 0.0
+    return covariance + apart + doubt

@@ -1,0 +1,84 @@
+"""The verdict, and every candidate with its probability and how far it closes the gap, best first."""
+
+from collections.abc import Mapping
+
+from airtouch.gap.answer.named_effects import chosen_effects
+from airtouch.gap.answer.shrink import Cells, Shrink, shrink_of
+from airtouch.gap.answer.unexplained import why_not
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.judging import FIRST_GAIN
+from airtouch.gap.naming.selection import Selection, probabilities
+from airtouch.gap.result import Found, Quantity, Ranked
+from airtouch.gap.signatures import candidates
+from airtouch.gap.signatures.candidates import CLOCK
+
+AT_FLOOR = 1.0  #: gap that is at its floor
+CALMED = 0.5  #: of how far a flight is below the floor, that effects named may leave
+CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
+
+
+def verdict_of(selection: Selection, gap: Shrink, simulated: bool) -> str:
+    """What does not stand over the floor is nothing, whatever small differences add up to.
+
+    What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
+    in both halves of the data, in whose common part the gap is measured. simulated: the flights are a simulator's;
+    there a flight calmer than nominal ones, which the effects named bring to the floor, has them, and no nominal flight
+    has odd times; a recorded one had calm air or a poor link.
+    """
+    calmed = simulated and abs(gap.after - AT_FLOOR) < CALMED * abs(gap.before - AT_FLOOR)
+    odd_times = simulated and selection.of_times > selection.allowed
+    apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
+    if gap.before <= AT_FLOOR and not (apart or calmed or odd_times):
+        return "none"
+    if not selection.explained:
+        return "unknown"
+    return "none" if selection.chosen is None else "effect"
+
+
+def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked], Shrink, str, list[Found]]:
+    """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
+    parts = selection.parts
+    overall = shrink_of(data, parts, selection.chosen, cells)
+    verdict = verdict_of(selection, overall, data.study.simulated)
+    effects = chosen_effects(data, selection) if verdict == "effect" else []
+    answer = effects[0].name if effects else verdict
+    chance = agreeing(probabilities(selection, verdict == "none"), answer)
+    out = []
+    for name, p in chance.items():
+        one = selection.singles.get(name)
+        share = Quantity(0.0)
+        if name == answer and effects and len(selection.named) == 1:
+            share = overall.share
+        elif one is not None and one.full and one.gain > FIRST_GAIN:
+            share = shrink_of(data, parts, one, cells).share
+        out.append(Ranked(name, float(p), share, why_not(selection, name, verdict)))
+    order = {n: j.gain for n, j in selection.singles.items()}
+    out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
+    return out, overall, verdict, effects
+
+
+def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
+    """The probabilities with the answer's at least as large as any other: it changes places with a larger one.
+
+    The verdict weighs what the ranking of single candidates does not, as effects that come and go.
+    """
+    out = {answer: 0.0, **chance}
+    best = max(out, key=out.__getitem__)
+    out[answer], out[best] = out[best], out[answer]
+    return out
+
+
+def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
+    """Sets that these logs cannot tell apart: names of one thing, and candidates as good as the best."""
+    if not selection.named:
+        return ()
+    groups = []
+    best = selection.named[0]
+    same = [n for n, j in selection.singles.items() if j.full and best.gain - j.gain < CLOSE]
+    if len(same) > 1:
+        groups.append(tuple(sorted(same)))
+    for step in selection.named:
+        group = candidates.names_alike(step.name)
+        if group and not any(step.name in g for g in groups):
+            groups.append(tuple(sorted(group[0])))
+    return tuple(groups)
