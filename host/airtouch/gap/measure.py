@@ -14,7 +14,8 @@ from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, Flight, ready
 from airtouch.gap.flights.hardness import STILL_RAD, hardness_of
 from airtouch.gap.flights.motion import held
-from airtouch.gap.loop import closed_loop
+from airtouch.gap.loop.command_spectra import block_spectra, frequencies
+from airtouch.gap.loop.controller import AXES
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Cell, Quantity, plain_cell, rounded
 from airtouch.gap.signals.channels import residual
@@ -223,7 +224,7 @@ def command_spectra(flights: Iterable[Flight], nominal: Iterable[Flight], vehicl
 
 def _command_power(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Sum of the commands' spectra over blocks and their number, (bins, 4): three axes and the count."""
-    blocks = closed_loop.block_spectra(flight, vehicle)[1]
+    blocks = block_spectra(flight, vehicle)[1]
     power = (np.abs(blocks) ** 2).sum(axis=0)
     return np.column_stack([power, np.full(len(power), float(len(blocks)))])
 
@@ -233,9 +234,9 @@ def _spectra(flown: Sequence[np.ndarray], nominal: Sequence[np.ndarray]) -> dict
     total = np.sum(flown, axis=0)
     if not len(flown) or not total[0, -1]:
         return {}
-    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": closed_loop.frequencies().tolist()}
+    made: dict[str, Any] = {"unit": "N^2/Hz", "frequency_hz": frequencies().tolist()}
     usual = np.sum(nominal, axis=0) if len(nominal) else None
-    for i, axis in enumerate(closed_loop.AXES):
+    for i, axis in enumerate(AXES):
         made[axis] = {"flown": (total[:, i] / total[0, -1]).tolist()}
         if usual is not None and usual[0, -1]:
             made[axis]["nominal"] = (usual[:, i] / usual[0, -1]).tolist()

@@ -10,7 +10,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.evidence import fit
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights import flight
-from airtouch.gap.loop import closed_loop, controller, edge_response, loop_model
+from airtouch.gap.loop import command_spectra, controller, edge_response, identify, loop_model, noise_spectra, turning
 from airtouch.gap.naming import judging
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signatures.candidates import terms
@@ -63,10 +63,10 @@ def nominal():
 def spectrum(effects):
     total = 0.0
     for log in simulated(scenario.parse(LONG, "long hover"), 8, vehicle=VEHICLE, effects=effects, workers=1):
-        told = VEHICLE.thrust(log.stack([f"m{i}_pwm" for i in (1, 2, 3, 4)])) @ closed_loop.MIX.T
-        f, power = welch(told[500:6000, :3], 100.0, nperseg=closed_loop.LENGTH, axis=0)
+        told = VEHICLE.thrust(log.stack([f"m{i}_pwm" for i in (1, 2, 3, 4)])) @ command_spectra.MIX.T
+        f, power = welch(told[500:6000, :3], 100.0, nperseg=command_spectra.LENGTH, axis=0)
         total = total + power
-    return total[np.isin(f, closed_loop.frequencies())]
+    return total[np.isin(f, command_spectra.frequencies())]
 
 
 @pytest.mark.parametrize("effects", [
@@ -77,12 +77,12 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
     row, changed = prepare(VEHICLE, ())[0][0], prepare(VEHICLE, activate(effects))[0][0]
     seen = spectrum(effects)
     for i, axis in enumerate(controller.AXES):
-        strengths, _, _ = closed_loop.noise_strengths(controller.firmware(row, axis), row, axis, nominal[:, i])
-        f, fine = closed_loop.frequencies(), closed_loop.fine_frequencies()
-        expected = closed_loop.through_window(
-            strengths @ loop_model.spectra(controller.firmware(changed, axis), changed, axis, fine))
-        expected /= closed_loop.through_window(
-            strengths @ loop_model.spectra(controller.firmware(row, axis), row, axis, fine))
+        strengths, _, _ = identify.noise_strengths(controller.firmware(row, axis), row, axis, nominal[:, i])
+        f, fine = command_spectra.frequencies(), command_spectra.fine_frequencies()
+        expected = command_spectra.through_window(
+            strengths @ noise_spectra.spectra(controller.firmware(changed, axis), changed, axis, fine))
+        expected /= command_spectra.through_window(
+            strengths @ noise_spectra.spectra(controller.firmware(row, axis), row, axis, fine))
         error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
         assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
@@ -171,9 +171,9 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
 
     def seen(axis):
         c = controller.firmware(row, axis)
-        whole = [loop_model.spectra(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
+        whole = [noise_spectra.spectra(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
         if axis != "thrust":
-            whole += [loop_model.turning_per_command(c, row, axis, strengths, f),
+            whole += [turning.turning_per_command(c, row, axis, strengths, f),
                       loop_model.torque_per_command(row, axis, f)]
         return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in whole])
 

@@ -9,7 +9,7 @@ import pytest
 import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap import diagnose, measure
-from airtouch.gap.loop import closed_loop, controller, loop_model
+from airtouch.gap.loop import command_spectra, controller, noise_spectra
 from airtouch.gap.loop.edge_response import calm
 from airtouch.gap.nominal.calibrate import declared
 from airtouch.gap.signals.channels import TORQUE, angular_acceleration, residual
@@ -81,14 +81,14 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     """Share of the roll commands' power that noise of the gyro makes: flights with that noise alone."""
     vehicle = vehicles.load(VEHICLE)
     alone = replace(calm(vehicle), gyro_noise_rms_radps=vehicle.gyro_noise_rms_radps)
-    spectra = [np.concatenate([closed_loop.block_spectra(f, vehicle)[1] for f in flown([], BASELINE, v)])
+    spectra = [np.concatenate([command_spectra.block_spectra(f, vehicle)[1] for f in flown([], BASELINE, v)])
                for v in (vehicle, alone)]
-    every, gyro = (closed_loop.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
+    every, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
     law, row = nominal().controller, prepare(vehicle, ())[0][0]
     roll = controller.firmware(row, "roll")
-    made = closed_loop.through_window(loop_model.spectra(roll, row, "roll", closed_loop.fine_frequencies()))
+    made = command_spectra.through_window(noise_spectra.spectra(roll, row, "roll", command_spectra.fine_frequencies()))
     told = law.strengths[1][0] * made[0] / (law.strengths[1] @ made)
-    f = closed_loop.frequencies()
+    f = command_spectra.frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):
         band = (f > low) & (f < high)
         np.testing.assert_allclose(told[band].mean(), (gyro / every)[band].mean(), atol=0.12)

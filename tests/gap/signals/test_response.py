@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.gap import measure
-from airtouch.gap.loop import controller, loop_model
+from airtouch.gap.loop import controller, loop_model, turning
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import FIRST_BIN, response_of
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
@@ -94,8 +94,8 @@ def test_turning_under_an_outside_torque_is_the_closed_loop_s():
     s = 2j * np.pi * f
     plant, *_, whole = loop_model.loop_parts(c, row, "roll", f)
     strengths = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-    turning = loop_model.turning_per_command(c, row, "roll", strengths, f)
-    np.testing.assert_allclose(turning, -s / whole, rtol=1e-9)
+    expected = turning.turning_per_command(c, row, "roll", strengths, f)
+    np.testing.assert_allclose(expected, -s / whole, rtol=1e-9)
 
 
 def test_more_inertia_leaves_more_of_an_outside_torque():
@@ -134,7 +134,7 @@ def test_a_late_gyro_changes_the_response_as_in_simulated_flights():
     told = []
     for active in ((), (late,)):
         row = prepare(vehicle, active)[0][0]
-        told.append(loop_model.turning_per_command(controller.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
+        told.append(turning.turning_per_command(controller.firmware(row, "roll"), row, "roll", noise_alone, f)[0])
     judged = (f > 15.0) & (f < 40.0)  # where it is noise of the gyro
     ratio = (seen / (told[1] / told[0]))[judged].reshape(-1, 8).mean(axis=1)
     np.testing.assert_allclose(np.angle(ratio), 0.0, atol=0.3)

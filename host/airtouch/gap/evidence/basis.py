@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.loop.closed_loop import MIX
+from airtouch.gap.loop.command_spectra import MIX
 from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle

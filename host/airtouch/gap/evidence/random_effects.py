@@ -14,7 +14,7 @@ from scipy.signal import freqz
 from airtouch.gap.evidence.vibration_lines import lines
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop.controller import AXES
-from airtouch.gap.loop.loop_model import spectra
+from airtouch.gap.loop.noise_spectra import spectra
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
 from airtouch.simulation.body import rigid_body

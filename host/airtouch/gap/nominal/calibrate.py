@@ -17,7 +17,7 @@ from airtouch.gap.evidence.fit import fit
 from airtouch.gap.evidence.generic import usual_of
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.loop import closed_loop
+from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.loop_model import sensitivity
 from airtouch.gap.nominal.apparent import apparent
 from airtouch.gap.result import Quantity
@@ -113,7 +113,7 @@ def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[
             table[:, 9:] = 1e12
             table[:, 6:9] = 1e6
         return Study(vehicle, calibration, None, Floor(power, {AIR: 8, REST: 8}, np.zeros(COUNT), 0.0, 0.0))
-    law = closed_loop.identify(flights, vehicle, calibration)
+    law = identify.identify(flights, vehicle, calibration)
     left = [np.nan_to_num(residual(f, vehicle, calibration)) for f in flights]
     first = [{r: starts(f, r) for r in (AIR, REST)} for f in flights]
     made = [{r: blocks(x, s[r], r) for r in s} for x, s in zip(left, first, strict=True)]

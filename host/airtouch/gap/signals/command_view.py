@@ -12,7 +12,9 @@ import numpy as np
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import edge_response
-from airtouch.gap.loop.closed_loop import AXES, FREEDOM, LENGTH, SHAPES, SPREAD, ClosedLoop, frequencies, shapes
+from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, SHAPES, SPREAD, frequencies, shapes
+from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
 from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
 from airtouch.simulation.effects import Active

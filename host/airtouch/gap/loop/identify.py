@@ -1,0 +1,84 @@
+"""The closed loop of nominal flights: the firmware's controller or one found from the spectra, noise, floor."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.optimize import minimize
+
+from airtouch.gap.flights.flight import Flight
+from airtouch.gap.flights.hardness import hardness_of, slopes_of
+from airtouch.gap.loop.closed_loop import ClosedLoop
+from airtouch.gap.loop.command_spectra import (
+    LENGTH,
+    block_spectra,
+    fine_frequencies,
+    frequencies,
+    through_window,
+    typical,
+)
+from airtouch.gap.loop.controller import AXES, Controller, firmware
+from airtouch.gap.loop.edge_response import floor_of
+from airtouch.gap.loop.noise_spectra import spectra
+from airtouch.simulation.effects import Active
+from airtouch.simulation.flight import prepare
+from airtouch.vehicle import Vehicle
+
+FEWEST = 6  #: blocks of nominal flights, for a command view
+
+
+def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
+    """Controller, noise and floor of flights declared nominal; None where they have too few blocks."""
+    made = [block_spectra(f, vehicle) for f in flights]
+    if sum(len(first) for first, _ in made) < FEWEST:
+        return None
+    hardness = np.concatenate([hardness_of(f, first, LENGTH) for f, (first, _) in zip(flights, made, strict=True)])
+    every = np.abs(np.concatenate([s for _, s in made])) ** 2
+    slopes = slopes_of(every, hardness, frequencies())
+    power = typical(every / slopes.level(hardness))
+    row = prepare(vehicle, calibration)[0][0]
+    documented = [noise_strengths(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
+    found = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
+    weight = 0.5 * len(every)
+    by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
+    chosen = documented if by_firmware else found
+    loop = ClosedLoop(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
+                tuple(c[0] for c in chosen), power, len(every), slopes, floor_of(flights, vehicle, calibration))
+    model = loop.nominal_power()
+    return replace(loop, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
+
+
+def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarray,
+                    steps: int = 300) -> tuple[np.ndarray, float, Controller]:
+    """Noise strengths of highest Whittle likelihood for a command's power, its negative a block, and the controller."""
+    shapes = through_window(spectra(controller, row, axis, fine_frequencies()))
+    scale = power.mean() / shapes.mean(axis=1)
+    shapes = shapes * scale[:, None]
+    a = np.full(len(shapes), 1.0 / len(shapes))
+    for _ in range(steps):  # multiplicative updates for the Itakura-Saito divergence
+        model = a @ shapes
+        a = np.maximum(a * np.sqrt((shapes @ (power / model ** 2)) / (shapes @ (1.0 / model))), 1e-9)
+    e = power / (a @ shapes)
+    return a * scale, float((e - np.log(e) - 1.0).sum()), controller
+
+
+def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, Controller]:
+    """A cascade's gains found from the shape of the spectrum, near those that vehicles of its size have."""
+    usual = firmware(row, axis)
+    middle = np.log([usual.gain, usual.angle, max(usual.velocity, 1e-3)])
+    spread = np.array([0.7, 0.4, 0.5])
+    free = 2 if axis == "thrust" else 3
+
+    def controller(x: np.ndarray) -> Controller:
+        values = np.exp(middle + spread * np.concatenate([x, np.zeros(3 - len(x))]))
+        return Controller(values[0], values[1], values[2] if free == 3 else 0.0)
+
+    def cost(x: np.ndarray) -> float:
+        return 8.0 * noise_strengths(controller(x), row, axis, power, 40)[1] + 0.5 * float(x @ x)
+
+    corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in (-1.0, 0.5)]
+    best = min((minimize(cost, x[0], method="Nelder-Mead", options={
+        "initial_simplex": x, "maxfev": 80, "xatol": 0.03, "fatol": 0.02}) for x in corners), key=lambda r: r.fun)
+    return noise_strengths(controller(best.x), row, axis, power)

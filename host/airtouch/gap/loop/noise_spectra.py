@@ -1,0 +1,142 @@
+"""What noise makes of the motor commands: power spectra of the modelled loop, aliases included."""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.loop.controller import Controller
+from airtouch.gap.loop.loop_model import Fixed, Parts, fixed_of, loop_parts
+
+FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequency (500 Hz controller)
+FLOW_HZ = 1.5  #: above it the estimated velocity's error falls by its square; errors of optical flow last 0.1 s
+
+
+def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
+
+    Sources, roll and pitch: white rate; with the firmware's controller velocity flat up to FLOW_HZ and falling with
+    the frequency's square beyond, with another one white angle and velocity falling with the frequency; velocity and
+    angle falling with its square; torque. Thrust: white climb, climb falling with the frequency, its square, force,
+    white error of the down range, the same drifting from reading to reading.
+    row: plant row of `simulation.flight.prepare`, effects in it.
+    """
+    return with_aliases(_sources(c, row, axis, f), aliases_of(c, row, axis, f))
+
+
+def aliases_of(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """What of the first source's noise folds into the log, noise to command, complex (folds, bins)."""
+    if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
+        return np.zeros((0, len(f)))
+    folded = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
+    fixed = fixed_of(c, folded)
+    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, folded)
+    kick = kick_of(c, fixed)
+    turned = plant * -(rate + angle) / (1.0 + plant * whole)
+    return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * turned
+
+
+def with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
+    for folded in aliases:
+        power[0] += np.abs(folded) ** 2
+    return power
+
+
+def difference(f: np.ndarray) -> np.ndarray:
+    """Of two samples of the log over their distance in time, at the middle between them, 1/s."""
+    return 2j * np.sin(np.pi * f * PERIOD_S) / PERIOD_S
+
+
+def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+    """Power (sources, bins) of the logged command for noise of unit power, without aliases."""
+    f = np.maximum(f, 0.05)
+    if axis == "thrust":
+        s, low = 2j * np.pi * f, np.maximum(f, 0.3)
+        plant, climb, _, _, whole = loop_parts(c, row, axis, f)
+        size = 1.0 / (1.0 + plant * whole)
+        climbs = np.abs(whole * size) ** 2
+        sources = [np.abs(climb * size) ** 2, climbs / low ** 2, climbs / low ** 4, np.abs(whole / s * size) ** 2]
+        if c.range_gains[0]:
+            sources += _range_errors(c, row, f, size)
+        return np.array(sources)
+    return np.abs(transfers(c, row, f, loop_parts(c, row, axis, f))[0]) ** 2
+
+
+def transfers(c: Controller, row: Any, f: np.ndarray, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
+    """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration.
+
+    parts: of the loop at f.
+    """
+    fixed, low = fixed_of(c, f), np.maximum(f, 0.3)
+    s = fixed.s
+    plant, rate, angle, velocity, whole = parts
+    size = 1.0 / (1.0 + plant * whole)
+    kick = kick_of(c, fixed)
+    tilt, speed = paths(c, row, fixed)
+    wandering = [speed / (low ** 2 + FLOW_HZ ** 2)] if c.lowpass_hz else [tilt, speed / low]
+    outer = [*wandering, speed / low ** 2, tilt / low ** 2]
+    direct = np.array([-(rate + angle), *outer, 0.0 * s])
+    stepped = np.array([-(rate + kick * angle), *(kick * np.array(outer)), 0.0 * s])
+    turned = plant * direct * size  # rate
+    turned[-1] = size / s
+    logged = stepped - (rate + kick * (angle + velocity)) * turned
+    turned = s * turned
+    turned[0] += difference(f) / fixed.chip
+    return logged, turned
+
+
+def paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray]:
+    """Command (bins,) for an angle and for a velocity of 1 that the controller is asked for."""
+    k = c.gain * float(row["rate_gain"])
+    tilt = k * fixed.integral * c.angle * float(row["attitude_gain"])
+    if c.on_error:
+        tilt = tilt * fixed.whole / fixed.integral
+    speed = tilt * c.velocity * float(row["position_gain"]) * fixed.velocity_integral
+    return tilt * fixed.angle_integral, speed
+
+
+def kick_of(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | float:
+    """Angle path in the log over that in the loop: set-points of the outer loop and attitudes come as steps, and the
+
+    log takes the sample on which they do. passed: share of that sample's derivative that the command's limits leave.
+    """
+    if not c.on_error:
+        return 1.0
+    return (fixed.integral + passed * c.derivative * fixed.outer) / fixed.whole
+
+
+def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:
+    """Power (bins,) of the logged command for white errors of the down range, and for drifting ones; aliases in it.
+
+    size: of the closed loop over the open one at f.
+    """
+    white, drifting = np.zeros(len(f)), np.zeros(len(f))
+    for k in FOLDS:
+        g = f + k / PERIOD_S
+        power = np.abs(_ranged(c, row, g) * (1.0 if k else size)) ** 2
+        white += power
+        drifting += power / (4.0 * np.sin(np.pi * g * c.range_s) ** 2 + (0.6 * np.pi * c.range_s) ** 2)
+    return [white, drifting]
+
+
+def _ranged(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
+    """Command for an error of the down range of 1 m at f (Hz), through the estimator's height and climb.
+
+    Between two readings T apart the estimate moves on its own: X = (1 - (1 - K H) F / z)^-1 K.
+    """
+    s = 2j * np.pi * f
+    height, climb = _estimated(*c.range_gains, c.range_s, f.tobytes())
+    k = float(row["height_gain"])
+    gain = k * c.gain * (1.0 + c.integral / s)
+    return np.sinc(f * c.range_s) * gain * (climb + c.angle * k * (1.0 + c.angle_integral / s) * height)
+
+
+@lru_cache(64)
+def _estimated(a: float, b: float, t: float, frequencies: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Height and climb (1/s) of the estimator, gains a and b, for an error of readings t apart, complex (bins,)."""
+    z = np.exp(-2j * np.pi * np.frombuffer(frequencies) * t)
+    # (1 - K H) F = [[1 - a, (1 - a) t], [-b, 1 - b t]]
+    m00, m01, m10, m11 = 1.0 - z * (1.0 - a), -z * (1.0 - a) * t, z * b, 1.0 - z * (1.0 - b * t)
+    det = m00 * m11 - m01 * m10
+    return (m11 * a - m01 * b) / det, (m00 * b - m10 * a) / det

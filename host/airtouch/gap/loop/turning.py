@@ -1,0 +1,135 @@
+"""How far the vehicle turns for a logged command: of noise, and of steps of a set-point beside it."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.loop.controller import Controller
+from airtouch.gap.loop.loop_model import Parts, butterworth, fixed_of, loop_parts
+from airtouch.gap.loop.noise_spectra import FOLDS, aliases_of, difference, kick_of, paths, transfers, with_aliases
+
+KICKS = np.linspace(1.0, 0.0, 21)  #: shares that are tried of a step's first sample
+STEP_HZ = (1.5, 14.0)  #: where they are fitted
+UNCUT = 0.95  #: share of a kick from which the command's limits do not cut it
+#: of the gains, with which what is left of a cut kick falls: so it does in ten pairs of simulated flights each with
+CUT_POWER = 0.6  #: attitude gains of 0.5 to 1.5 and rate gains of 0.8 to 1.3
+
+
+class Step(NamedTuple):
+    """Steps of a velocity set-point in a block.
+
+    power: of the steps, over that of noise of unit strength; kick: share of the derivative at the first sample that is
+    left by the limits of the command, which are 16 bits and what the motors take.
+    """
+
+    power: float = 0.0
+    kick: float = 1.0
+
+
+NO_STEP = Step()
+
+
+def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray,
+                        width: float = 0.0, step: Step = NO_STEP) -> np.ndarray:
+    """Angular acceleration (..., bins) to be expected for a logged command, rad/s^2 per N: S_yu / S_uu of roll or pitch
+
+    for noise of given strengths (..., sources) and steps; width: of neighbouring bins of f that are
+    smoothed over, standard deviation.
+    """
+    return turnings_per_command(c, row, axis, strengths, f, width, [step])[0]
+
+
+def turnings_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, width: float,
+                         steps: Sequence[Step]) -> list[np.ndarray]:
+    """`turning_per_command` for each of several steps."""
+    at = np.maximum(f, 0.05)
+    parts = loop_parts(c, row, axis, at)
+    cross, power = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
+    made = {NO_STEP: (cross, power)}
+    known = [s for s in dict.fromkeys(steps) if s.power]
+    for s, stepped in zip(known, _stepped(c, row, at, parts, [s.kick for s in known]), strict=True):
+        made[s] = _with_steps(cross, power, s.power, *stepped)
+    crosses, powers = (np.array(x) for x in zip(*made.values(), strict=True))
+    if width > 0.0:
+        crosses, powers = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (crosses, powers))
+    each = dict(zip(made, crosses / powers, strict=True))
+    return [each[s if s.power else NO_STEP] for s in steps]
+
+
+def _with_steps(cross: np.ndarray, power: np.ndarray, amount: float, logged: np.ndarray, turned: np.ndarray,
+                ) -> tuple[np.ndarray, np.ndarray]:
+    """S_yu and S_uu of noise, `cross` and `power`, and of steps of a power `amount` beside it (`_stepped`)."""
+    return cross + amount * turned * logged.conj(), power + amount * np.abs(logged) ** 2
+
+
+def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray, parts: Parts,
+                        ) -> tuple[np.ndarray, np.ndarray]:
+    """S_yu and S_uu (sources, bins) of the angular acceleration and the logged command for noise of unit power.
+
+    parts: of the loop at f, no lower than 0.05 Hz.
+    """
+    logged, turned = transfers(c, row, np.maximum(f, 0.05), parts)
+    cross, aliases = turned * logged.conj(), aliases_of(c, row, axis, f)
+    for k, folded in zip(FOLDS[1:], aliases, strict=False):  # noise of the gyro folds into log and command alike
+        beyond = f + k / PERIOD_S
+        both = folded.conj() / butterworth(2j * np.pi * np.abs(beyond), c.chip_hz)
+        cross[0] += difference(f) * np.where(beyond < 0.0, both.conj(), both)
+    return cross, with_aliases(np.abs(logged) ** 2, aliases)
+
+
+def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, over: np.ndarray,
+            turning: np.ndarray) -> Step:
+    """The steps that explain blocks of nominal flights best, by least squares.
+
+    strengths (sources,): of the noise; over (bins,): power of their commands over that of blocks without a step;
+    turning (bins,): measured S_yu / S_uu, 0 where it is not known.
+    """
+    known = (turning != 0.0) & (f > STEP_HZ[0]) & (f < STEP_HZ[1])
+    if not known.any():
+        return NO_STEP
+    at = np.maximum(f, 0.05)
+    parts = loop_parts(c, row, axis, at)
+    cross, noise = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
+    best, least = NO_STEP, np.inf
+    for kick, (logged, turned) in zip(KICKS, _stepped(c, row, at, parts, KICKS), strict=True):
+        step = Step(float(np.median(((over - 1.0) * noise / np.abs(logged) ** 2)[known])), float(kick))
+        if step.power > 0.0:
+            both, power = _with_steps(cross, noise, step.power, logged, turned)
+            made = both / power
+            misfit = float((np.abs(made[known] / turning[known] - 1.0) ** 2).sum())
+            if misfit < least:
+                best, least = step, misfit
+    return best
+
+
+def step_under(step: Step, c: Controller, before: Any, row: Any) -> Step:
+    """Steps of the same set-point under another plant row; step: those under `before`.
+
+    What the limits leave of the first sample of a large step has one size however high the gains; smaller steps are
+    not cut: together it falls by CUT_POWER of the gains.
+    """
+    if step.kick >= UNCUT or not c.on_error:
+        return step
+    ahead = c.derivative / c.period_s
+    gains = [float(r["rate_gain"]) * float(r["attitude_gain"]) * float(r["position_gain"]) for r in (before, row)]
+    kick = ((1.0 + ahead * step.kick) * (gains[0] / gains[1]) ** CUT_POWER - 1.0) / ahead
+    return step._replace(kick=float(np.clip(kick, 0.0, 1.0)))
+
+
+def _stepped(c: Controller, row: Any, f: np.ndarray, parts: Parts, passed: Iterable[float],
+             ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Of roll or pitch, (bins,) each: steps of the velocity's set-point to logged command and angular acceleration.
+
+    parts: of the loop at f. passed: shares of the first sample's derivative that the command's limits leave, a pair
+    for each; what follows is too small for them.
+    """
+    fixed = fixed_of(c, f)
+    plant, rate, angle, velocity, whole = parts
+    step = paths(c, row, fixed)[1] / np.maximum(f, 0.3)
+    turned = plant * step / (1.0 + plant * whole)
+    later, turning = (rate + kick_of(c, fixed) * (angle + velocity)) * turned, fixed.s * turned
+    for share in passed:
+        yield kick_of(c, fixed, share) * step - later, turning
