@@ -1,5 +1,6 @@
 """What every test may ask for."""
 
+import gc
 import importlib
 import os
 import sys
@@ -28,6 +29,12 @@ def pytest_configure(config):
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         for name in ("batch", "replay"):
             importlib.import_module(f"airtouch.simulation.{name}")
+
+
+def pytest_collection_finish():
+    """What is imported and collected by now stays: the garbage collector need not walk through it again and again."""
+    gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
 
 
 @pytest.fixture(scope="session")

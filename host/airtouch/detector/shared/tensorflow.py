@@ -1,6 +1,8 @@
 """What both trainers need of TensorFlow: a fixed start, and a network of one tensor as an int8 TFLite file."""
 
 import contextlib
+import functools
+import gc
 import os
 import warnings
 from collections.abc import Callable, Iterator
@@ -20,10 +22,17 @@ def use_tensorflow(seed: int) -> None:
         import tensorflow as tf
     except ImportError:
         raise AirTouchError("training needs TensorFlow: pip install 'airtouch[train]'") from None
+    _keep_what_is_imported()
     tf.get_logger().setLevel("ERROR")
     keras.backend.clear_session()
     keras.utils.set_random_seed(seed)
     tf.config.experimental.enable_op_determinism()
+
+
+@functools.cache
+def _keep_what_is_imported() -> None:
+    """TensorFlow is half a million objects, which `clear_session` would look through for garbage each time."""
+    gc.freeze()
 
 
 def convert(network: Callable, shape: tuple[int, ...], inputs: np.ndarray) -> bytes:
