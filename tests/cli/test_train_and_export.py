@@ -133,7 +133,7 @@ def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path
             logs.write(log, tmp_path / folder / f"f{i}.csv")
     best.fit([made_flight(8)], recipe=SMALL).save(tmp_path / "old.npz")
     result = train(tmp_path / "mine", "--start", tmp_path / "old.npz", "--labelled", 2, "--free-air", tmp_path / "calm",
-                   "--steps", 5, "--out", tmp_path / "new.npz")
+                   "--steps", SMALL.steps, "--out", tmp_path / "new.npz")
     assert result.exit_code == 0, result.output
     assert "trained on 2 flights" in result.output
     metadata = best.load(tmp_path / "new.npz").metadata

@@ -40,10 +40,10 @@ def test_every_flight_is_scored_by_models_that_never_saw_it(house, tmp_path, mon
         trained.append({log.source for log in flights})
         return fit(flights, **options)
 
-    fit([made_flight(9)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
     monkeypatch.setattr(best, "fit", spy)
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
-            "--draws", 2, "--seeds", 1, "--steps", 3, "--alone-steps", 3)
+            "--draws", 2, "--seeds", 1, "--steps", SMALL.steps, "--alone-steps", SMALL.steps)
     run(monkeypatch, *call)
     assert len(trained) == 8 and all(len(names) == 1 for names in trained)
     days = [int(next(iter(names)).split("/")[-1][1]) % 2 for names in trained]
@@ -61,7 +61,7 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
     beside.mkdir()
     for i in range(3):
         logs.write(made_flight(20 + i), beside / f"g{i}.csv")
-    best.fit([made_flight(9)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
     asked, fit = [], best.fit
     monkeypatch.setattr(adapt, "TWIN_STEPS", {"shipped": 3, "scratch": 3})
     monkeypatch.setattr(best, "fit", lambda flights, *a, **o: asked.append((len(flights), o)) or fit(flights, *a, **o))
@@ -75,13 +75,13 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
 
 
 def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):
-    best.fit([made_flight(1)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    best.fit([made_flight(1)], recipe=SMALL).save(tmp_path / "start.npz")
     with pytest.raises(AirTouchError, match="was trained on this flight"):
         run(monkeypatch, house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out")
 
 
 def test_each_start_has_its_twin(house, tmp_path, monkeypatch):
-    best.fit([made_flight(9)], recipe=SMALL, steps=3).save(tmp_path / "start.npz")
+    best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
     with pytest.raises(SystemExit, match="2 twins for 1 models"):
         run(monkeypatch, house, "--start", tmp_path / "start.npz", "--twin", "a", "--twin", "b", "--by", "day",
             "--out", tmp_path / "out")

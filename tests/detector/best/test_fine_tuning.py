@@ -31,8 +31,8 @@ def test_labels_that_are_given_train_like_the_down_range(small):
 
 def test_training_goes_on_from_a_model(small):
     flights = [made_flight(2)]
-    tuned = best.fit(flights, start=small, steps=30, peak_rate=1e-3)
-    assert tuned.recipe.steps == 30 and tuned.recipe.width == small.recipe.width
+    tuned = best.fit(flights, start=small, steps=SMALL.steps, peak_rate=1e-3)
+    assert tuned.recipe.steps == SMALL.steps and tuned.recipe.width == small.recipe.width
     moved = [np.abs(tuned.weights[name] - small.weights[name]).max() for name in small.weights]
     assert 0 < max(moved) < 0.5
     for i in range(1, 1 + len(SMALL.dilations)):
@@ -40,7 +40,7 @@ def test_training_goes_on_from_a_model(small):
         zero = ~kernel.reshape(-1, 4, kernel.shape[-1]).any(axis=1)
         blocks = tuned.weights[f"layer{i}.kernel"].reshape(-1, 4, kernel.shape[-1])
         assert zero.any() and not blocks.any(axis=1)[zero].any()
-    assert best.fit(flights, start=small, steps=30, peak_rate=1e-3).to_bytes() == tuned.to_bytes()
+    assert best.fit(flights, start=small, steps=SMALL.steps, peak_rate=1e-3).to_bytes() == tuned.to_bytes()
     assert training_set.contains(tuned.metadata, made_flight(0)) and training_set.contains(tuned.metadata, flights[0])
 
 

@@ -30,12 +30,23 @@ def test_both_effects_are_named_and_nothing_else(study, effects):
     assert chosen.free_after < chosen.allowed
 
 
-@pytest.mark.parametrize("closes", [True, False])
-def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(study, monkeypatch, closes):
-    """It is named with the share of the gap that it takes away; with less than the loop model's error it is not."""
+@pytest.fixture(scope="module")
+def delayed(study):
+    """A study as of recorded flights, a flight with a delay held against it, and what is selected there."""
     recorded = replace(study, scatter=replace(study.scatter, exact=False))
+    data = Data(recorded, flown(1, 93, {"actuator_delay": {"delay": 0.005}}))
+    return recorded, data, select(data, every())
+
+
+@pytest.mark.parametrize("closes", [True, False])
+def test_in_recorded_flights_a_loop_effect_must_close_a_part_of_the_gap(delayed, monkeypatch, closes):
+    """It is named with the share of the gap that it takes away; with less than the loop model's error it is not."""
+    recorded, data, selected = delayed
+    asked = []
+    monkeypatch.setattr(diagnose, "select", lambda *of, **_: asked.append(of[0]) or selected)  # it looks at no gap
     if not closes:
         monkeypatch.setattr(diagnose, "shrink_of", lambda *_: Shrink(1.4, 1.36, Quantity(0.1)))
-    found = diagnose.brief(recorded, flown(1, 93, {"actuator_delay": {"delay": 0.005}}))
+    found = diagnose.brief(recorded, data.flights, data=data)
+    assert asked == [data]
     assert [e.name for e in found.effects] == (["actuator_delay"] if closes else [])
     assert (found.verdict == "effect") == closes
