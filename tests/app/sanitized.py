@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -19,15 +20,31 @@ SOURCES = [*sorted((ROOT / "firmware" / "link").glob("*.c")), ROOT / "firmware/k
 SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 
 
+FLAGS = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZERS, *INCLUDES]
+
+
 def build(driver: Path, program: Path) -> Path:
     """The program of a driver and SOURCES; skips the test where there is no compiler or no sanitizer."""
+    return link([(FLAGS, [*SOURCES, driver])], program)
+
+
+def link(parts: Sequence[tuple[list[str], Sequence[Path]]], program: Path) -> Path:
+    """The program of sources, each with the flags beside it; skips as `build`.
+
+    Programs that take the same sources with the same flags share the objects.
+    """
     compiler = shutil.which(os.environ.get("CC", "cc"))
     if compiler is None:
         pytest.skip("no C compiler on this machine")
-    flags = ["-std=gnu11", "-O2", "-g", "-Wall", "-Wextra", *SANITIZERS, *INCLUDES]
-    made, error = compiled(compiler, flags, [*SOURCES, driver])
-    assert not error, error
-    done = subprocess.run([compiler, *SANITIZERS, *made, "-lm", "-o", program], capture_output=True, text=True)
+    made: list[Path] = []
+    for flags, sources in parts:
+        objects, error = compiled(compiler, flags, sources)
+        if "libclang_rt" in error:
+            pytest.skip(f"{compiler} has no sanitizers")
+        assert not error, error
+        made += objects
+    done = subprocess.run([compiler, *SANITIZERS, *made, "-pthread", "-lm", "-o", program], capture_output=True,
+                          text=True)
     if "cannot find -lasan" in done.stderr or "libclang_rt" in done.stderr:
         pytest.skip(f"{compiler} has no sanitizers")
     assert done.returncode == 0, done.stderr

@@ -1,8 +1,6 @@
 """The GAP8 app's main.c, run: PMSIS and CPX stand in for the chip, eight threads for the cluster's cores."""
 
 import binascii
-import os
-import shutil
 import struct
 import subprocess
 from pathlib import Path
@@ -11,18 +9,18 @@ import numpy as np
 import pytest
 
 from airtouch.kernels.app_core import DETECTORS, HEALTH, AppCore, Gap8Core
-from objects import compiled
+from app.sanitized import FLAGS, link
 from patience import HANG_S
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 APP = ROOT / "gap8" / "app" / "src"
-INCLUDES = [HERE / "pmsis", *(ROOT / folder for folder in ("gap8/app/src", "gap8/kernels", "gap8/model",
-                                                           "firmware/link", "firmware/kernels"))]
-SOURCES = [*sorted(APP.glob("*.c")), *sorted((ROOT / "firmware" / "link").glob("*.c")),
-           ROOT / "firmware/kernels/feature_window.c", *sorted((ROOT / "gap8" / "kernels").glob("*_int8.c")),
-           ROOT / "gap8/kernels/fixed_scale.c", HERE / "pmsis" / "runtime.c"]
-SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
+SHARED = [APP / "gap8_core.c", *sorted((ROOT / "firmware" / "link").glob("*.c")),
+          ROOT / "firmware/kernels/feature_window.c", *sorted((ROOT / "gap8" / "kernels").glob("*_int8.c")),
+          ROOT / "gap8/kernels/fixed_scale.c"]
+#: what of the app is written against PMSIS, and what stands in for that
+STANDING_IN = [*(p for p in sorted(APP.glob("*.c")) if p.name != "main.c" and p not in SHARED),
+               HERE / "pmsis" / "runtime.c"]
 STM32, WIFI_HOST, CONSOLE, APP_FUNCTION = 1, 3, 2, 5
 HALF_SECOND = struct.pack("<BH", 0, 0)
 RESULT, HEARTBEAT = 3, 4
@@ -70,24 +68,9 @@ class Chip:
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """The app and its stand-ins, built with sanitizers."""
-    compiler = shutil.which(os.environ.get("CC", "cc"))
-    if compiler is None:
-        pytest.skip("no C compiler on this machine")
-    folder = tmp_path_factory.mktemp("main")
-    (folder / "empty.c").write_text("int main(void) { return 0; }\n")
-    if subprocess.run([compiler, *SANITIZERS, folder / "empty.c", "-o", folder / "empty"],
-                      capture_output=True).returncode:
-        pytest.skip(f"{compiler} has no sanitizers")
-    flags = ["-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZERS, *(f"-I{path}" for path in INCLUDES)]
-    made = []
-    for named, sources in ((["-Dmain=appMain"], [APP / "main.c"]), ([], [p for p in SOURCES if p.name != "main.c"])):
-        objects, error = compiled(compiler, [*flags, *named], sources)
-        assert not error, error
-        made += objects
-    built = subprocess.run([compiler, *SANITIZERS, *made, "-pthread", "-lm", "-o", folder / "app"], capture_output=True,
-                           text=True)
-    assert built.returncode == 0, built.stderr
-    return folder / "app"
+    own = [*FLAGS, f"-I{HERE / 'pmsis'}"]
+    parts = [([*own, "-Dmain=appMain"], [APP / "main.c"]), (own, STANDING_IN), (FLAGS, SHARED)]
+    return link(parts, tmp_path_factory.mktemp("main") / "app")
 
 
 @pytest.fixture
