@@ -5,8 +5,17 @@ import pytest
 from scipy.stats import chi2
 from scipy.stats import t as student
 
+from airtouch.gap.nominal.apparent import NOBODY_KNOWS
 from airtouch.gap.signatures.candidates import ALIKE
-from airtouch.gap.signatures.nominal_scatter import LEAST_RECORDED, Apparent, Scatter, measured, scatter_of, table
+from airtouch.gap.signatures.nominal_scatter import (
+    LEAST,
+    LEAST_RECORDED,
+    Apparent,
+    Scatter,
+    measured,
+    scatter_of,
+    table,
+)
 from airtouch.simulation.effects import EFFECTS
 
 
@@ -109,6 +118,39 @@ def test_a_longer_flight_may_gain_more_without_a_name():
     assert 12.0 < scatter.allowed(10.0, 12.0) < scatter.allowed(40.0, 12.0)
     quiet = Scatter({}, 8.0, (0.0, 0.0))
     assert quiet.allowed(40.0, 12.0) == pytest.approx(12.0)
+
+
+def test_an_effect_of_one_sign_scatters_as_the_flights_that_show_it():
+    """Half of the flights would have it below none: how far below, nobody knows, and they are no sign of calm."""
+    rng = np.random.default_rng(8)
+    seen = 0.3 * rng.normal(size=200)
+    flights = [Apparent({"ground_effect": np.array([max(x, 0.0)])},
+                        {"ground_effect": np.array([0.02 if x > 0.0 else NOBODY_KNOWS])}, 0.0) for x in seen]
+    assert measured(flights).rms["ground_effect"][0] == pytest.approx(0.3, rel=0.15)
+
+
+def test_flights_that_say_nothing_of_an_effect_leave_it_to_its_gain():
+    """Nominal flights high above the floor say nothing of ground effect; a flight close to it may still be news."""
+    rng = np.random.default_rng(9)
+    flights = [Apparent({"ground_effect": np.array([rng.uniform(0.0, 3.0)])},
+                        {"ground_effect": np.array([rng.uniform(1.0, 9.0)])}, 0.0) for _ in range(30)]
+    assert measured(flights).rms["ground_effect"][0] == LEAST
+
+
+def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
+    """One flight in twelve meets a gust. Were the largest tenth cut off, one in twelve would be called one."""
+    rng = np.random.default_rng(10)
+    seconds, least = 20.0, 12.0
+
+    def root() -> float:
+        return rng.uniform(1.0, 3.0) if rng.uniform() < 1.0 / 12.0 else abs(rng.normal()) * 0.2
+
+    beyond = []
+    for _ in range(50):
+        known = [Apparent({}, {}, 0.0, {"gust": root() ** 2}) for _ in range(40)]
+        limit = measured(known).passing("gust", seconds, least)
+        beyond += [seconds * root() ** 2 > limit for _ in range(40)]
+    assert np.mean(beyond) < 0.03
 
 
 def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():

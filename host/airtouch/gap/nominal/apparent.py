@@ -15,6 +15,7 @@ from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, every, telling
 from airtouch.gap.signatures.nominal_scatter import Apparent
 
+NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
 
 
@@ -35,7 +36,9 @@ def _error(data: Data, judged: Judged) -> np.ndarray:
     if term.kind == CLOCK:
         return np.zeros(len(judged.strength))
     if term.kind != SPECTRUM:
-        return np.where(at_bound(term, judged.strength), NOBODY_KNOWS,
+        low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
+        pressed = (low == 0.0) & (judged.strength < NEUTRAL)  # the data would have it below none: how far, nobody knows
+        return np.where(at_bound(term, judged.strength) | pressed, NOBODY_KNOWS,
                         np.minimum(np.sqrt(judged.variance), NOBODY_KNOWS))
     fitted = judged.fits[0].terms
     same = next(t for t in fitted if t.name == term.name and t.kind == SPECTRUM)

@@ -32,6 +32,7 @@ NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told fro
 RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
 RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
 SIMULATED = "simulated"  #: the class of flights of this project's simulator
+SAYS = 1.0  #: sure estimates that must be there, of a scatter of a natural step, for any scatter to be told from them
 GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the posterior's median is taken
 
 
@@ -153,8 +154,11 @@ def _median(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> flo
     """Posterior median of the standard deviation of values (n,) that chance alone scatters by `error` (n,).
 
     The variance's prior is scaled inverse chi-square of `worth` degrees of freedom; where worth is 0 every order of
-    magnitude of GRID is as likely. The likeliest value would be none at all wherever chance can explain the values.
+    magnitude of GRID is as likely, and the least is told where the values say nothing. The likeliest value would be
+    none at all wherever chance can explain the values.
     """
+    if not worth and float(((1.0 + error ** 2) ** -2.0).sum()) < SAYS:  # Fisher information, of sure ones 1 each
+        return LEAST
     variance = GRID[:, None] ** 2 + error ** 2
     level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
     level -= 0.5 * worth * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) if worth else 0.0
@@ -231,13 +235,14 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
         each, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
         pooled = _median(each, errors, 0.0, 0.0)
         rms[name] = np.array([_median(x, e, pooled, POOLED) for x, e in columns] if size > 1 else [pooled])
-    passing = {n: _robust([f.passing_rates.get(n, 0.0) for f in alike])
+    # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
+    passing = {n: _roots([f.passing_rates.get(n, 0.0) for f in alike], 1.0)
                for n in sorted({n for f in alike for n in f.passing_rates})}
-    return Scatter(rms, float(len(alike)), _robust([f.rate for f in alike]), passing, middle=middle)
+    return Scatter(rms, float(len(alike)), _roots([f.rate for f in alike], 0.9), passing, middle=middle)
 
 
-def _robust(rates: Sequence[float]) -> tuple[float, float]:
-    """Mean and standard deviation of square roots, the tenth that are largest cut to the rest (winsorised)."""
+def _roots(rates: Sequence[float], most: float) -> tuple[float, float]:
+    """Mean and standard deviation of square roots, those above the quantile `most` cut to it (winsorised)."""
     roots = np.sqrt(rates)
-    roots = np.minimum(roots, np.quantile(roots, 0.9))
+    roots = np.minimum(roots, np.quantile(roots, most))
     return float(roots.mean()), float(roots.std(ddof=1))
