@@ -40,7 +40,7 @@ class Diverged:
 
 def fly(scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: int = 0, *, effects: Chosen = (),
         without: Sequence[str] = ()) -> FlightLog | Diverged:
-    """Flight number `flight` of a scenario: depends on the arguments only.
+    """Fly flight number `flight` of a scenario. The result depends on the arguments only.
 
     effects: on top of the scenario's (one of the same name replaces it). without: names to
     leave out. Raises AirTouchError for what cannot be flown.
@@ -50,7 +50,7 @@ def fly(scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: int = 0, *,
 
 
 def choose(plan: FlightPlan, effects: Chosen = (), without: Sequence[str] = ()) -> list[Active]:
-    """The effects of one flight: the scenario's, replaced or joined by `effects`, less `without`."""
+    """The effects of one flight: those of the scenario, with `effects` replaced or added and `without` removed."""
     for name in without:
         registry.get(name)
     added = registry.activate(effects)

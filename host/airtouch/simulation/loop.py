@@ -76,7 +76,7 @@ def constants(plant):
 
 @inlined
 def control(flight, fixed, row, volts):
-    """Sensors and firmware over the two milliseconds that end with this step, for a set-point row (8,).
+    """Run sensors and firmware over the two milliseconds that end with this step, for a set-point row (8,).
 
     The command is in state.motors.pwm; fixed: Constants; volts: what the motors see.
     """
@@ -92,7 +92,7 @@ def control(flight, fixed, row, volts):
 
 @inlined
 def move(flight, fixed, volts):
-    """The vehicle over one physics step under state.motors.pwm: motors, effects, body. How it stands: OK or a reason.
+    """Advance the vehicle by one physics step under state.motors.pwm: motors, effects, body. Returns OK or a reason.
 
     fixed: Constants; volts: what the motors see.
     """
@@ -122,7 +122,7 @@ def _ending(state):
 
 @jit(types.Tuple((int64, int64))(FLIGHT, float64[:, ::1], float64[:, ::1]), nogil=True)
 def fly(flight, setpoints, table):
-    """Fly as many rows as `table` (rows, 33) has, the columns of the flight log.
+    """Fly len(table) rows and fill `table` (rows, 33), the columns of the flight log.
 
     setpoints (rows, 8): one a logged row. The next call with the same Flight continues, and many short calls give
     the same numbers as one long one. Returns how it ended (OK or a reason) and the number of rows of this call that

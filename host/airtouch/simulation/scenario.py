@@ -48,12 +48,12 @@ class FlightPlan:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     def flown_by(self, vehicle: Vehicle) -> Vehicle:
-        """The vehicle as it is in this flight."""
+        """The vehicle of this flight: the declared one with the flight's own values."""
         return replace(vehicle, **self.changes)
 
 
 def names() -> list[str]:
-    """The scenarios that come with the package."""
+    """Names of the package's scenarios."""
     folder = resources.files("airtouch") / "simulation" / "scenarios"
     return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
 
@@ -95,7 +95,7 @@ def parse(text: str, source: str) -> Scenario:
 
 
 def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
-    """Flight number `flight`: depends on (scenario, seed, flight) only.
+    """Draw flight number `flight`. The result depends on (scenario, seed, flight) only.
 
     Raises AirTouchError when what is drawn cannot be flown.
     """

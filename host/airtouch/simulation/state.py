@@ -36,13 +36,13 @@ STATE = from_dtype(DTYPE)[::1]  #: in compiled code
 
 
 def empty() -> np.ndarray:
-    """A record (1,) of DTYPE, all zero as `begin` expects it."""
+    """A record (1,) of DTYPE, all zero, as `begin` needs it."""
     return np.zeros(1, DTYPE)
 
 
 @jit(types.void(PLANT, WORLD, ROW, STREAM, STATE))
 def begin(plants, ground, row, stream, states):
-    """Stand the vehicle on what is below the first set-point row (8,): fills a record (1,) that is all zero."""
+    """Stand the vehicle on the surface below the first set-point row (8,). The record (1,) must be all zero."""
     plant, state = plants[0], states[0]
     body, pose = state.body, state.body.state
     pose[0], pose[1] = row[setpoint.X], row[setpoint.Y]

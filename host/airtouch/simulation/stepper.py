@@ -56,12 +56,12 @@ class Stepper:
         self.flight = loop.Flight(self.plant, plan.world, plan.room, effects, streams, self.state)
 
     def begin(self, setpoint: np.ndarray) -> None:
-        """Stand on what is below the set-point (8,), motors off."""
+        """Stand on the surface below the set-point (8,), motors off."""
         self.state[:] = 0
         states.begin(self.plant, self.flight.world, setpoint, self.flight.streams[0]["start"], self.state)
 
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:
-        """Fly on by len(table) rows into table (rows, 33): how it ended, rows filled. setpoints (rows, 8)."""
+        """Fly len(table) rows of setpoints (rows, 8) into table (rows, 33). Returns OK or a reason, and rows filled."""
         return loop.fly(self.flight, setpoints, table)
 
 

@@ -13,7 +13,7 @@ FRICTION_S = 0.02  #: sliding dies out with this time constant, under full weigh
 
 @jit
 def legs(plant, pose, s, force):
-    """Add force and torque of the legs to force (6,), N and N m; returns how deep the deepest stands in a surface, m.
+    """Add force and torque of the legs to force (6,), N and N m; returns the depth of the deepest leg in a surface, m.
 
     pose (13,): state of the body; s (COUNT,): its signals.
     """

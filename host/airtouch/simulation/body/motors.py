@@ -61,7 +61,7 @@ def target_speed(plant, pwm, factor):
 
 @jit
 def compensated(plant, pwm, factor):
-    """PWM that gives at a voltage factor the thrust that `pwm` gives at the nominal voltage."""
+    """PWM that has, at a voltage factor, the thrust of `pwm` at the nominal voltage."""
     if pwm <= 0.0:
         return 0.0
     c = plant.thrust_curve

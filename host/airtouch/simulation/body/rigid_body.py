@@ -78,7 +78,7 @@ def rotor_wrench(plant, speed, gain):
 
 @jit
 def derivative(plant, body):
-    """Fill body.slope, d(state)/dt of a BODY as it is now."""
+    """Fill body.slope, the present d(state)/dt of a BODY."""
     fixed = constants(plant)
     rotors = _rotors(plant, fixed, body, 1.0, 1.0)
     _put(body.slope, _slope(plant, fixed, _numbers(body.state), rotors, body.wrench))
@@ -86,7 +86,7 @@ def derivative(plant, body):
 
 @jit
 def step(plant, body):
-    """Advance a BODY by plant.step seconds, in place: its state and rotor speeds; slope is that at the start."""
+    """Advance a BODY by plant.step seconds in place: its state and rotor speeds. slope keeps its value at the start."""
     advance(plant, constants(plant), body)
 
 

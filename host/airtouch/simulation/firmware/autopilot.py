@@ -33,7 +33,7 @@ STATE = np.dtype([
 
 @jit
 def begin(plant, state, roll, pitch, yaw):
-    """The estimator at the true place over the floor, its attitude off by small angles (rad); loops reset."""
+    """Start the estimator at the true position over the floor, with small attitude errors (rad); reset the loops."""
     s, pose = state.firmware, state.body.state
     est, q = s.kalman, s.quaternion
     q[0], q[3] = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -62,7 +62,7 @@ def _publish(s):
 
 @jit
 def estimate(plant, state, tick, volts):
-    """The estimator's stage of a tick (ms), with the tick's reading; volts: what the motors see."""
+    """The estimator's stage of a tick (ms), with the tick's reading; volts: voltage at the motors."""
     s = state.firmware
     flying = tick - s.thrust_tick < FLYING_MS
     estimator.tick(plant, s.kalman, tick, flying, s.reading)

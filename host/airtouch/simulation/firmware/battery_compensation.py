@@ -15,7 +15,7 @@ COMMANDS, VOLTS = np.linspace(5000.0, 65000.0, 61), np.linspace(0.6, 4.4, 61)  #
 
 @jit
 def smoothed(settings, supply, volts):
-    """The voltage that the compensation uses one millisecond on."""
+    """The compensation's filtered voltage, one millisecond later."""
     return supply + settings.battery_compensation.voltage_share * (volts - supply)
 
 

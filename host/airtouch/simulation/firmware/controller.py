@@ -29,7 +29,7 @@ STATE = np.dtype([("loops", pid.STATE, (12,)), ("mode", _I, (6,)), ("attitude", 
 
 @jit
 def run(plant, state, setpoint, estimate, tick):
-    """One call at a tick (ms) at which the attitude loop is due: thrust and command of state (STATE).
+    """Run the controller once, at a tick (ms) at which the attitude loop is due: thrust and command of state (STATE).
 
     plant: its firmware's loops fly, its gains scale them. setpoint: SETPOINT; estimate: ESTIMATE.
     """

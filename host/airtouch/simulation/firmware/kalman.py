@@ -40,7 +40,7 @@ TINY = 1e-6  #: keeps lengths from being zero
 
 @jit
 def begin(settings, est, x, y, z, q):
-    """Start at a place with an attitude (4,), with the firmware's own uncertainty."""
+    """Start at a position with an attitude (4,) and the firmware's own initial uncertainty."""
     k = settings.kalman
     est.x[0], est.x[1], est.x[2] = x, y, z
     for i in range(4):
@@ -61,7 +61,7 @@ def begin(settings, est, x, y, z, q):
 
 @jit
 def take_imu(est, acc, gyro):
-    """A sample of the IMU: specific force (3,) and rates (3,)."""
+    """Add a sample of the IMU to the mean since the last prediction: specific force (3,) and rates (3,)."""
     for i in range(3):
         est.acc[i], est.gyro[i] = acc[i], gyro[i]
         est.acc_sum[i] += acc[i]
@@ -71,7 +71,7 @@ def take_imu(est, acc, gyro):
 
 @jit
 def predict(settings, est, dt, flying, gravity):
-    """dt seconds on, with the mean of the samples since the last prediction."""
+    """Predict the state dt seconds ahead, from the mean of the samples since the last prediction."""
     share = 1.0 / max(est.samples, 1)
     ax, ay, az = est.acc_sum[0] * share, est.acc_sum[1] * share, est.acc_sum[2] * share
     wx, wy, wz = est.gyro_sum[0] * share, est.gyro_sum[1] * share, est.gyro_sum[2] * share
@@ -153,7 +153,7 @@ def _spread(est):
 
 @jit
 def process_noise(settings, est, dt):
-    """Uncertainty that grows in dt seconds. Its square root grows with dt: ten short steps are not one long one."""
+    """Add the process noise of dt seconds. Its square root grows with dt: ten short steps are not one long one."""
     k, p = settings.kalman, est.p
     for i in range(3):
         acc = k.noise_acc_z_mps2 if i == Z else k.noise_acc_xy_mps2
@@ -226,7 +226,7 @@ def _unit(q):
 
 @jit
 def lost(settings, est):
-    """Whether the estimate is beyond what the firmware believes: it starts anew then."""
+    """Whether the estimate is outside the firmware's bounds; the firmware then restarts it."""
     k = settings.kalman
     for i in range(3):
         if abs(est.x[i]) > k.most_position_m or abs(est.v[i]) > k.most_velocity_mps:
@@ -236,7 +236,7 @@ def lost(settings, est):
 
 @jit
 def world_velocity(est, out):
-    """Velocity in world axes into out (3,)."""
+    """Write the velocity in world axes, m/s, into out (3,)."""
     for i in range(3):
         out[i] = est.r[i, 0] * est.v[0] + est.r[i, 1] * est.v[1] + est.r[i, 2] * est.v[2]
 

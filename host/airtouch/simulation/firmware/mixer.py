@@ -14,7 +14,7 @@ def whole(value):
 
 @jit
 def mix(thrust, roll, pitch, yaw, out):
-    """Motor commands (4,) before the cap; pitch is nose up, yaw as it leaves the controller (negated)."""
+    """Motor commands (4,) before the cap. pitch is nose up; yaw has the controller's sign (negated)."""
     r, p = float(int(0.5 * roll)), float(int(0.5 * pitch))
     out[0] = float(int(thrust - r + p + yaw))
     out[1] = float(int(thrust - r - p - yaw))
@@ -24,7 +24,7 @@ def mix(thrust, roll, pitch, yaw, out):
 
 @jit
 def cap(motors):
-    """Bring commands (4,) into 0..65535: attitude goes before thrust."""
+    """Limit commands (4,) to 0..65535; attitude has priority over thrust."""
     over = max(max(max(motors[0], motors[1]), max(motors[2], motors[3])) - MOST, 0.0)
     for i in range(4):
         motors[i] = max(motors[i] - over, 0.0)

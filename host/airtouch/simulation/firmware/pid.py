@@ -20,13 +20,13 @@ class How(NamedTuple):
 
 @jit
 def limit(value, bound):
-    """value held within -bound..bound."""
+    """`value` limited to -bound..bound."""
     return min(max(value, -bound), bound)
 
 
 @jit
 def wrapped(angle):
-    """An angle beyond +-180 deg brought back by one turn."""
+    """An angle beyond +-180 deg, moved by one turn."""
     if angle > 180.0:
         return angle - 360.0
     if angle < -180.0:
@@ -36,7 +36,7 @@ def wrapped(angle):
 
 @jit
 def reset(state, measured):
-    """Forget the integral; no derivative at the next run with the same measurement."""
+    """Clear the integral, and the derivative of the next run if the measurement does not change."""
     state.integral = 0.0
     state.previous = measured
 

@@ -13,7 +13,7 @@ STATE = np.dtype([("reference", np.float64), ("held", np.float64), ("over", np.i
 
 @jit
 def platform(settings, state, distance):
-    """What the fork's module passes on of a reading, m.
+    """Height that the fork's range module gives for a reading, m.
 
     A drop of more than the threshold since the reference sets a flag, a rise of as much clears it; with
     the flag a fixed height is added. What would jump by more than a step is replaced by what was passed
@@ -36,7 +36,7 @@ def platform(settings, state, distance):
 
 @jit
 def compensated(settings, state, distance, top):
-    """What the estimator gets of a reading, m. top: true height of the surface that was seen."""
+    """Height that the estimator gets for a reading, m. top: true height of the surface under the beam."""
     kind = settings.range_module.kind
     if kind == PLATFORM:
         return platform(settings, state, distance)

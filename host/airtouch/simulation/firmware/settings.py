@@ -103,7 +103,7 @@ DTYPE = np.dtype([("loops", GAINS, (len(LOOPS),))] + [
 
 
 def names() -> list[str]:
-    """The firmwares that come with the package."""
+    """Names of the package's firmwares."""
     folder = resources.files("airtouch") / "simulation" / "firmwares"
     return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
 

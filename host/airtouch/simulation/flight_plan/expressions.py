@@ -17,7 +17,7 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
 
 
 def draw(node: Any, values: Mapping[str, Any], rng: np.random.Generator, where: str) -> Any:
-    """One value for a node of a scenario.
+    """One value, drawn if need be, for a node of a scenario.
 
     {low, high}: uniform; {choice = [...]}: one of them; "= sum": arithmetic over `values`
     with sin, cos (degrees), min and max; lists and tables: element by element; anything
@@ -42,7 +42,7 @@ def draw(node: Any, values: Mapping[str, Any], rng: np.random.Generator, where: 
 
 
 def evaluate(text: str, values: Mapping[str, Any], where: str) -> float:
-    """The number that arithmetic over named values gives."""
+    """The value of an arithmetic expression over named values."""
     try:
         return float(_evaluate(_tree(text.strip()), values))
     except KeyError as error:

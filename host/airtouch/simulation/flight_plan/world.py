@@ -68,7 +68,7 @@ def build(platforms: Sequence[Platform], floor: str = "cement") -> World:
 
 @jit
 def inside_by(corners, start, stop, x, y):
-    """How far (x, y) is inside a polygon, m; negative outside."""
+    """Distance from (x, y) to the border of a polygon, m; positive inside, negative outside."""
     nearest = 1e30
     inside = False
     j = stop - 1
@@ -96,7 +96,7 @@ def _beyond(world, k, x, y, distance):
 
 @jit
 def below(world, x, y, z, radius):
-    """What lies under a disc of `radius` m at (x, y, z): lower, upper, cover.
+    """The surfaces under a disc of `radius` m at (x, y, z): lower, upper, cover.
 
     lower: row of World.surface that lies under the whole disc; upper: row of the higher one under part of it;
     cover: share of the disc over that one, 0..1, as across a straight edge. With a cover of 0 upper means nothing.
@@ -153,7 +153,7 @@ def top_at(world, x, y):
 
 @jit
 def first_below(world, places):
-    """The first of places (n, 3) that is below the surface at its x and y; NONE where none is."""
+    """Index of the first of places (n, 3) that is below the surface at its x and y; NONE if there is none."""
     for i in range(len(places)):
         if places[i, 2] < top_at(world, places[i, 0], places[i, 1]):
             return i

@@ -7,7 +7,7 @@ from airtouch.simulation.compiled import jit
 
 @jit
 def lowpass_coefficients(cutoff, h, out):
-    """Second-order Butterworth (b0, b1, b2, a1, a2) for samples of h s into out (5,); a cutoff (Hz) of 0 passes all."""
+    """Second-order Butterworth (b0, b1, b2, a1, a2) for samples of h s into out (5,); cutoff (Hz) 0: no filter."""
     if cutoff <= 0.0 or cutoff >= 0.49 / h:
         out[0], out[1], out[2], out[3], out[4] = 1.0, 0.0, 0.0, 0.0, 0.0
         return

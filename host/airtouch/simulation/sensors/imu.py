@@ -129,7 +129,7 @@ def _gyro_sample(plant, s, row, i, rate, shake):
 
 @jit
 def reading(plant, state, tick):
-    """What the firmware has of the IMU at a tick (ms), plant.sensor_delay late: acc and gyro of its reading."""
+    """Fill acc and gyro of the firmware's reading at a tick (ms), plant.sensor_delay late."""
     line, late, out = state.imu.delay_line, 1000.0 * plant.sensor_delay, state.firmware.reading
     for i in range(3):
         out.acc[i] = filters.delayed(line, tick, late, i)

@@ -10,7 +10,7 @@ RPM_OF_RADPS = 9.549296585513721
 
 @jit
 def write(plant, state, volts, out):
-    """The log's stage: a row (33,) with the columns of the flight log, in its order and units.
+    """The log's stage: fill a row (33,) with the columns of the flight log, in its order and units.
 
     Sensors as measured; position (of the down range sensor), velocity and attitude true; acceleration in world axes
     as the firmware turns it. volts: what the motors see.

@@ -7,7 +7,7 @@ from airtouch.simulation.compiled import jit
 
 def received(table: np.ndarray, jitter_s: float, loss: float, burst: float,
              rng: np.random.Generator) -> np.ndarray:
-    """Rows of a log (n, columns), time in column 0, that the host gets, with the host's times.
+    """The rows of a log (n, columns), time in column 0, that reach the host, with the host's times.
 
     jitter_s: rms of the error of each time; times never run backwards. loss: share of rows
     lost, in runs of `burst` rows on average (Gilbert's two-state channel). The first row

@@ -42,7 +42,7 @@ STATE = np.dtype([
 
 @jit
 def begin(s, top):
-    """Stand on a surface of that height, m."""
+    """Set the sensors for a vehicle that stands on a surface of that height, m."""
     s.start_top = s.seen_top = s.below_top = top
     s.down, s.changed_s = 0.01, -LONG_AGO_S
 
@@ -55,7 +55,7 @@ def uniform_of(normal):
 
 @jit
 def mixed_share(drawn, leaving):
-    """How far the one reading on which an edge passes has gone from the old distance (0) to the new one (1).
+    """Position of the reading at an edge between the old distance (0) and the new one (1).
 
     drawn: uniform in 0..1, the part of the 25 ms of ranging that the new surface was below. Onto a higher surface the
     reading follows it. Leaving one, it lies in the lower half or overshoots by up to a half

@@ -41,7 +41,7 @@ def flights(client: Any, scenario: Scenario, numbers: Sequence[int], *, vehicle:
 
 
 def connect(address: str) -> Any:
-    """A client of the scheduler at `address`; AirTouchError where there is none."""
+    """A client of the scheduler at `address`. Raises AirTouchError if no scheduler answers."""
     try:
         from dask.distributed import Client
     except ImportError:

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def in_order(submit: Callable[[Any], Any], items: Iterable[Any], ahead: int) -> Iterator[Any]:
-    """The results of `submit(item)`, futures, in the order of the items; at most `ahead` are sent out and not yet back.
+    """The results of `submit(item)`, futures, in the order of the items; at most `ahead` are in progress.
 
     Items are taken as they are sent. What waits when the caller stops, or when one fails, is cancelled. Raises what
     `submit` and the futures raise.

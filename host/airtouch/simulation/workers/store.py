@@ -54,7 +54,7 @@ def path_of(folder: Path, scenario: str, seed: int, flight: int) -> Path:
 
 
 def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
-    """Numbers of the flights that are neither there nor known to diverge."""
+    """Numbers of the flights that are neither written nor known to diverge."""
     done = {p.name for p in folder.glob("*.csv.gz")}
     gone = {d["flight"] for d in failures(folder)}
     return [n for n in range(count) if n not in gone and path_of(folder, scenario, seed, n).name not in done]
@@ -74,7 +74,7 @@ def failures(folder: Path) -> list[dict[str, Any]]:
 
 
 def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | None:
-    """Write a flight, or note one that diverged. A flight that is already there stays."""
+    """Write a flight, or note one that diverged. An existing flight is kept."""
     if isinstance(result, Diverged):
         with open(folder / FAILED, "a", encoding="utf-8") as file:
             file.write(json.dumps(vars(result)) + "\n")
@@ -107,5 +107,5 @@ def write_manifest(folder: Path, scenario: Scenario, seed: int, count: int) -> N
 
 
 def digest(text: str) -> str:
-    """Short name of a text, for requests."""
+    """Short hash of a request's text."""
     return hashlib.sha256(text.encode()).hexdigest()[:16]
