@@ -7,6 +7,11 @@ build: the flights on which settings may be chosen: the authors' folds 0 to 2, n
 CrazyPAD's conditions in four. view: the rest, of which each look is a line of host/docs/looks.md, and the peers, on
 which nothing is ever chosen. Each flight is diagnosed alone: the authors' against five others of the same day and
 condition, neural-swarm's and CrazyPAD's against the nominal flights of the same drone. Labels are read afterwards.
+
+    python tools/gap_real.py [FLIGHTS] --rows nominal    # false alarms on every nominal flight, 25 min
+
+nominal: every nominal flight of a group against the others of it, the baseline flights of the other rows too. It runs
+only where --rows names it.
 """
 
 import argparse
@@ -38,6 +43,7 @@ from gap_peers import NAMES
 
 OTHERS = 5  #: of the authors' flights, that one is held against
 PER_GROUP = 4  #: flights tested of a day and condition
+LEAST_GROUP = 3  #: nominal flights of a group, for each to have two others
 BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")
 COMES_AND_GOES = ("gust", "wind", "downwash")  #: names that say so of the fan, where they have seconds
 QUICK = {("swarm", "ground_effect"): 1, ("crazypad", "normal"): 1, ("crazypad", "rotor damage"): 2,
@@ -84,6 +90,27 @@ def swarm(folder: Path, part: str) -> Iterator[Case]:
                        tuple(base[r["group"]]), r["vehicle"])
 
 
+def nominal(folder: Path, part: str) -> Iterator[Case]:
+    """Every nominal flight against the others of its group: of the authors' a day and condition, of neural-swarm's the
+
+    baseline flights of a drone and day.
+    """
+    made = defaultdict(list)
+    for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
+        if r["use"] == "clean" and r["wind"] == "none" and _wanted(part, r["fold"] in BUILD_FOLDS):
+            group = ("crazyflie-2.1-flow", "the authors'", r["file"].split("_")[2][:4], r["height"], r["angle_deg"])
+            made[group].append(str(folder / "airtouch" / r["file"]))
+    own = folder / "neuralswarm"
+    of = {r["group"]: (r["vehicle"], r["day"]) for r in csv.DictReader((own / "manifest.csv").open())}
+    for r in csv.DictReader((own / "baselines.csv").open()):
+        if r["group"] in of and _wanted(part, of[r["group"]][1] in BUILD_DAYS):
+            vehicle = of[r["group"]][0]
+            made[str(own / f"{vehicle}.toml"), vehicle, r["group"]].append(str(own / "flights" / r["file"]))
+    for (flown, condition, *_), files in made.items():
+        for flight in files if len(files) >= LEAST_GROUP else ():
+            yield Case("nominal", "none", flown, flight, tuple(f for f in files if f != flight)[:OTHERS], condition)
+
+
 def crazypad(folder: Path, part: str) -> Iterator[Case]:
     """CrazyPAD's flights against the other normal ones of the same drone; truth is the family of the defect."""
     own = folder / "crazypad"
@@ -120,7 +147,8 @@ def _wanted(part: str, build: bool) -> bool:
 
 #: of this process, whose calibration serves the next case alike
 _LAST: dict[tuple[str, tuple[str, ...]], Diagnosis] = {}
-ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "peers": peers}
+ROWS = {"authors": authors, "swarm": swarm, "crazypad": crazypad, "fan": fan, "peers": peers, "nominal": nominal}
+USUAL = [row for row in ROWS if row != "nominal"]
 
 
 def answered(case: Case) -> dict:
@@ -159,7 +187,7 @@ def show(cases: list[dict], folder: Path) -> None:
     """One line for each row and truth: hits, their share with its 95 % interval, every answer. folder: the flights."""
     table = defaultdict(lambda: defaultdict(int))
     for c in cases:
-        kind = f"{c['row']}, {c['condition']}" if c["row"] == "swarm" else c["row"]
+        kind = f"{c['row']}, {c['condition']}" if c["row"] in ("swarm", "nominal") else c["row"]
         peers = c["row"] == "peers"
         said = "right" if peers and answer(c) == c["truth"] else answer(c)
         table[kind, "any effect" if peers else c["truth"]][said] += 1
@@ -202,29 +230,29 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("flights", nargs="?", type=Path,
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
     parser.add_argument("--part", choices=("build", "view", "all"), default="build")
-    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=list(ROWS))
+    parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=USUAL)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
     parser.add_argument("--quick", action="store_true",
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
     if args.quick:  # of the parts for building, and two peers
-        cases = quick([c for row, make in ROWS.items()
-                       for c in make(args.flights, "view" if row == "peers" else "build")])
+        cases = quick([c for row in USUAL for c in ROWS[row](args.flights, "view" if row == "peers" else "build")])
     else:
         cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
     done = {}
     if args.keep and args.keep.exists():
-        done = {c["flight"]: c for c in map(json.loads, args.keep.read_text().splitlines())}
-    todo = sorted((c for c in cases if Path(c.flight).name not in done), key=lambda c: (c.row, c.vehicle, c.baseline))
+        done = {(c["row"], c["flight"]): c for c in map(json.loads, args.keep.read_text().splitlines())}
+    todo = sorted((c for c in cases if (c.row, Path(c.flight).name) not in done),
+                  key=lambda c: (c.row, c.vehicle, c.baseline))
     with ProcessPoolExecutor(max(args.jobs, 1)) as pool:
         for i, case in enumerate(pool.map(answered, todo)):
-            done[case["flight"]] = case
+            done[case["row"], case["flight"]] = case
             if args.keep:
                 with args.keep.open("a") as out:
                     out.write(json.dumps(case) + "\n")
             print(f"{i + 1}/{len(todo)} {case['truth']}: {answer(case)} {case['flight']}", file=sys.stderr, flush=True)
-    told = [done[Path(c.flight).name] for c in cases]
+    told = [done[c.row, Path(c.flight).name] for c in cases]
     show(told, args.flights)
     wrong = [c["flight"] for c in told if answer(c) != c["truth"]]
     if args.quick and len(wrong) > QUICK_WRONG:

@@ -1,5 +1,7 @@
 """The diagnosis on a few recorded flights of each kind, and that the check of them can fail."""
 
+import re
+
 import gap_real
 
 
@@ -18,6 +20,16 @@ def test_a_diagnosis_that_always_says_none_is_noticed(flights, monkeypatch, caps
     monkeypatch.setattr(gap_real, "ProcessPoolExecutor", Alone)
     assert gap_real.main([str(flights), "--quick"]) == 1
     assert "wrong, more than" in capsys.readouterr().err
+
+
+def test_nominal_flights_are_held_against_others_of_their_group(flights):
+    build, view = (list(gap_real.nominal(flights, part)) for part in ("build", "view"))
+    assert len(build) >= 60 and len(view) >= 30
+    assert not {c.flight for c in build} & {c.flight for c in view}
+    for case in build + view:
+        assert case.truth == "none" and case.flight not in case.baseline and 2 <= len(case.baseline) <= gap_real.OTHERS
+    days = {day for c in build if "neuralswarm" in c.flight for day in re.findall(r"_cf\d+d(\d\d)_", c.flight)}
+    assert days == {"19", "20"}
 
 
 class Alone:
