@@ -105,7 +105,7 @@ def test_a_killed_process_leaves_its_rows_and_a_drone_that_lands(hop, cache, tmp
 
 
 def test_nobody_at_the_address_is_one_line():
-    with pytest.raises(AirTouchError, match="no connection: .*is the drone on"):
+    with pytest.raises(AirTouchError, match="no connection: .*is `airtouch sitl` running"):
         Drone("udp://127.0.0.1:1", patience_s=0.5)
     with pytest.raises(AirTouchError, match="no connection"):
         Drone("nonsense", patience_s=0.5)

@@ -76,6 +76,8 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
             reason = failure[0].strip().splitlines()[0]
             time.sleep(min(0.5, max(deadline - time.monotonic(), 0.0)))
         disconnect(cf)
+    if uri.startswith("udp"):
+        raise AirTouchError(f"{uri}: no connection: {reason}; is `airtouch sitl` running and ready?")
     raise AirTouchError(f"{uri}: no connection: {reason}; is the drone on, the radio plugged in and the URI "
                         "right (radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850)?")
 

@@ -1,0 +1,74 @@
+"""The flight's own signals, in which a model without names looks for what is left: against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.evidence.basis import BASIS, HEIGHT_M, LAG_S, TIME_S, basis
+from airtouch.simulation import signals as at
+from gap_flights import VEHICLE, flight
+
+REST_S, TILT = 1.0, 0.3
+WEIGHT_N = VEHICLE.mass_kg * VEHICLE.gravity_mps2
+
+
+def columns(made):
+    """Each signal by its name, (n, 3)."""
+    return dict(zip(BASIS, basis(made, VEHICLE).transpose(1, 0, 2), strict=True))
+
+
+@pytest.fixture(scope="module")
+def lift_off():
+    """1 s at rest, then all motors at one command."""
+    return flight(3.0, resting_s=REST_S)
+
+
+def test_thrust_rises_as_the_motors_do(lift_off):
+    t = np.arange(len(lift_off)) * 0.01 - REST_S
+    full = 4.0 * float(VEHICLE.thrust(np.array([40000.0]))[0]) / WEIGHT_N
+    seen = columns(lift_off)
+    late = t > 0.05
+    thrust = full * (1.0 - np.exp(-(t[late] + 0.01) / VEHICLE.motor_time_constant_s))
+    np.testing.assert_allclose(seen["thrust"][late, 0], thrust, rtol=1e-9)
+    slope = full / VEHICLE.motor_time_constant_s * np.exp(-(t[late] + 0.01) / VEHICLE.motor_time_constant_s) * LAG_S
+    np.testing.assert_allclose(seen["d_thrust"][late, 0], slope, rtol=0.05, atol=1e-6)
+    for name in ("roll", "pitch", "yaw"):
+        np.testing.assert_allclose(seen[name], 0.0, atol=1e-12)
+
+
+def test_on_the_ground_only_the_constant_is_left(lift_off):
+    ground = basis(lift_off, VEHICLE)[np.arange(len(lift_off)) * 0.01 < REST_S]
+    assert (ground[:, BASIS.index("one")] == 1.0).all()
+    assert not np.delete(ground, BASIS.index("one"), axis=1).any()
+
+
+@pytest.mark.parametrize(("motor", "roll", "pitch", "yaw"), [(0, -1, -1, -1), (1, -1, 1, 1), (2, 1, 1, -1),
+                                                               (3, 1, -1, 1)])
+def test_one_motor_more_is_a_roll_a_pitch_and_a_yaw(motor, roll, pitch, yaw):
+    """Motors front right, rear right, rear left, front left: the left side lifts to a positive roll."""
+    made = flight(3.0)
+    pwm = made.pwm.copy()
+    pwm[:, motor] = 45000.0
+    seen = columns(replace(made, pwm=pwm))
+    more, usual = VEHICLE.thrust(np.array([45000.0, 40000.0])) / WEIGHT_N
+    for name, sign in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
+        np.testing.assert_allclose(seen[name][-1], sign * (more - usual), rtol=1e-9)
+    np.testing.assert_allclose(seen["thrust"][-1], 3.0 * usual + more, rtol=1e-9)
+
+
+def test_time_height_and_axes_of_the_world():
+    made = flight(3.0)
+    signals = made.signals.copy()
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 2.0 * HEIGHT_M
+    c, s = np.cos(TILT), np.sin(TILT)
+    turn = np.tile([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], (len(made), 1, 1))
+    seen = columns(replace(made, signals=signals, turn=turn))
+    t = np.arange(len(made)) * 0.01
+    np.testing.assert_allclose(seen["time"][:, 0], t / TIME_S)
+    np.testing.assert_allclose(seen["time_thrust"][:, 0], t / TIME_S * seen["thrust"][:, 0])
+    np.testing.assert_allclose(seen["height"], 0.25)  # a quarter at twice the height
+    np.testing.assert_allclose(seen["height_roll"], 0.0, atol=1e-12)
+    # a push along x of the world is felt along the body's x by cos, along its y by -sin of the yaw
+    np.testing.assert_allclose(seen["world_x"][0], [c, -s, 0.0], atol=1e-12)
+    np.testing.assert_allclose(seen["world_y"][0], [s, c, 0.0], atol=1e-12)
