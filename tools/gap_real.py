@@ -65,7 +65,7 @@ class Case:
 
 def authors(folder: Path, part: str) -> Iterator[Case]:
     """Nominal flights of the authors against five others of the same day and condition."""
-    made = defaultdict(list)
+    made: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and _wanted(part, r["fold"] in BUILD_FOLDS):
             made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(str(folder / "airtouch" / r["file"]))
@@ -95,7 +95,7 @@ def nominal(folder: Path, part: str) -> Iterator[Case]:
 
     baseline flights of a drone and day.
     """
-    made = defaultdict(list)
+    made: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
         if r["use"] == "clean" and r["wind"] == "none" and _wanted(part, r["fold"] in BUILD_FOLDS):
             group = ("crazyflie-2.1-flow", "the authors'", r["file"].split("_")[2][:4], r["height"], r["angle_deg"])

@@ -2,7 +2,7 @@
 
     python tools/repeat.py                                # those below tests/, 50 times each
     python tools/repeat.py tests/sitl --times 200
-    nice -n 10 python tools/repeat.py tests/crazyflie/test_log_blocks.py -k refuses
+    nice -n 10 python tools/repeat.py tests/crazyflie/connection/test_log_blocks.py -k refuses
 
 Best on a machine that is busy with other work. Each test is repeated before the next one begins; fixtures of a module
 or of the session are made once. Prints for each test how often it passed and failed; what the failures printed is kept

@@ -8,7 +8,7 @@ import pytest
 from airtouch.crazyflie.connection import app_log, blocks
 from airtouch.kernels.app_core import HEALTH
 
-APP = Path(__file__).parents[2] / "firmware" / "app" / "src"
+APP = Path(__file__).parents[3] / "firmware" / "app" / "src"
 
 
 def test_names_and_types_are_those_of_the_log_group():

@@ -150,5 +150,5 @@ def test_the_docs_table_is_not_stale():
     from pathlib import Path
 
     from airtouch.simulation.effects.table import updated
-    page = (Path(__file__).parents[2] / "host" / "docs" / "effects.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "host" / "docs" / "effects.md").read_text(encoding="utf-8")
     assert page == updated(page), "run: python -m airtouch.simulation.effects.table host/docs/effects.md"
