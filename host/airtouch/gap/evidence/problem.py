@@ -235,9 +235,12 @@ def _tail(nu: float) -> float:
 
 
 def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
-    """Every block of every flight, or of the flights of these numbers."""
-    chosen = range(len(data.flights)) if flights is None else flights
-    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in chosen for r in (AIR, REST)
+    """Every block of every flight, one and the same part in each call, or of the flights of these numbers."""
+    if flights is None:
+        if "_whole" not in data.__dict__:  # the blocks of each new part are flattened anew, and kept
+            data.__dict__["_whole"] = whole_of(data, range(len(data.flights)))
+        return data.__dict__["_whole"]
+    return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in flights for r in (AIR, REST)
                       if len(data.first[i][r])))
 
 
