@@ -104,6 +104,19 @@ def test_the_sharper_sense_gets_the_weight_and_the_other_ones_inventions_are_dro
     assert not (chosen.airtouch_alone if camera_off < airtouch_off else chosen.camera_alone)
 
 
+def test_the_weights_are_the_inverse_squared_errors():
+    """Errors of +-10 and +-20 samples: 20^2 / (10^2 + 20^2) = 0.8 for the camera; almost none for one without edges."""
+    from airtouch.vision import compare
+
+    films = [made_film()] * 4
+
+    def sense(off):
+        return [[Detection(e.sample + off * (-1) ** i, "edge") for e in film.edges] for i, film in enumerate(films)]
+
+    assert compare.choose_fusion(films, sense(10), sense(20)).share == pytest.approx(0.8, abs=0.001)
+    assert compare.choose_fusion(films, [[]] * 4, sense(20)).share < 0.02
+
+
 def test_a_constant_lag_is_learnt_on_the_first_films_and_taken_off_all():
     from airtouch.vision import compare
 
