@@ -232,4 +232,6 @@ def test_size_of_the_networks(job, monkeypatch, small_m, answer):
 @pytest.mark.parametrize(("joined_m", "answer"), [(0.012, REPRODUCED), (0.2, NOT_REPRODUCED)])
 def test_both_together(job, monkeypatch, joined_m, answer):
     seen(monkeypatch, lambda way, lux: joined_m if way == "fusion" else 0.015, 0.033)
-    assert verdict(vision_figures.fusion(job), "backup") == answer
+    figure = vision_figures.fusion(job)
+    assert verdict(figure, "backup") == answer
+    assert ("at no light below the better one" in figure.verdicts["backup"].found) == (answer == REPRODUCED)

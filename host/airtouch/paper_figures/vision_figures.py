@@ -141,13 +141,16 @@ def fusion(job: Job) -> Figure:
     worst = [(r["fusion_loses"], r["loses_low"], r["lux"]) for r in table if r["detector"] == "both"]
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
-    verdict = words.judged(all(low <= 0.0 for _, low, _ in worst),
-                           f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; both are below the better "
-                           f"one by {max(v for v, _, _ in worst):.3f} at most, and nowhere beyond the 95 % interval "
-                           "of the difference"
-                           if all(low <= 0.0 for _, low, _ in worst) else
-                           f"timed F1: {text}; both are below the better one beyond the interval at "
-                           + ", ".join(f"{v:g} lux" for _, low, v in worst if low > 0.0))
+    most = max(loss for loss, _, _ in worst)
+    beyond = ", ".join(f"{v:g} lux" for _, low, v in worst if low > 0.0)
+    if beyond:
+        said = f"both are below the better one beyond the 95 % interval of the difference at {beyond}"
+    elif most > 0.0:
+        said = (f"both are below the better one by {most:.3f} at most, and nowhere beyond the 95 % interval of the "
+                "difference")
+    else:
+        said = f"both are at no light below the better one: {-most:.3f} above it at least"
+    verdict = words.judged(not beyond, f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; {said}")
 
     def draw(canvas):
         axes = canvas.subplots()
