@@ -60,7 +60,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     before = nameless(on, None)
     after = nameless(on, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
-    found = Selection(singles, tuple(steps), before, after, on.parts, least, data.study.nominal, _assumes(data, last),
+    assumed = _is_random(last) if data.study.simulated else _assumes(data, last)
+    found = Selection(singles, tuple(steps), before, after, on.parts, least, data.study.nominal, assumed,
                       _usual(data), data.study.simulated, clock_left(data, [t.name for t in last]))
     return replace(found, contradicted=contradicted(on, found.chosen)) if found.simulated else found
 
@@ -183,7 +184,11 @@ def _usual(data: Data) -> float:
 
 def _assumes(data: Data, terms: Sequence[Term]) -> bool:
     """Whether the spectrum of effects is assumed: they are random or change the loop."""
-    return any(t.kind == SPECTRUM for t in terms) or _changes_loop(data, terms)
+    return _is_random(terms) or _changes_loop(data, terms)
+
+
+def _is_random(terms: Sequence[Term]) -> bool:
+    return any(t.kind == SPECTRUM for t in terms)
 
 
 def _changes_loop(data: Data, terms: Sequence[Term]) -> bool:

@@ -56,7 +56,7 @@ class Selection:
     latter, what the logged times hold; contradicted: log likelihood that the effects named lose in cells where they
     say what the flights do not show, and the worst of these cells;
     parts: the two halves that they were fitted and judged on; nominal: how many flights gave the floor;
-    assumed: whether a chosen effect is random or changes the loop.
+    assumed: whether a chosen effect is random, or changes the loop in recorded flights.
     """
 
     singles: Mapping[str, Judged]
@@ -103,10 +103,8 @@ class Selection:
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         gained = self.whole.gain if self.whole else 0.0
-        if self.simulated:
-            return max(self.least_left, UNKNOWN_SHARE * gained)
         share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
-        return max(self.least_left, share * gained, self.usual)
+        return max(self.least_left, share * gained, 0.0 if self.simulated else self.usual)
 
     @property
     def least_left(self) -> float:
