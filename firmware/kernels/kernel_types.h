@@ -14,7 +14,7 @@
 
 enum {
   MOTION_CHANNELS = 12,    ///< what the streaming detector sees of a sample (motion_channels.h); the last one is empty
-  EDGE_DECODER_LOGITS = 3  ///< what its network says of a step (edge_decoder.h): over, entry, exit
+  EDGE_DECODER_LOGITS = 3  ///< what the decoder reads of a step (edge_decoder.h): over, entry, exit
 };
 
 /** What the disturbance force needs to know of a vehicle; SI units, PWM 0..65535. */

@@ -10,7 +10,7 @@
 bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
                         const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena) {
   if (streamInt8Check(network) >= 0 || network->convs[0].layer.inChannels != MOTION_CHANNELS ||
-      network->head->outChannels != EDGE_DECODER_LOGITS) {
+      network->head->outChannels < EDGE_DECODER_LOGITS) {
     return false;
   }
   detector->network = network;

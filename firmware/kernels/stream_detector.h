@@ -35,7 +35,7 @@ typedef struct {
 /**
  * Sets a detector up; the settings are copied.
  * @param arena  streamInt8ArenaBytes(network) bytes, aligned to 4, used by nothing else
- * @return false for a network that does not take MOTION_CHANNELS channels or give EDGE_DECODER_LOGITS logits
+ * @return false for a network that does not take MOTION_CHANNELS channels or give EDGE_DECODER_LOGITS logits at least
  */
 bool streamDetectorInit(streamDetector_t *detector, const motionConfig_t *motion, const streamInt8_t *network,
                         const streamQuantisation_t *quantisation, const decoderConfig_t *decoder, int8_t *arena);

@@ -73,6 +73,16 @@ static inline int32_t shapeFits(int32_t rows, int32_t columns, int32_t channels)
          channels <= LAYER_MAX_VALUES / (rows * columns);
 }
 
+// Weights of a layer that keeps all of them; 0 for the other kinds. Where shapes are not checked yet, so is this.
+static inline int32_t layerWeights(const layerInt8_t *layer) {
+  switch (layer->kind) {
+    case LAYER_CONV:  // each filter is filled up to a multiple of four
+      return layer->outChannels * ((layer->kernelRows * layer->kernelColumns * layer->inChannels + 3) / 4 * 4);
+    case LAYER_DENSE: return layer->outChannels * layer->inRows * layer->inColumns * layer->inChannels;
+    default: return 0;
+  }
+}
+
 #ifdef __cplusplus
 }
 #endif

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from airtouch.reference.networks.int8_network import Int8Layer, Int8Network
+from airtouch.reference.networks.int8_network import CONV, DENSE, MAX_POOL, Int8Layer, Int8Network, LayerKind
 
 SCALE, ZERO = 0.05, -7
 
 
-def weighted(rng: np.random.Generator, kind: str, before: tuple, after: tuple, kernel: tuple, *, relu: bool,
+def weighted(rng: np.random.Generator, kind: LayerKind, before: tuple, after: tuple, kernel: tuple, *, relu: bool,
              sparsity: float, input_zero: int) -> Int8Layer:
     """A convolution or a dense layer; a share of its blocks of four, and of whole outputs, is zero."""
     out = after[2]
-    shape = (out, *kernel, before[2]) if kind == "conv" else (out, int(np.prod(before)))
+    shape = (out, *kernel, before[2]) if kind == CONV else (out, int(np.prod(before)))
     weights = rng.integers(-127, 128, shape).astype(np.int8)
     flat = weights.reshape(out, -1)
     if flat.shape[1] % 4 == 0:
@@ -29,7 +29,7 @@ def weighted(rng: np.random.Generator, kind: str, before: tuple, after: tuple, k
 
 def pool(before: tuple, kernel: tuple, zero: int) -> Int8Layer:
     after = (before[0] // kernel[0], before[1] // kernel[1], before[2])
-    return Int8Layer("max_pool", before, after, kernel, SCALE, zero, SCALE, zero)
+    return Int8Layer(MAX_POOL, before, after, kernel, SCALE, zero, SCALE, zero)
 
 
 def network(seed: int, rows: int, columns: int, channels: int, stages: list[tuple], dense: list[int],
@@ -39,7 +39,7 @@ def network(seed: int, rows: int, columns: int, channels: int, stages: list[tupl
     shape, zero, layers = (rows, columns, channels), ZERO, []
     for kernel_rows, kernel_columns, outputs, pooling in stages:
         after = (shape[0] - kernel_rows + 1, shape[1] - kernel_columns + 1, outputs)
-        layers.append(weighted(rng, "conv", shape, after, (kernel_rows, kernel_columns), relu=True, sparsity=sparsity,
+        layers.append(weighted(rng, CONV, shape, after, (kernel_rows, kernel_columns), relu=True, sparsity=sparsity,
                                input_zero=zero))
         shape, zero = after, -128
         if pooling:
@@ -47,7 +47,7 @@ def network(seed: int, rows: int, columns: int, channels: int, stages: list[tupl
             shape = layers[-1].output_shape
     for i, outputs in enumerate(dense):
         relu = i + 1 < len(dense)
-        layers.append(weighted(rng, "dense", shape, (1, 1, outputs), (1, 1), relu=relu, sparsity=sparsity,
+        layers.append(weighted(rng, DENSE, shape, (1, 1, outputs), (1, 1), relu=relu, sparsity=sparsity,
                                input_zero=zero))
         shape, zero = (1, 1, outputs), -128 if relu else ZERO
     return Int8Network(tuple(layers))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from airtouch.errors import AirTouchError
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream import run_stream as run_c
-from airtouch.reference.networks.int8_network import Int8Layer
+from airtouch.reference.networks.int8_network import DENSE, Int8Layer
 from airtouch.reference.networks.stream_graph import StreamLayer
 from airtouch.reference.networks.stream_int8 import StreamNetwork, run_stream
 
@@ -21,7 +21,7 @@ def dense(rng, taps, channels, outputs, *, relu=True, sparsity=0.0, zero_point=-
     if sparsity:
         weights.reshape(outputs, -1, 4)[rng.random((outputs, taps * channels // 4)) < sparsity] = 0
     scale = np.float32(0.002) * rng.uniform(0.5, 2, outputs).astype(np.float32)
-    return Int8Layer("dense", (taps, 1, channels), (1, 1, outputs), (1, 1), 0.02, zero_point, 0.03,
+    return Int8Layer(DENSE, (taps, 1, channels), (1, 1, outputs), (1, 1), 0.02, zero_point, 0.03,
                      -128 if relu else 3, relu, weights, rng.integers(-3000, 3000, outputs).astype(np.int32), scale)
 
 

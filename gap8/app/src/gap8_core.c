@@ -143,7 +143,7 @@ static bool stepPaperStream(void *context, const uint8_t sample[EDGE_LINK_SAMPLE
 static bool bestFits(const streamInt8_t *network) {
   return streamInt8Check(network) < 0 && streamInt8ArenaBytes(network) <= AIRTOUCH_STREAM_ARENA_BYTES &&
          network->convs[0].layer.inChannels == EDGE_LINK_SAMPLE_BYTES &&
-         network->head->outChannels == EDGE_LINK_OUTPUTS;
+         network->head->outChannels >= EDGE_DECODER_LOGITS;
 }
 
 /** Whether rows of features are the network's input, and its output `outputs` values. */

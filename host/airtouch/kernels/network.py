@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.library import ffi, lib
-from airtouch.reference.networks.int8_network import KINDS, Int8Layer, Int8Network, runs_sparse, sparse_blocks
+from airtouch.reference.networks.int8_network import CONV, Int8Layer, Int8Network, LayerKind, runs_sparse, sparse_blocks
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 
@@ -24,7 +24,7 @@ class Model(Protocol):
 class FloatLayer:
     """One layer in float; shapes and weights laid out as `Int8Layer` does, a pool has no weights."""
 
-    kind: str
+    kind: LayerKind
     input_shape: tuple[int, int, int]
     output_shape: tuple[int, int, int]
     kernel: tuple[int, int]
@@ -65,7 +65,7 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
     Raises AirTouchError for windows of another shape and for layers that do not fit each other.
     """
     x = np.ascontiguousarray(_windows(layers[0].input_shape, windows), dtype=np.float32)
-    shapes = np.array([[KINDS.index(layer.kind), *layer.input_shape, *layer.output_shape, *layer.kernel,
+    shapes = np.array([[layer.kind.number, *layer.input_shape, *layer.output_shape, *layer.kernel,
                         layer.relu, 0, 0] for layer in layers], dtype=np.int32)
     weighted = [layer for layer in layers if layer.weighted]
     weights = _joined([layer.weights for layer in weighted], np.float32)
@@ -129,14 +129,14 @@ def packed_weights(layer: Int8Layer) -> tuple[np.ndarray, np.ndarray, np.ndarray
     if runs_sparse(layer):
         return sparse_blocks(layer.weights)
     weights = layer.weights.reshape(len(layer.weights), -1)
-    fill = -weights.shape[1] % 4 if layer.kind == "conv" else 0
+    fill = -weights.shape[1] % 4 if layer.kind == CONV else 0
     return np.pad(weights, ((0, 0), (0, fill))), np.zeros(0, np.uint16), np.zeros(0, np.uint8)
 
 
 def layer_shape(layer: Int8Layer) -> list[int]:
     """The twelve integers of `flatNetworkInt8_t.shapes`."""
-    kind = f"sparse_{layer.kind}" if runs_sparse(layer) else layer.kind
-    return [KINDS.index(kind), *layer.input_shape, *layer.output_shape, *layer.kernel,
+    sparse = layer.kind.sparse_number if runs_sparse(layer) else None
+    return [layer.kind.number if sparse is None else sparse, *layer.input_shape, *layer.output_shape, *layer.kernel,
             layer.output_zero_point, layer.output_min, 127]
 
 

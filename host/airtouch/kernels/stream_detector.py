@@ -14,7 +14,7 @@ from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 #: what is said of a network that the detector cannot run
-OTHER_NETWORK = f"stream detector: the network must take {len(NAMES)} channels and give {len(LOGITS)} logits"
+OTHER_NETWORK = f"stream detector: the network must take {len(NAMES)} channels and give {len(LOGITS)} logits or more"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def stream_detector(
 ) -> StreamEvents:
     """A flight through the whole detector, sample by sample as the drone runs it.
 
-    Raises AirTouchError for signals of another shape and for a network of another number of channels or logits.
+    Raises AirTouchError for signals of another shape and for a network of another number of channels or fewer logits.
     """
     acc, rate, motors = check_signals(acc_level, gyro, pwm)
     flat, keep = flat_stream(network)

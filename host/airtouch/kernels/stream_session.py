@@ -22,7 +22,7 @@ from airtouch.reference.networks.stream_int8 import StreamNetwork
 class StreamSession:
     """`stream_detector` in pieces: the same events whatever the pieces are.
 
-    Raises AirTouchError for a network of another number of channels or logits.
+    Raises AirTouchError for a network of another number of channels or fewer logits.
     """
 
     def __init__(self, network: StreamNetwork, motion: MotionConfig | None = None,

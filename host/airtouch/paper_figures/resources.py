@@ -10,7 +10,7 @@ from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import REPRODUCED, SAID, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.parameters import DEFAULT
-from airtouch.reference.networks.int8_network import multiplications
+from airtouch.reference.networks.int8_network import CONV, multiplications
 from airtouch.vision import teed, weights
 from airtouch.vision.camera import Camera
 
@@ -101,7 +101,7 @@ def _dense_multiplications(model: Any) -> int:
     for layer in model.float_layers:
         if layer.weights.size:
             rows, columns, channels = layer.output_shape
-            total += int(np.prod(layer.weights.shape)) * (rows * columns if layer.kind == "conv" else 1)
+            total += int(np.prod(layer.weights.shape)) * (rows * columns if layer.kind == CONV else 1)
     return total
 
 

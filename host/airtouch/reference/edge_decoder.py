@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Columns of the logits. The decoder reads the first three; kernel_types.h has their number for C.
+#: The logits that the decoder reads, the first columns; kernel_types.h has their number for C.
 LOGITS = ("over", "entry", "exit")
 LOGIT_LIMIT = 8.0  #: logits are clamped to this magnitude
 SLOW_AT_START = -3.0  #: the smoothed over logit before anything is known: off a platform
@@ -35,7 +35,7 @@ class DecoderConfig:
 
 
 def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig = DecoderConfig()) -> np.ndarray:
-    """Edges (n,), 0 none, 1 entry, 2 exit, of logits (n, 3): over, entry, exit; airborne (n,) bool.
+    """Edges (n,), 0 none, 1 entry, 2 exit, of logits (n, 3 or more): over, entry, exit; airborne (n,) bool.
 
     NaN logits count as "no". On the ground the state is off the platform, and forgotten.
     """

@@ -169,8 +169,8 @@ def test_representative_windows_cover_every_flight():
     assert sorted(set(found[:, 0, 0])) == [0, 1, 2, 3]
 
 
-def test_the_outputs_are_what_the_decoder_reads():
-    assert [output.name for output in OUTPUTS] == list(LOGITS)
+def test_the_first_outputs_are_what_the_decoder_reads():
+    assert [output.name for output in OUTPUTS[:len(LOGITS)]] == list(LOGITS)
 
 
 def test_goals_peak_where_their_edge_is_due():

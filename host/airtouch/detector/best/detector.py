@@ -30,7 +30,7 @@ from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream_detector import StreamEvents
 from airtouch.logs.flight_log import FlightLog
-from airtouch.reference.edge_decoder import DecoderConfig
+from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
 
 #: Chosen once over the five folds, by tools/choose_decoder.py with models of three seeds (host/docs/looks.md).
 DECODER = DecoderConfig(over_share=0.3, entry_score=2.3, exit_score=1.1, late_entry=3.0, late_exit=-4.0,
@@ -75,7 +75,8 @@ def run_float(log: FlightLog, model: BestModel) -> Trace:
     x, airborne = channels_of(log, model.recipe.motion)
     steps = float_logits(model.weights, model.recipe.graph, x)
     edge = np.zeros(len(log), dtype=np.uint8)
-    edge[::STRIDE] = kernels.edge_decoder(steps, airborne[::STRIDE], model.decoder_without(sensors.missing(log)))
+    edge[::STRIDE] = kernels.edge_decoder(steps[:, :len(LOGITS)], airborne[::STRIDE],
+                                          model.decoder_without(sensors.missing(log)))
     return trace_of(log, model, np.repeat(steps, STRIDE, axis=0)[:len(log)], edge, airborne)
 
 

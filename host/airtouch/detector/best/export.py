@@ -3,6 +3,7 @@
 import numpy as np
 
 from airtouch.detector.best.model import BestModel
+from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.detector.shared.c_source import float_literal, golden_header, golden_source, layer
 from airtouch.detector.shared.vehicle_header import thrust_text
 from airtouch.kernels.network import parameter_bytes
@@ -38,9 +39,10 @@ def golden_flight(network: StreamNetwork) -> tuple[np.ndarray, np.ndarray]:
 
 def _header(model: BestModel) -> str:
     network, motion, decoder = model.int8, model.recipe.motion, model.decoder
+    names = ", ".join(output.name for output in OUTPUTS)
     return f"""// The `best` detector: {parameter_bytes(network)} bytes of constants.
 // Input: {network.channels} motion channels a sample (motion_channels.h), quantised by airtouchStreamQuantisation.
-// Output: three logits on every {network.stride}nd sample: over a platform, entry, exit (edge_decoder.h).
+// Output: logits on every {network.stride}nd sample: {names} (edge_decoder.h).
 #pragma once
 
 #include "kernel_types.h"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from airtouch.reference.networks.int8_network import DENSE, LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer, taps_of
 
 if TYPE_CHECKING:
@@ -22,14 +23,14 @@ HEAD = "head"  #: dense layer: row t reads row t of several layers
 class Operation:
     """What one operation is.
 
-    kind: of `reference.int8_network.OPERATIONS`, what int8 and C do with the rows that a layer reads.
+    kind: what int8 and C do with the rows that a layer reads; DENSE multiplies them with weights.
     kernel_shape(layer): of its float weights, the last axis that of the outputs. rows(layer, kernel, bias, x): float
     NumPy, a row of output for each row of input. keras(layer, **options): a new Keras layer. window(layer, kernel,
     bias, x): TensorFlow, over a window (1, 1, rows, inputs) without a past. Without ReLU and stride but for `keras`,
     whose layer has both, and `window`, which has the stride.
     """
 
-    kind: str
+    kind: LayerKind
     kernel_shape: Callable[[StreamLayer], tuple[int, ...]]
     rows: Callable[[StreamLayer, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
     keras: Callable[..., "keras.Layer"]
@@ -70,5 +71,5 @@ def _head_window(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: An
 
 
 #: operation of a `StreamLayer` -> what it is
-OPERATIONS = {CONV: Operation("dense", lambda layer: layer.shape, _conv_rows, _conv_keras, _conv_window),
-              HEAD: Operation("dense", lambda layer: layer.shape, _head_rows, _head_keras, _head_window)}
+OPERATIONS = {CONV: Operation(DENSE, lambda layer: layer.shape, _conv_rows, _conv_keras, _conv_window),
+              HEAD: Operation(DENSE, lambda layer: layer.shape, _head_rows, _head_keras, _head_window)}

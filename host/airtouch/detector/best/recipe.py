@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 from airtouch.detector.best.operations import CONV, HEAD
-from airtouch.reference.edge_decoder import LOGITS
+from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_graph import StreamLayer, receptive_samples
 
@@ -63,7 +63,7 @@ class Recipe:
             StreamLayer("layer0", CONV, self.first_taps, CHANNELS, width, stride=STRIDE),
             *(StreamLayer(f"layer{i}", CONV, self.taps, width, width, dilation, pruned=True)
               for i, dilation in zip(dilated, self.dilations, strict=True)),
-            StreamLayer(f"layer{len(dilated) + 1}", HEAD, len(dilated), width, len(LOGITS), relu=False,
+            StreamLayer(f"layer{len(dilated) + 1}", HEAD, len(dilated), width, len(OUTPUTS), relu=False,
                         reads=tuple(dilated)),
         )
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from airtouch.reference.networks.int8_network import CONV, DENSE, MAX_POOL, LayerKind
+
 if TYPE_CHECKING:
     import keras
 
 Shape = tuple[int, int, int]  #: rows, columns, channels
-CONV, MAX_POOL, DENSE = "conv", "max_pool", "dense"  #: kinds of `reference.int8_network`
 
 INPUT_SHAPE: Shape = (100, 3, 1)  #: samples, sensors, one value
 
@@ -22,7 +23,7 @@ class Row(NamedTuple):
     """A line of the list. kernel: rows and columns that it reads. outputs: channels, 0 for as many as it reads."""
 
     name: str
-    operation: str
+    operation: LayerKind
     kernel: tuple[int, int] = (1, 1)
     outputs: int = 0
     relu: bool = False
@@ -43,7 +44,7 @@ class PaperLayer:
     """One layer with its shapes. kernel_shape: of its weights as Keras lays them out, () for a layer without."""
 
     name: str
-    operation: str
+    operation: LayerKind
     input_shape: Shape
     output_shape: Shape
     kernel: tuple[int, int]

@@ -5,14 +5,15 @@ import hashlib
 import numpy as np
 
 from airtouch.kernels.network import layer_shape, packed_weights
-from airtouch.reference.networks.int8_network import KINDS, Int8Layer
+from airtouch.reference.networks.int8_network import Int8Layer, runs_sparse
 
 
 def layer(name: str, of: Int8Layer) -> tuple[str, str]:
     """The C arrays of one layer, whose names begin with `name`, and the initialiser of its layerInt8_t."""
-    kind, *shape = layer_shape(of)
+    _, *shape = layer_shape(of)
+    kind = f"{'SPARSE_' if runs_sparse(of) else ''}{of.kind.name.upper()}"
     sizes = [", ".join(map(str, shape[start:stop])) for start, stop in ((0, 3), (3, 6), (6, 8), (8, 11))]
-    head = (f"{{.kind = LAYER_{KINDS[kind].upper()}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), "
+    head = (f"{{.kind = LAYER_{kind}, LAYER_IN({sizes[0]}), LAYER_OUT({sizes[1]}), "
             f"LAYER_KERNEL({sizes[2]}), LAYER_RANGE({sizes[3]})")
     if not of.weighted:
         return "", head + "}"

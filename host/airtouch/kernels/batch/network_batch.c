@@ -11,10 +11,10 @@ enum { SHAPE_COLUMNS = 12 };
 
 static int32_t inputs(const int32_t *shape) { return shape[1] * shape[2] * shape[3]; }
 
-// Weights of a layer that keeps all of them; 0 for a pool. `multiple`: what a filter is filled up to.
-static int32_t weights(const int32_t *shape, int32_t multiple) {
+// Weights of a float layer; 0 for a pool.
+static int32_t floatWeights(const int32_t *shape) {
   if (shape[0] == LAYER_CONV) {
-    return shape[6] * ((shape[7] * shape[8] * shape[3] + multiple - 1) / multiple * multiple);
+    return shape[6] * shape[7] * shape[8] * shape[3];
   }
   return shape[0] == LAYER_DENSE ? shape[6] * inputs(shape) : 0;
 }
@@ -66,7 +66,7 @@ int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
         }
       }
     }
-    weight = (weight + weights(s, 4) + 3) & ~3;  // each layer's weights are aligned to 4
+    weight = (weight + layerWeights(&layers[i]) + 3) & ~3;  // each layer's weights are aligned to 4
     if (weight > flat->weightCount) {
       return i;
     }
@@ -101,7 +101,7 @@ static void unpackFloat(const flatNetworkFloat_t *flat, layerFloat_t *layers, ne
                                .relu = s[9],
                                .weights = weight,
                                .bias = bias};
-    weight += weights(s, 1);
+    weight += floatWeights(s);
     bias += s[0] == LAYER_MAX_POOL ? 0 : s[6];
   }
   *network = (networkFloat_t){.layers = layers, .layerCount = flat->layerCount};
@@ -123,7 +123,7 @@ int32_t networkFloatBatchArena(const flatNetworkFloat_t *flat) {
   }
   for (int32_t i = 0; i < flat->layerCount; i++) {
     const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
-    weight += weights(s, 1);
+    weight += floatWeights(s);
     channel += s[0] == LAYER_MAX_POOL ? 0 : s[6];
     if (s[0] > LAYER_DENSE || weight > flat->weightCount || channel > flat->channelCount) {
       return -1 - i;

@@ -5,25 +5,39 @@ one scale per output channel; biases are int32 at input scale x weight scale; an
 becomes an activation by gemmlowp's double rounding (`requantise`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-#: kinds in the order of the C kernels' `layerKind_t`; the last two keep their weights in blocks (`runs_sparse`)
-KINDS = ("conv", "max_pool", "dense", "sparse_dense", "sparse_conv")
 _CHUNK = 256  # windows at a time, for memory
 
 
 @dataclass(frozen=True)
+class LayerKind:
+    """The arithmetic of a layer: CONV, MAX_POOL, DENSE, or that of an operation of `best` that has its own.
+
+    name, number: in `gap8/kernels/layer_int8.h`, LAYER_<NAME>. run(layer, x): int8 output (n, *output shape) of its
+    int8 input (n, ...), of as many values as its input shape. sparse_number: the number of the kernel that does the
+    same with weights in blocks of four (`runs_sparse`), None where there is none.
+    """
+
+    name: str
+    number: int
+    run: Callable[["Int8Layer", np.ndarray], np.ndarray]
+    sparse_number: int | None = None
+
+
+@dataclass(frozen=True)
 class Int8Layer:
-    """One layer; shapes are (rows, columns, channels); kind: of OPERATIONS.
+    """One layer; shapes are (rows, columns, channels).
 
     weights: int8, conv (out, kernel rows, kernel columns, in), dense (out, inputs).
     bias: int32 (out,). weight_scale: float32 (out,). A pool has none of them (size 0), and keeps the scale.
     """
 
-    kind: str
+    kind: LayerKind
     input_shape: tuple[int, int, int]
     output_shape: tuple[int, int, int]
     kernel: tuple[int, int]
@@ -87,7 +101,7 @@ def multiplications(network: Int8Network) -> int:
     total = 0
     for layer, after in zip(network.layers, (*network.layers[1:], None), strict=True):
         rows, columns, _ = layer.output_shape
-        if after is not None and after.kind == "max_pool":
+        if after is not None and after.kind == MAX_POOL:
             rows, columns = (n - n % k for n, k in zip((rows, columns), after.kernel, strict=True))
         total += rows * columns * _weights_used(layer)
     return total
@@ -100,9 +114,9 @@ def rolling_multiplications(network: Int8Network, stride: int) -> float:
     """
     total, period = 0.0, 1
     for layer in network.layers:
-        if layer.kind == "max_pool":
+        if layer.kind == MAX_POOL:
             period = min(period * layer.kernel[0], stride)
-        columns = layer.output_shape[1] if layer.kind == "conv" else 1
+        columns = layer.output_shape[1] if layer.kind == CONV else 1
         total += columns * _weights_used(layer) / period
     return total
 
@@ -167,7 +181,7 @@ def run(network: Int8Network, quantised: np.ndarray) -> np.ndarray:
 
 def _run_chunk(network: Int8Network, x: np.ndarray) -> np.ndarray:
     for layer in network.layers:
-        x = OPERATIONS[layer.kind](layer, x)
+        x = layer.kind.run(layer, x)
     return x.reshape(len(x), -1)
 
 
@@ -197,8 +211,9 @@ def _max_pool(layer: Int8Layer, x: np.ndarray) -> np.ndarray:
     return whole.reshape(-1, rows, height, columns, width, channels).max(axis=(2, 4))
 
 
-#: kind of a layer -> int8 output (n, *output shape) of its int8 input (n, ...), of as many values as its input shape
-OPERATIONS = {"conv": _conv, "max_pool": _max_pool, "dense": _dense}
+CONV = LayerKind("conv", 0, _conv, sparse_number=4)
+MAX_POOL = LayerKind("max_pool", 1, _max_pool)
+DENSE = LayerKind("dense", 2, _dense, sparse_number=3)
 
 
 def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -226,7 +241,7 @@ def sparse_blocks(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 def runs_sparse(layer: Int8Layer) -> bool:
     """Whether blocks of four (five bytes each, two an output for their count) take less room."""
-    if not layer.weighted or f"sparse_{layer.kind}" not in KINDS or layer.weights[0].size % 4:
+    if not layer.weighted or layer.kind.sparse_number is None or layer.weights[0].size % 4:
         return False
     _, counts, skips = sparse_blocks(layer.weights)
     return 5 * len(skips) + 2 * len(counts) < layer.weights.size

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.reference.networks.int8_network import OPERATIONS, Int8Layer
+from airtouch.reference.networks.int8_network import Int8Layer, LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer, follow, receptive_samples, taps_of
 
 
@@ -15,7 +15,7 @@ from airtouch.reference.networks.stream_graph import StreamLayer, follow, recept
 class StreamNetwork:
     """A graph and the int8 layer of each of its layers.
 
-    layers: input_shape (taps, 1, inputs); of kind "dense", weights (outputs, taps * inputs), oldest tap first.
+    layers: input_shape (taps, 1, inputs); of kind DENSE, weights (outputs, taps * inputs), oldest tap first.
     """
 
     graph: tuple[StreamLayer, ...]
@@ -52,10 +52,10 @@ class StreamNetwork:
         return sum(int(np.count_nonzero(layer.weights)) for layer in self.layers)
 
 
-def int8_layer(layer: StreamLayer, kind: str, arrays: dict[str, np.ndarray]) -> Int8Layer:
+def int8_layer(layer: StreamLayer, kind: LayerKind, arrays: dict[str, np.ndarray]) -> Int8Layer:
     """The int8 layer of a layer of the graph.
 
-    kind: of `int8_network.OPERATIONS`. arrays: weights int8 (outputs, ...), bias int32 (outputs,), weight_scale float32
+    arrays: weights int8 (outputs, ...), bias int32 (outputs,), weight_scale float32
     (outputs,), scale float32 and zero_point int32 of input and output, (2,).
     """
     (scale_in, scale_out), (zero_in, zero_out) = arrays["scale"], arrays["zero_point"]
@@ -71,6 +71,6 @@ def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
     def apply(layer: StreamLayer, x: np.ndarray) -> np.ndarray:
         arrays = next(int8)
         patches = x if layer.reads else np.hstack(taps_of(layer, x, arrays.input_zero_point))
-        return OPERATIONS[arrays.kind](arrays, patches).reshape(len(x), layer.outputs)[::layer.stride]
+        return arrays.kind.run(arrays, patches).reshape(len(x), layer.outputs)[::layer.stride]
 
     return follow(network.graph, np.asarray(quantised, dtype=np.int8), apply, np.hstack)
