@@ -26,7 +26,7 @@ from patience import HANG_S
 
 URI = "simulated://"
 CLOCKED = [f"airtouch.crazyflie.{name}" for name in (
-    "collect", "connection.drone", "flight", "connection.log_blocks", "monitor")]
+    "readiness", "connection.drone", "flight", "connection.log_blocks", "monitor")]
 CLOCKED += ["cflib.crazyflie.link_statistics", "cflib.positioning.motion_commander"]
 LOOK_S = 0.0002
 CREATE, APPEND, SETTINGS = 6, 7, 1

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli import airtouch, demo
 from airtouch.cli.gap.files import files_of
-from airtouch.crazyflie import collect, mission
+from airtouch.crazyflie import manifest, mission
 from airtouch.crazyflie.view import board
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
@@ -99,7 +99,7 @@ def test_recovered_flights_are_listed(generated, tmp_path):
     log = log.with_columns({}, mission="sweep", flight=7, speed_mps=0.3, condition={"clearance": 0.04})
     logs.write(log, tmp_path / "sweep_0007.csv")
     (tmp_path / "sweep_0007.csv").rename(tmp_path / "sweep_0007.csv.gz.part")
-    found, _ = collect.recover(tmp_path)
+    found, _ = manifest.recover(tmp_path)
     assert [p.name for p in found] == ["sweep_0007.csv.gz"]
     assert (tmp_path / "manifest.csv").read_text().splitlines()[1] == "sweep_0007.csv.gz,messy,2,40mm,,none,0.3"
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from airtouch import logs
 from airtouch.cli import airtouch
-from airtouch.crazyflie import collect, mission
+from airtouch.crazyflie import collect, mission, readiness
 from airtouch.crazyflie.connection import blocks
 from airtouch.crazyflie.connection.drone import Drone, drain
 from airtouch.crazyflie.guard import Guard
@@ -137,7 +137,7 @@ def test_thirty_percent_packet_loss_of_everything(serve, hop, cache, tmp_path):
         plan = collect.Plan(virtual.uri, tmp_path, "hop")
         drone = Drone(virtual.uri, cache)
         try:
-            ready = collect.make_ready(drone, plan, lambda _: None)
+            ready = readiness.make_ready(drone, plan.settings, plan.least_v, lambda _: None)
             virtual.order("loss=0.3,all")  # the radio gets bad now
             outcome = collect.fly(drone, ready, mission.load(hop), plan, 1, stop=threading.Event(), say=lambda _: None)
         finally:

@@ -20,13 +20,13 @@ from airtouch.crazyflie.recorder import Recorder
 from airtouch.errors import AirTouchError
 
 TURN_S = 0.02  #: s, period of the loop
-PING_S = 0.5
+PING_S = 0.5  #: s between echo requests, which keep a quiet link open
 LINK_TIMEOUT_S = 3.0  #: s of silence, after which the drone lands as soon as the link is back
 FORGOTTEN_S = 1.0  #: s of silence, after which the firmware has deleted the log blocks
 GIVE_UP_S = 60.0  #: s without an answer to the land command, after which the flight gives up
 DOWN_S = 3.0  #: s, duration of a landing after an error
 AFTER_S = 0.5  #: s of log after the motors have stopped
-BATTERY_SAMPLES = 100
+BATTERY_SAMPLES = 100  #: samples (1 s) whose median voltage counts, so that a climb does not end the flight
 
 
 class Craft(Protocol):

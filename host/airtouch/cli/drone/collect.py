@@ -5,11 +5,16 @@ import sys
 import threading
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
+
+if TYPE_CHECKING:
+    from airtouch.crazyflie import collect
+    from airtouch.crazyflie.mission import Mission
 
 
 def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -63,13 +68,9 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     """
     from airtouch.crazyflie import collect, mission, recorder
     from airtouch.crazyflie.checks import parse_setting
-    from airtouch.crazyflie.connection.link import default_cache
 
     if recover:
-        recovered, unreadable = collect.recover(out)
-        lines = [f"recovered: {path}" for path in recovered] + unreadable
-        click.echo("\n".join(lines) or f"{out}: nothing to recover")
-        sys.exit(2 if unreadable else 0)
+        _recover(out)
     if not uri or not mission_name:
         raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
     if flights < 1 or link_timeout <= 0:
@@ -82,28 +83,43 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     first_number = number or recorder.next_number(out, name)
     check_free(recorder.flight_path(out, name, first_number), force)
     click.echo(first.describe())
-    asked = sys.stdin.isatty() and not yes
-    early = 0
+    missions = {i: mission.load(mission_name, seed, i) for i in range(first_number, first_number + flights)}
     with stopping() as stop:
-        drone = collect.Drone(uri, cache or default_cache())
-        try:
-            for flight_number in range(first_number, first_number + flights):
-                if flight_number == first_number:
-                    ready = collect.make_ready(drone, plan, click.echo)
-                if asked:
-                    click.confirm(f"flight {flight_number}: drone at the start, nose along x, room clear?",
-                                  abort=True)
-                flown = mission.load(mission_name, seed, flight_number)
-                with _shown(flown.seconds) as show:
-                    outcome = collect.fly(drone, ready, flown, plan, flight_number, stop=stop,
-                                          say=click.echo, show=show)
-                _report(outcome)
-                early += not outcome.planned
-                if early:
-                    break
-        finally:
-            drone.close()
-    sys.exit(1 if early else 0)
+        planned = _fly(plan, missions, cache, stop, ask=sys.stdin.isatty() and not yes)
+    sys.exit(0 if planned else 1)
+
+
+def _recover(out: Path) -> None:
+    """Finish the flights of killed runs and exit."""
+    from airtouch.crazyflie import manifest
+
+    recovered, unreadable = manifest.recover(out)
+    lines = [f"recovered: {path}" for path in recovered] + unreadable
+    click.echo("\n".join(lines) or f"{out}: nothing to recover")
+    sys.exit(2 if unreadable else 0)
+
+
+def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | None, stop: threading.Event,
+         ask: bool) -> bool:
+    """Fly missions, by the flights' numbers, until one ends early. True if all ended as planned."""
+    from airtouch.crazyflie import collect, readiness
+    from airtouch.crazyflie.connection.drone import Drone
+    from airtouch.crazyflie.connection.link import default_cache
+
+    drone = Drone(plan.uri, cache or default_cache())
+    try:
+        ready = readiness.make_ready(drone, plan.settings, plan.least_v, click.echo)
+        for number, mission in missions.items():
+            if ask:
+                click.confirm(f"flight {number}: drone at the start, nose along x, room clear?", abort=True)
+            with _shown(mission.seconds) as show:
+                outcome = collect.fly(drone, ready, mission, plan, number, stop=stop, say=click.echo, show=show)
+            _report(outcome)
+            if not outcome.planned:
+                return False
+    finally:
+        drone.close()
+    return True
 
 
 @contextmanager

@@ -1,0 +1,76 @@
+"""The manifest of a folder of flights: one row a file, which `evaluate` and `train` read."""
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+from airtouch import logs
+from airtouch.crazyflie import recorder
+from airtouch.logs.edges import true_edges
+from airtouch.logs.files import write_bytes
+from airtouch.logs.flight_log import FlightLog
+
+NAME = "manifest.csv"
+COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
+FOLDS = 5  #: folds of cross-validation, as in the authors' manifest
+CLEAN_LOSS = 0.01  #: largest fraction of lost samples of a "clean" flight; one of the authors' 87 lost any: 0.5 %
+
+
+def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
+    """Add a flight to the manifest of its folder, in place of a row of the same file. Returns its `use` there.
+
+    The mission's values come from the log's metadata.
+    """
+    path = file.parent / NAME
+    use = use_of(log, planned)
+    rows = [row for row in _rows(path) if row.get("file") != file.name]
+    rows.append(_row(file.name, use, log))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, extrasaction="ignore", restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_bytes(text.getvalue().encode(), path, force=True)
+    return use
+
+
+def use_of(log: FlightLog, planned: bool) -> str:
+    """What a flight can be used for.
+
+    "clean": ended as planned, with few lost samples, and crossed an edge. "free-air": the same without an edge.
+    "messy": any other.
+    """
+    lost = log.meta["lost_samples"]
+    if not planned or lost > CLEAN_LOSS * (len(log) + lost):
+        return "messy"
+    return "clean" if crossed_an_edge(log) else "free-air"
+
+
+def crossed_an_edge(log: FlightLog) -> bool:
+    """True if the down range shows an edge, or if there is no down range."""
+    return not log.has("zrange_m") or bool(true_edges(log))
+
+
+def recover(folder: Path) -> tuple[list[Path], list[str]]:
+    """As `recorder.recover`, and add each recovered flight to the manifest."""
+    recovered, unreadable = recorder.recover(folder)
+    for path in recovered:
+        list_flight(path, logs.read(path), planned=False)
+    return recovered, unreadable
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    if not path.is_file():
+        return []
+    with path.open(encoding="utf-8-sig", newline="") as handle:
+        return list(csv.DictReader(handle))
+
+
+def _row(name: str, use: str, log: FlightLog) -> dict[str, Any]:
+    meta, condition = log.meta, log.meta.get("condition")
+    condition = condition if isinstance(condition, dict) else {}
+    clearance = condition.get("clearance")
+    return {"file": name, "use": use, "fold": int(meta.get("flight") or 0) % FOLDS,
+            "height": f"{1000 * clearance:.0f}mm" if clearance is not None else "",
+            "angle_deg": condition.get("angle", ""), "wind": condition.get("wind", "none"),
+            "speed_mps": meta.get("speed_mps") or ""}

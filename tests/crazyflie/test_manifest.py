@@ -1,0 +1,52 @@
+"""The manifest of a folder of flights: what a flight counts as, and its row."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from airtouch.crazyflie import manifest
+from airtouch.logs.flight_log import FlightLog
+
+HEADER = "file,use,fold,height,angle_deg,wind,speed_mps"
+
+
+def flight(lost=0, zrange=None, **meta) -> FlightLog:
+    """Two hundred samples in cruise; zrange: its down range, m."""
+    columns = {"t_s": np.arange(200) / 100}
+    if zrange is not None:
+        columns["zrange_m"] = zrange
+    return FlightLog(columns, {"lost_samples": lost, **meta})
+
+
+def over_a_platform() -> np.ndarray:
+    """A down range of 0.8 m, and 0.4 m over a platform in the middle."""
+    return np.where(np.arange(200) // 50 % 4 == 1, 0.4, 0.8)
+
+
+@pytest.mark.parametrize("lost, zrange, planned, use", [
+    (0, over_a_platform(), True, "clean"),
+    (0, np.full(200, 0.8), True, "free-air"),
+    (0, None, True, "clean"),  # nothing says that there was no edge
+    (0, over_a_platform(), False, "messy"),
+    (2, over_a_platform(), True, "clean"),  # 2 of 202
+    (3, over_a_platform(), True, "messy"),  # 3 of 203: more than 1 %
+])
+def test_use_of_a_flight(lost, zrange, planned, use):
+    assert manifest.use_of(flight(lost, zrange), planned) == use
+
+
+def test_a_row_has_the_values_of_its_mission_and_replaces_an_older_one(tmp_path):
+    path = tmp_path / "manifest.csv"
+    path.write_text(f"{HEADER},note\nold.csv,clean,1,h79,0,none,0.35,mine\nnew.csv,messy,,,,,,\n")
+    log = flight(flight=7, speed_mps=0.3, condition={"clearance": 0.04, "angle": 30, "wind": "fan"})
+    assert manifest.list_flight(tmp_path / "new.csv", log, planned=True) == "clean"
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows == [HEADER.split(","), "old.csv,clean,1,h79,0,none,0.35".split(","),
+                    "new.csv,clean,2,40mm,30,fan,0.3".split(",")]
+
+
+def test_a_recorded_flight_without_mission_leaves_its_values_empty(tmp_path):
+    manifest.list_flight(tmp_path / "a.csv", flight(), planned=True)
+    assert (tmp_path / "manifest.csv").read_text() == f"{HEADER}\na.csv,clean,0,,,none,\n"
