@@ -1,0 +1,109 @@
+"""The app's shell, what surrounds the core in the firmware:
+tasks, parameters, log tables, and what of CPX it touches."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import objects
+from airtouch import vehicle as vehicles
+from airtouch.detector.shared import vehicle_header
+from airtouch.simulation import scenario
+from airtouch.sitl import app as sitl
+from airtouch.sitl.drone import Drone
+from patience import HANG_S
+
+ROOT, HERE = Path(__file__).parents[3], Path(__file__).parent
+APP, HOST = ROOT / "firmware" / "app" / "src", ROOT / "host" / "airtouch" / "kernels" / "batch"
+INCLUDES = [APP, HERE / "crazyflie", *(ROOT / folder for folder in (
+    "firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model", "gap8/app/src"))]
+CORE = [*sorted(set(APP.glob("app_*.c")) - {APP / "app_sensors.c"}),
+        *sorted((ROOT / "firmware/kernels").glob("*.c")), *sorted((ROOT / "firmware/link").glob("*.c")),
+        *sorted((ROOT / "gap8/kernels").glob("*.c")), *sorted((ROOT / "gap8/model").glob("*.c"))]
+#: configuration -> what the compiler is told, sources beside the core's
+BUILDS = {
+    "app-config": ([], []),
+    "app-config-tap": (["-DCONFIG_CONTROLLER_OOT"], [APP / "imu_tap.c"]),
+    "app-config-gap8": (["-DCONFIG_DECK_AI", "-DCONFIG_ENABLE_CPX", f"-I{HERE / 'crazyflie/cpx'}", f"-I{HOST}"],
+                        [APP / "gap8_port.c", ROOT / "gap8/app/src/gap8_core.c", HOST / "app_core_batch.c"]),
+}
+ALL = ("silent", "missing-variable", "parameters", "write-between", "stalled", "late")
+LONGEST_NAME = 26  # group, name and two bytes: the firmware asserts on a longer one when it starts
+
+
+@pytest.fixture(scope="module")
+def headers():
+    """A folder with the vehicle's header under the name that the build gives it."""
+    folder = objects.FOLDER / "vehicle"
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(ROOT / vehicle_header.FOLDER / "crazyflie-2.1-flow.h", folder / "airtouch_vehicle.h")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shells(headers, tmp_path_factory):
+    """The shell as each configuration builds it: configuration -> program."""
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        pytest.skip("no C compiler on this machine")
+    folder = tmp_path_factory.mktemp("shell")
+    command = [compiler, "-std=gnu11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
+               "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DCONFIG_PLATFORM_CF2", f"-I{headers}",
+               *(f"-I{i}" for i in INCLUDES)]
+    core, error = objects.compiled(compiler, command[1:], CORE)
+    assert not error, error[:3000]
+    for name, (flags, sources) in BUILDS.items():
+        done = subprocess.run([*command, *flags, HERE / "shell_driver.c", APP / "app_sensors.c", *sources, *core, "-lm",
+                               "-o", folder / name], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[:3000]
+    return {name: folder / name for name in BUILDS}
+
+
+def run(program, *arguments):
+    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", BUILDS)
+@pytest.mark.parametrize("story", ALL)
+def test_the_shell_keeps_its_promises(shells, name, story):
+    run(shells[name], story)
+
+
+@pytest.mark.parametrize("story", ["gap8-on-request", "foreign"])
+def test_the_gap8_is_asked_only_where_the_parameter_says_so(shells, story):
+    run(shells["app-config-gap8"], story)
+
+
+@pytest.mark.parametrize("deck", [0, 0xFFFF], ids=["absent", "unknown to the firmware"])
+def test_without_an_ai_deck_nothing_is_sent(shells, deck):
+    assert "no GAP8, detector 1" in run(shells["app-config-gap8"], "no-deck", deck)
+
+
+@pytest.mark.parametrize("story", ["tap", "tap-mean"])
+def test_the_tap_gives_means(shells, story):
+    run(shells["app-config-tap"], story)
+
+
+def test_the_virtual_crazyflie_has_the_same_defaults(shells):
+    said = [line.split() for line in run(shells["app-config"], "tables").splitlines()]
+    params = {name.split(".")[1]: float.fromhex(value) for what, name, _, value in (w for w in said if w[0] == "param")}
+    virtual = Drone(scenario.draw_flight(scenario.load("paper-9cm"), 0, 0), vehicles.load(), 0, 0, [], ai_deck=True)
+    assert params and {p.name.split(".")[1]: p.default for p in virtual.app.parameters()} == params
+
+
+def test_names_are_no_longer_than_the_firmware_takes(shells):
+    names = [line.split()[1] for line in run(shells["app-config"], "tables").splitlines()]
+    assert len(names) == len(sitl.LOGS) + len(sitl.PARAMS)
+    assert max(len(name.replace(".", "")) for name in names) + 2 <= LONGEST_NAME
+    assert not [name for name in names if not name.replace(".", "").isalnum()]
+
+
+@pytest.mark.parametrize("name", ["app-config", "app-config-tap"])
+def test_shipped_configurations_leave_cpx_out(name):
+    said = (APP.parent / name).read_text().splitlines()
+    assert {"# CONFIG_DECK_AI is not set", "# CONFIG_ENABLE_CPX is not set"} <= set(said)

@@ -1,0 +1,120 @@
+"""host/docs/port.md, followed: its lists of sources alone, for a Cortex-M0 and in C++; what the headers promise."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtouch import kernels, vehicle
+from airtouch.detector import best
+from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM
+from airtouch.simulation import scenario
+from airtouch.simulation.flight import fly
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "host/docs/port.md").read_text()
+LISTS = {title: block.split() for title, block in re.findall(r"^## (.+?)\nSources:\n```\n(.+?)```", PAGE, re.M | re.S)}
+INCLUDES = [f"-I{ROOT / folder}" for folder in ("firmware/kernels", "firmware/link", "gap8/kernels", "gap8/model")]
+FLAGS = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", *INCLUDES]
+#: what the page allows a list to leave undefined; __aeabi_ and __gnu_ are the compiler's own library
+LIBRARY = {"memcpy", "memset", "memmove", "sqrtf", "floorf", "ceilf", "ldexpf", "fmaxf", "memcmp"}
+#: headers that sources include for themselves
+INTERNAL = {"sample_guard.h", "start_up_math.h", "dot_int8.h", "xpulp.h", "requantise.h", "extensions.h",
+            "airtouch_parameters.h"}
+TREES = ("firmware/kernels", "firmware/link", "gap8/kernels")
+PUBLIC = sorted(path for tree in TREES for path in (ROOT / tree).glob("*.h") if path.name not in INTERNAL)
+
+
+def run(*command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+def test_the_page_lists_every_kernel_once_or_more():
+    listed = {source for sources in LISTS.values() for source in sources}
+    there = {str(path.relative_to(ROOT)) for tree in TREES for path in (ROOT / tree).glob("*.c")}
+    assert len(LISTS) == 4
+    assert there - listed == {"gap8/kernels/network_float.c"}, "for tests, not for a drone"
+    assert listed - there == {"gap8/model/airtouch_stream.c"}
+
+
+@pytest.mark.parametrize("title", LISTS)
+def test_a_list_builds_alone_for_a_cortex_m0(title, tmp_path):
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi")
+    core = ["-mcpu=cortex-m0", "-mthumb"]
+    objects = []
+    for i, source in enumerate(LISTS[title]):
+        objects.append(tmp_path / f"{i}.o")
+        run("arm-none-eabi-gcc", *core, "-Os", *FLAGS, "-c", ROOT / source, "-o", objects[-1])
+    whole = tmp_path / "whole.o"
+    run("arm-none-eabi-gcc", *core, "-nostdlib", "-r", *objects, "-o", whole)
+    missing = {line.split()[-1] for line in run("arm-none-eabi-nm", "--undefined-only", whole).splitlines()}
+    missing = {name for name in missing if not name.startswith(("__aeabi_", "__gnu_"))}
+    assert missing <= LIBRARY, missing - LIBRARY
+    written = [line for line in run("arm-none-eabi-nm", whole).splitlines() if line.split()[-2] in "bBdDcC"]
+    assert written == [], "no globals that are written"
+
+
+def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
+    cc, cpp = shutil.which("cc"), shutil.which("c++")
+    if cc is None or cpp is None:
+        pytest.skip("no C and C++ compiler on this machine")
+    title = next(title for title in LISTS if "best" in title)
+    objects = []
+    for i, source in enumerate(LISTS[title]):
+        objects.append(tmp_path / f"{i}.o")
+        run(cc, "-O2", *FLAGS, "-c", ROOT / source, "-o", objects[-1])
+    program = tmp_path / "example"
+    run(cpp, "-std=c++17", "-O2", "-Wall", "-Wextra", "-Werror", *INCLUDES,
+        ROOT / "tests/firmware/kernels/port/example.cpp", *objects, "-lm", "-o", program)
+    log = fly(scenario.load("paper-4cm"), vehicle.load(), seed=3)
+    table = np.column_stack([log.stack(ACC_WORLD), log.stack(GYRO), log.stack(PWM)]).astype(np.float32)
+    said = subprocess.run([program], input=table.tobytes(), capture_output=True, check=True).stdout.decode().split("\n")
+    rows = [line.split() for line in said if line]
+    model = best.load(None)
+    wanted = kernels.stream_detector(table[:, :3], table[:, 3:6], table[:, 6:], model.int8, model.recipe.motion,
+                                     model.decoder_without(()))
+    logits = np.array([[int(word, 16) for word in row[1:4]] for row in rows], np.uint32).view(np.float32)
+    np.testing.assert_array_equal(logits, wanted.logits)
+    edges = np.array([int(row[4]) for row in rows])
+    np.testing.assert_array_equal(edges, wanted.edge)
+    assert edges.any()
+
+
+@pytest.mark.parametrize("header", PUBLIC, ids=lambda path: path.name)
+def test_a_public_header_says_what_it_needs_and_is_cpp(header, tmp_path):
+    text = header.read_text()
+    for word in ("Target: ", "Threads: ", "Memory: ", "Cost: "):
+        assert text.split("#pragma once")[0].count(word) == 1, word
+    cpp = shutil.which("c++")
+    if cpp is None:
+        pytest.skip("no C++ compiler on this machine")
+    alone = tmp_path / "alone.cpp"
+    alone.write_text(f'#include "{header.name}"\n')
+    run(cpp, "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *INCLUDES, alone)
+    code = re.sub(r"/\*.*?\*/|//[^\n]*", "", text, flags=re.S)
+    functions = re.search(r"^[a-z][\w *]*\([^;{]*\)\s*[;{]", code, re.M)
+    assert bool(functions) <= ('extern "C"' in code)
+
+
+def includes(folder):
+    return {(path, name) for path in (ROOT / folder).rglob("*.[ch]")
+            for name in re.findall(r'^#include "(.+?)"', path.read_text(), re.M)}
+
+
+def test_kernels_and_link_know_no_app_and_no_app_the_other():
+    apps = {app: {path.name for path in (ROOT / app).rglob("*.h")} for app in ("firmware/app", "gap8/app")}
+    models = {path.name for path in (ROOT / "gap8/model").glob("*.h")}
+    for tree in TREES:
+        for path, name in includes(tree):
+            assert name not in apps["firmware/app"] | apps["gap8/app"] | models, f"{path} includes {name}"
+    link = {name for _, name in includes("firmware/link")}
+    assert link == {path.name for path in (ROOT / "firmware/link").glob("*.h")}, "the link knows itself alone"
+    assert not {name for _, name in includes("gap8/kernels")} - {p.name for p in (ROOT / "gap8/kernels").glob("*.h")}
+    for app, other in (("firmware/app", "gap8/app"), ("gap8/app", "firmware/app")):
+        assert not {name for _, name in includes(app)} & apps[other]

@@ -1,0 +1,40 @@
+"""One to eight threads, one a core: the same bits, and no race that ThreadSanitizer could see."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from gap8.kernels.conftest import EMULATION, KERNELS, MODEL
+from patience import HANG_S
+
+SOURCES = [*sorted(KERNELS.glob("*.c")), *sorted(MODEL.glob("airtouch_[mrg]*.c")), Path(__file__).with_name("team.c")]
+
+
+@pytest.fixture(scope="module", params=["portable", "xpulp"])
+def programs(request, compiler, tmp_path_factory) -> dict[str, Path]:
+    """The program, plain and under the sanitizers that work here, by their name."""
+    folder = tmp_path_factory.mktemp(request.param)
+    emulation = [EMULATION] if request.param == "xpulp" else []
+    built = {"plain": compiler(SOURCES, folder / "plain", "-pthread", *emulation)}
+    for name in ("thread", "address,undefined"):
+        flag = f"-fsanitize={name}"
+        if compiler.has(flag, folder=folder):
+            built[name] = compiler(SOURCES, folder / name.split(",")[0], "-pthread", "-g", flag,
+                                   "-fno-sanitize-recover=all", *emulation)
+    return built
+
+
+@pytest.mark.parametrize("cores", range(1, 9))
+def test_any_number_of_cores_gives_the_golden_answers(programs, cores):
+    done = subprocess.run([programs["plain"], str(cores), "3"], capture_output=True, text=True, timeout=HANG_S)
+    assert (done.returncode, done.stdout) == (0, "same\n"), done.stderr
+
+
+@pytest.mark.parametrize("cores", [2, 3, 8])
+@pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
+def test_sanitizers_find_nothing(programs, sanitizer, cores):
+    if sanitizer not in programs:
+        pytest.skip(f"the C compiler has no {sanitizer} sanitizer that runs here")
+    done = subprocess.run([programs[sanitizer], str(cores), "1"], capture_output=True, text=True, timeout=HANG_S)
+    assert (done.returncode, done.stdout) == (0, "same\n"), done.stderr[-3000:]

@@ -1,0 +1,81 @@
+"""Crazyflie log variables as columns: units by hand, axes by SciPy's rotations."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from airtouch.logs.variables import to_columns
+
+G = 9.81  #: m/s^2, as the firmware has it
+
+
+def converted(**table):
+    """Columns and metadata of log variables; "stateEstimate__vx" stands for "stateEstimate.vx"."""
+    meta = {"warnings": []}
+    return to_columns({name.replace("__", "."): np.asarray(v, float) for name, v in table.items()}, meta), meta
+
+
+def attitude(seed=0, n=40):
+    """A smooth attitude: angles (n, 3) rad, and the logged roll, legacy pitch and yaw in degrees."""
+    angles = np.random.default_rng(seed).normal(0, 0.02, (n, 3)).cumsum(axis=0)
+    degrees = np.degrees(angles)
+    return angles, {"stateEstimate__roll": degrees[:, 0], "stateEstimate__pitch": -degrees[:, 1],
+                    "stateEstimate__yaw": degrees[:, 2]}
+
+
+def test_units():
+    columns, meta = converted(acc__x=[1], acc__y=[0], acc__z=[-1], gyro__x=[180], gyro__y=[0], gyro__z=[-90],
+                              stateEstimateZ__vx=[300], stateEstimateZ__vy=[0], stateEstimateZ__vz=[-20],
+                              pm__vbatMV=[3700], range__zrange=[400], motor__m1=[1], motor__m2=[2], motor__m3=[3],
+                              motor__m4=[65535])
+    assert [columns[f"acc_{a}_mps2"][0] for a in "xyz"] == pytest.approx([G, 0, -G], rel=1e-3)
+    assert [columns[f"gyro_{a}_radps"][0] for a in "xyz"] == pytest.approx([np.pi, 0, -np.pi / 2])
+    assert [columns[f"v{a}_mps"][0] for a in "xyz"] == pytest.approx([0.3, 0, -0.02])
+    assert columns["vbat_V"][0] == pytest.approx(3.7) and columns["zrange_m"][0] == pytest.approx(0.4)
+    assert [columns[f"m{i}_pwm"][0] for i in (1, 2, 3, 4)] == [1, 2, 3, 65535]
+    assert meta == {"warnings": [], "acc_frame": "body"}
+
+
+def test_of_two_variables_for_a_column_the_whole_one_is_taken():
+    both, _ = converted(pwm__m1_pwm=[7], motor__m1=[1], motor__m2=[2], motor__m3=[3], motor__m4=[4])
+    assert [both[f"m{i}_pwm"][0] for i in (1, 2, 3, 4)] == [1, 2, 3, 4]  # three of pwm.m*_pwm are missing
+    volts, _ = converted(pm__vbat=[3.9], pm__vbatMV=[3700])
+    assert volts["vbat_V"][0] == 3.9
+
+
+def test_a_range_of_zero_is_near_below_and_no_answer_to_the_side():
+    columns, _ = converted(range__zrange=[0, 32766, 32767], range__front=[0, 32766, 32767])
+    assert np.array_equal(columns["zrange_m"], [0, 32.766, np.nan], equal_nan=True)
+    assert np.array_equal(columns["range_front_m"], [np.nan, 32.766, np.nan], equal_nan=True)
+
+
+def test_accelerations_of_the_estimate_turn_into_the_body():
+    angles, table = attitude()
+    world = np.random.default_rng(1).normal(0, 0.3, (len(angles), 3))  # g, without gravity
+    columns, meta = converted(**table, **{f"stateEstimate__a{a}": world[:, i] for i, a in enumerate("xyz")})
+    body = Rotation.from_euler("ZYX", angles[:, ::-1]).inv().apply((world + (0, 0, 1)) * G)
+    np.testing.assert_allclose(np.column_stack([columns[f"acc_{a}_mps2"] for a in "xyz"]), body, rtol=1e-3, atol=1e-3)
+    assert meta["acc_frame"] == "body"
+
+
+def test_without_attitude_they_stay_in_the_world_and_say_so():
+    columns, meta = converted(stateEstimateZ__ax=[0], stateEstimateZ__ay=[100], stateEstimateZ__az=[9810])
+    assert [columns[f"acc_{a}_mps2"][0] for a in "xyz"] == pytest.approx([0, 0.1, 9.81])
+    assert meta["acc_frame"] == "world" and "world frame" in meta["warnings"][0]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])  # firmware releases differ
+def test_the_pitch_rate_gets_the_sign_of_the_logged_attitude(sign):
+    angles, table = attitude(seed=2)
+    turns = Rotation.from_euler("ZYX", angles[:, ::-1])
+    rates = np.vstack([np.zeros(3), (turns[:-1].inv() * turns[1:]).as_rotvec()]) / 0.01  # rad/s in the body
+    mrad = 1e3 * rates * (1.0, sign, 1.0)
+    columns, meta = converted(**table, stateEstimateZ__rateRoll=mrad[:, 0], stateEstimateZ__ratePitch=mrad[:, 1],
+                              stateEstimateZ__rateYaw=mrad[:, 2])
+    np.testing.assert_allclose(np.column_stack([columns[f"gyro_{a}_radps"] for a in "xyz"]), rates, atol=1e-9)
+    assert not meta["warnings"]
+
+
+def test_a_pitch_rate_without_attitude_is_left_out():
+    columns, meta = converted(**{f"stateEstimateZ__rate{a}": [1.0, 2.0] for a in ("Roll", "Pitch", "Yaw")})
+    assert "gyro_y_radps" not in columns and "gyro left out" in meta["warnings"][0]

@@ -1,0 +1,39 @@
+"""The recording of a session: one log, whole or not at all."""
+
+import numpy as np
+import pytest
+
+from airtouch import logs
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import COLUMNS
+from airtouch.sitl.recorder import Recorder
+
+
+def test_rows_are_read_back_to_a_millionth(tmp_path):
+    rows = np.random.default_rng(0).normal(size=(50, len(COLUMNS)))
+    rows[:, 0] = 0.01 * np.arange(50)
+    row = np.empty(len(COLUMNS))
+    recorder = Recorder(tmp_path / "a.csv.gz", "sweep", "crazyflie-2.1-flow", 3, 0, force=False)
+    for values in rows:
+        row[:] = values  # the caller's row is its own again after `add`
+        recorder.add(row)
+    assert not (tmp_path / "a.csv.gz").exists()
+    recorder.write()
+    log = logs.read(tmp_path / "a.csv.gz")
+    assert np.abs(log.stack(COLUMNS) - rows).max() <= 0.5e-6 + 1e-12
+    assert (log.meta["scenario"], log.meta["seed"], log.meta["sample_period_s"]) == ("sweep", 3, 0.01)
+
+
+def test_a_session_without_rows_writes_nothing(tmp_path):
+    Recorder(tmp_path / "a.csv.gz", "sweep", "crazyflie-2.1-flow", 0, 0, force=False).write()
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_existing_file_and_a_missing_folder_are_refused_before_the_session(tmp_path):
+    (tmp_path / "a.csv").write_text("mine")
+    with pytest.raises(AirTouchError, match="exists already; use --force"):
+        Recorder(tmp_path / "a.csv", "", "", 0, 0, force=False)
+    with pytest.raises(AirTouchError, match="no such folder"):
+        Recorder(tmp_path / "none" / "a.csv", "", "", 0, 0, force=True)
+    Recorder(tmp_path / "a.csv", "", "", 0, 0, force=True)
+    assert (tmp_path / "a.csv").read_text() == "mine"  # replaced at the end alone
