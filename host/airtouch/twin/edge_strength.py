@@ -1,7 +1,7 @@
 """How strong recorded edges are beside simulated ones, by height, and simulated edges made as strong.
 
 Simulated edges of high flights are too weak: 6.5 cm and more over the platform, the median of vertical acceleration and
-motor mean around an edge is about half of the recorded one (host/docs/twin.md). A detector that has learnt weak edges
+motor mean around an edge is about half of the recorded one (host/docs/twin-findings.md). A detector that has learnt weak edges
 is unsure of them.
 """
 
