@@ -6,21 +6,21 @@ from pathlib import Path
 import pytest
 
 from airtouch.paper_figures import run
-from airtouch.paper_figures.claims import SAID
+from airtouch.paper_figures.claims import CLAIMS
 
 SOURCE = Path(__file__).parents[3] / "shared" / "paper" / "airtouch.tex"
 
 
 @pytest.mark.skipif(not SOURCE.exists(), reason="the paper's source is not on this machine")
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", CLAIMS)
 def test_each_quote_stands_in_its_line(name):
-    said = SAID[name]
+    said = CLAIMS[name]
     assert said.quote in SOURCE.read_text("utf-8").splitlines()[said.line - 1]
 
 
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", CLAIMS)
 def test_each_number_stands_in_its_quote(name):
-    said = SAID[name]
+    said = CLAIMS[name]
     numbers = [float(n.replace(",", "")) for n in re.findall(r"\d[\d,]*\.?\d*", said.quote)]
     for value in said.values:
         assert any(value == pytest.approx(n * scale) for n in numbers
@@ -28,4 +28,4 @@ def test_each_number_stands_in_its_quote(name):
 
 
 def test_every_claim_belongs_to_a_figure_and_every_figure_has_one():
-    assert {said.figure for said in SAID.values()} == set(run.FIGURES)
+    assert {said.figure for said in CLAIMS.values()} == set(run.FIGURES)

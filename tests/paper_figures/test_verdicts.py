@@ -139,7 +139,7 @@ def test_a_caption_names_the_flights_that_are_missing(tmp_path):
     names = [f"f{i}.csv" for i in range(5)]
     (tmp_path / "manifest.csv").write_text("file,fold,speed_mps\n" + "".join(f"{n},{i},0.3\n" for i, n in
                                                                            enumerate(names)))
-    told = recorded.said(Job(tmp_path, tmp_path / "work"), 87, 174)
+    told = recorded.sample_sentence(Job(tmp_path, tmp_path / "work"), 87, 174)
     assert "in 5 folds. Left out: " in told and all(str(tmp_path / n) in told for n in names[:3])
     assert told.endswith("; and 2 more.") and "f3.csv" not in told
 

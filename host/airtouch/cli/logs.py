@@ -207,8 +207,8 @@ def _hertz(rate: float | None) -> str:
     return "?" if rate is None else f"{rate:.2f}"
 
 
-def _print_json(found: list[dict[str, Any]], left_out: list[dict[str, str]]) -> None:
-    click.echo(json.dumps(_finite({"flights": found, "left_out": left_out}), indent=1))
+def _print_json(reports: list[dict[str, Any]], left_out: list[dict[str, str]]) -> None:
+    click.echo(json.dumps(_finite({"flights": reports, "left_out": left_out}), indent=1))
 
 
 def _finite(value: Any) -> Any:

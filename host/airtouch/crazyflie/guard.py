@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 PATIENCE_S = 60.0  #: s to wait for a drone out of reach or a radio that is still busy
-RESEND_S = 0.2
+RESEND_S = 0.2  #: s between two land commands, until one is answered
 HEADER = 0x8C  #: CRTP port 8, channel 0
 LAND = 8
 

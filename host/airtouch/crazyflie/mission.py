@@ -17,7 +17,7 @@ from airtouch.simulation.firmware import setpoint as c
 from airtouch.simulation.flight_plan.mission import RATE_HZ
 
 SHORTEST_S = 0.05  #: s; a shorter stop is a corner, no hover
-LANDING_MPS = 0.3
+LANDING_MPS = 0.3  #: m/s; assumed, within the firmware's range for landings
 
 
 @dataclass(frozen=True)

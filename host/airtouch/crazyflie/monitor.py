@@ -18,10 +18,10 @@ from airtouch.crazyflie.view.board import Board, Felt, Link
 from airtouch.crazyflie.view.host_detector import HostDetector, with_gaps
 from airtouch.errors import AirTouchError
 
-TURN_S = 0.05
-PING_S = 0.5
+TURN_S = 0.05  #: s, period of the loop
+PING_S = 0.5  #: s between echo requests
 RATE_S = 2.0  #: s over which the packet rate is averaged
-REOPEN_S = 5.0
+REOPEN_S = 5.0  #: s, longest attempt to connect again
 
 
 def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostDetector | None]:
@@ -129,7 +129,7 @@ def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
         if time.monotonic() - pinged > PING_S:
             drone.ping()
             pinged = time.monotonic()
-        for line in drone.said():
+        for line in drone.console_lines():
             say(f"the drone says: {line}")
         monitor.refresh(drone.round_trip_s)
         show(monitor.board)

@@ -19,7 +19,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 SUFFIX, PART = ".csv.gz", ".part"
-LEAST_FREE_BYTES = 50 * 2**20
+LEAST_FREE_BYTES = 50 * 2**20  #: a minute of flight takes about 2 MB while it is recorded
 
 
 def flight_path(folder: Path, name: str, number: int) -> Path:
@@ -29,11 +29,11 @@ def flight_path(folder: Path, name: str, number: int) -> Path:
 
 def next_number(folder: Path, name: str) -> int:
     """The number after the highest of all flights of this name in the folder, finished or not; at least 1."""
-    taken = [0]
+    numbers = [0]
     for path in folder.glob(f"{name}_*"):
         number = path.name.removeprefix(f"{name}_").removesuffix(PART).removesuffix(SUFFIX)
-        taken += [int(number)] if number.isdigit() else []
-    return max(taken) + 1
+        numbers += [int(number)] if number.isdigit() else []
+    return max(numbers) + 1
 
 
 class Recorder:

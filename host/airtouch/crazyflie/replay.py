@@ -43,9 +43,9 @@ def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 
             return first
         rows = {name: values[first:first + CHUNK] for name, values in columns.items()}
         count = len(next(iter(rows.values())))
-        probability, found = detector.next(rows)
+        probability, edges = detector.next(rows)
         board.add((first + np.arange(count)) * SAMPLE_PERIOD_S, rows, probability)
-        for edge in found:
+        for edge in edges:
             felt(board.feel(edge.kind, edge.sample * SAMPLE_PERIOD_S, edge.probability))
         show(board)
         if speed > 0.0:

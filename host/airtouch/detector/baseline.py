@@ -53,8 +53,8 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, **_: Any) -> Baseline:
     correlations = [correlation_sum(spectrum_power(log), Baseline.correlation_window) for log in flights]
     slopes = {s: [derivative(c, s) for c in correlations] for s in (25, 50, 100)}
     candidates = [
-        Baseline(smoothing=smoothing, threshold=float(np.quantile(np.abs(np.concatenate(found)), q)))
-        for smoothing, found in ((s, [np.nan_to_num(x) for x in xs]) for s, xs in slopes.items())
+        Baseline(smoothing=smoothing, threshold=float(np.quantile(np.abs(np.concatenate(finite)), q)))
+        for smoothing, finite in ((s, [np.nan_to_num(x) for x in xs]) for s, xs in slopes.items())
         for q in (0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)
     ]
 

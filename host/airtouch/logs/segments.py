@@ -64,12 +64,12 @@ def segments(log: FlightLog) -> list[Segment]:
 def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray | None:
     """Height above the ground, (n,) m; over a platform the down range plus the platform's height."""
     if log.has("zrange_m"):
-        added, total = np.zeros(len(log) + 1), 0.0
+        steps, total = np.zeros(len(log) + 1), 0.0
         for edge in edges:
             step = edge.height_before_m - edge.height_after_m if edge.kind == "entry" else -total
-            added[edge.sample] += step
+            steps[edge.sample] += step
             total += step
-        return log["zrange_m"] + np.cumsum(added[:-1])
+        return log["zrange_m"] + np.cumsum(steps[:-1])
     return log["z_m"] if log.has("z_m") else None
 
 

@@ -11,7 +11,7 @@ from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.variants import Variant, VariantModel
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, recorded, words
-from airtouch.paper_figures.claims import SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
 
 FEW = 10  #: training flights in the small training set, with which the paper says that its loss helps most
@@ -57,12 +57,12 @@ def df_loss(job: Job) -> Figure:
              / (rows[pair[1]]["mean_abs_error_m"] or np.nan)
              for pair in pairs}
     text = "; ".join(f"{what} {words.metres(r)}, {words.missed(r)}" for what, r in rows.items())
-    helps = any(words.worse(rows[w], rows[wo]) and gains[w] >= 0.5 * SAID["df-loss"].values[2] for w, wo in pairs)
+    helps = any(words.worse(rows[w], rows[wo]) and gains[w] >= 0.5 * CLAIMS["df-loss"].values[2] for w, wo in pairs)
     sooner = [1.0 - epochs[w] / epochs[wo] for w, wo in pairs]
     verdicts = {
         "df-loss": words.judged(helps, f"{text}; error less by "
                                 + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
-        "df-epochs": words.judged(max(sooner) >= 0.5 * SAID["df-epochs"].values[2],
+        "df-epochs": words.judged(max(sooner) >= 0.5 * CLAIMS["df-epochs"].values[2],
                                   "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
                                   + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
     if job.quick:
@@ -96,7 +96,7 @@ def input_size(job: Job) -> Figure:
     rows = {size: summary.summarise(scores(job, *variant)[0]) for size, variant in SIZES.items()}
     text = "; ".join(f"{size} samples {words.metres(r)}, {words.missed(r)}" for size, r in rows.items())
     best = max(rows, key=lambda size: rows[size]["hit"]["0.25"])
-    low, high = SAID["input-size"].values
+    low, high = CLAIMS["input-size"].values
     verdict = words.judged(low <= best <= high, f"{text}; most edges within 0.25 m with {best}: "
                            + ", ".join(f"{s} {words.percent(r['hit']['0.25'], r['intervals']['hit']['0.25'])}"
                                        for s, r in rows.items()))

@@ -3,12 +3,12 @@
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, simulated, words
-from airtouch.paper_figures.claims import SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 
 DETECTORS = ("best", "paper")
 HEIGHTS = ("paper-4cm", "paper-9cm", "paper-12cm")
-WINDS_MPS = SAID["wind"].values
+WINDS_MPS = CLAIMS["wind"].values
 STYLES = {"best": {"ls": "-"}, "paper": {"ls": "--"}}
 
 
@@ -39,7 +39,7 @@ def by_height(job: Job) -> Figure:
     def within(name: str, height: str) -> str:
         return f"{name} {height} {words.percent(*hits[name, height, 'simulated'])}"
 
-    low, high = SAID["height-4cm"].values[0], SAID["height-9cm"].values[0]
+    low, high = CLAIMS["height-4cm"].values[0], CLAIMS["height-9cm"].values[0]
     near = hits["paper", "4cm", "simulated"]  # share and its interval
     far = [hits["paper", h, "simulated"] for h in ("9cm", "12cm")]
     verdicts = {
@@ -90,7 +90,7 @@ def by_angle(job: Job) -> Figure:
     verdicts = {"angle": words.judged(words.worse(steep["paper"][0.0], steep["paper"][20.0]), both),
                 "angle-sides": words.judged(*_sides(rows))}
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
-               + recorded.said(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
+               + recorded.sample_sentence(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
@@ -102,15 +102,15 @@ def by_angle(job: Job) -> Figure:
 
 def _sides(rows: dict) -> tuple[bool, str]:
     """Whether left and right agree within their intervals for both detectors, and what they are."""
-    same, said = True, []
+    same, pairs = True, []
     for name in reversed(DETECTORS):
         for angle in (10.0, 20.0):
             left, right = rows.get((name, -angle)), rows.get((name, angle))
             if left and right:
                 same &= not words.worse(left, right) and not words.worse(right, left)
-                said.append(f"{name} -{angle:.0f}° {words.metres(left)} ({left['edges']} edges), +{angle:.0f}° "
+                pairs.append(f"{name} -{angle:.0f}° {words.metres(left)} ({left['edges']} edges), +{angle:.0f}° "
                             f"{words.metres(right)} ({right['edges']})")
-    return same and bool(said), "no difference beyond the 95 % intervals: " * same + "; ".join(said)
+    return same and bool(pairs), "no difference beyond the 95 % intervals: " * same + "; ".join(pairs)
 
 
 def wind(job: Job) -> Figure:
@@ -126,16 +126,16 @@ def wind(job: Job) -> Figure:
         for name in DETECTORS:
             rows[name, speed] = summary.summarise(simulated.scores(flights, name))
     table = [words.table_row(f"{n}, {v:g} m/s", r, detector=n, wind_mps=v) for (n, v), r in rows.items()]
-    said = "; ".join(f"{n}: " + ", ".join(f"{v:g} m/s {words.metres(rows[n, v])}, {words.missed(rows[n, v])}"
+    text = "; ".join(f"{n}: " + ", ".join(f"{v:g} m/s {words.metres(rows[n, v])}, {words.missed(rows[n, v])}"
                                           for v in WINDS_MPS) for n in reversed(DETECTORS))
     calm = {name: rows[name, WINDS_MPS[0]] for name in DETECTORS}
     same = {name: not any(words.worse(calm[name], rows[name, v]) for v in WINDS_MPS[1:]) for name in DETECTORS}
     caption = (f"Simulated: {2 * count} flights a speed, 4 cm over the platform, half with wind from the front and "
                "half from the left; the shipped networks. The wind is steady, as the paper's. The recorded flights "
                "have one with a fan.")
-    verdict = words.judged(same["paper"] and same["best"], said)
+    verdict = words.judged(same["paper"] and same["best"], text)
     if calm["paper"]["missed"] is not None and calm["paper"]["missed"] > 0.5 and same["best"]:
-        verdict = Verdict(UNTESTABLE, f"the paper's method misses most edges without wind already; {said}")
+        verdict = Verdict(UNTESTABLE, f"the paper's method misses most edges without wind already; {text}")
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)

@@ -43,7 +43,7 @@ class Figure:
     """A reproduced figure.
 
     rows: the table, one dict for each row. draw: draws the picture on an empty matplotlib figure.
-    verdicts: claim of `claims.SAID` -> verdict, for every claim of the figure.
+    verdicts: claim of `claims.CLAIMS` -> verdict, for every claim of the figure.
     """
 
     title: str

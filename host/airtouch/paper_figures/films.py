@@ -55,26 +55,26 @@ def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name
     from airtouch.detector.trace import Detection
     from airtouch.vision import compare, lines
 
-    kept = job.work / f"vision_{name}.json"
+    path = job.work / f"vision_{name}.json"
     try:
-        stored = json.loads(kept.read_text())
+        stored = json.loads(path.read_text())
     except (OSError, ValueError):
         sizes = weights.SIZES if lux == SIZE_LUX else ("teed",)
         mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in sizes}}
         stored = {}
         for way, sights in compare.filmed(films, lux, mappers, SEED, job.tell).items():
             least = compare.threshold(films[:training_count], sights[:training_count])
-            stored[way] = [[d.sample for d in found] for found in compare.crossings(films, sights, least)]
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(json.dumps(stored).encode(), kept, force=True)
-    return {way: [[Detection(s, "edge") for s in found] for found in some] for way, some in stored.items()}
+            stored[way] = [[d.sample for d in detections] for detections in compare.crossings(films, sights, least)]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(json.dumps(stored).encode(), path, force=True)
+    return {way: [[Detection(s, "edge") for s in detections] for detections in some] for way, some in stored.items()}
 
 
-def film_scores(films: list[Any], found: list[Any]) -> list[FlightScore]:
+def film_scores(films: list[Any], detections: list[Any]) -> list[FlightScore]:
     """A score a film, of the crossings found in each."""
     from airtouch.vision import compare
 
-    return compare.scored(films, found)
+    return compare.scored(films, detections)
 
 
 def lux_of(job: Job) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, simulated, words
-from airtouch.paper_figures.claims import SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
 from airtouch.paper_figures.overall import each_m, errors_m
 
@@ -51,7 +51,7 @@ def _flights(scene: str, count: int, seed: int) -> list[FlightLog]:
 
 def overall(job: Job) -> Figure:
     """Performance:1b: the errors over all four pairs, edge by edge."""
-    claim = SAID["material-error"]
+    claim = CLAIMS["material-error"]
     scores = pair_scores(job)
     whole = {name: [s for (n, _), some in scores.items() if n == name for s in some] for name in DETECTORS}
     rows = {name: summary.summarise(some) for name, some in whole.items()}
@@ -96,7 +96,7 @@ def by_pair(job: Job) -> Figure:
                 axes.text(place, -0.03, f"{100 * row['missed']:.0f} %\nmissed", ha="center", va="top", fontsize=6,
                           color=pictures.MUTED)
             axes.set(title=name, ylim=(-0.11, 0.5))
-        median, greatest = SAID["mat-cement"].values
+        median, greatest = CLAIMS["mat-cement"].values
         canvas.axes[1].plot([1, 1], [median, greatest], "k*", ms=7, label="paper: mat, cement: median, greatest")
         canvas.axes[1].legend(fontsize=7, frameon=False)
         canvas.axes[0].set_ylabel("|error| of edges found, m")
@@ -108,8 +108,8 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f} m"
 
 
-def _caption(found: dict[tuple[str, str], list[FlightScore]]) -> str:
-    flights = len(next(iter(found.values())))
+def _caption(scores: dict[tuple[str, str], list[FlightScore]]) -> str:
+    flights = len(next(iter(scores.values())))
     return (f"Simulated: {flights} flights a pair, cruising 3.8 to 4.5 cm over the surface at 0, 10 and 20 degrees; "
             "both detectors trained on other simulated flights over the four pairs. Truth is where the drone is. How "
             "a material changes the lift is not measured but set so that the order of the paper comes out.")

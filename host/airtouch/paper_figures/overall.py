@@ -3,7 +3,7 @@
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, words
-from airtouch.paper_figures.claims import SAID
+from airtouch.paper_figures.claims import CLAIMS
 from airtouch.paper_figures.figure import Figure, Job
 
 
@@ -19,14 +19,14 @@ def each_m(scores: list[FlightScore]) -> list[float | None]:
 
 def heights(job: Job) -> Figure:
     """Performance:1a: the errors over platforms, edge by edge."""
-    claim = SAID["height-error"]
+    claim = CLAIMS["height-error"]
     scores = {name: recorded.scores(job, name)[0] for name in ("best", "paper")}
     rows = {name: summary.summarise(some) for name, some in scores.items()}
     verdict = words.judged(
         words.reaches(rows["paper"], claim.values[0]),
         f"paper's method {words.score(rows['paper'])}; best {words.score(rows['best'])}"
         + ("; best reaches the claim" if words.reaches(rows["best"], claim.values[0]) else ""))
-    caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"])
+    caption = (recorded.sample_sentence(job, rows["best"]["flights"], rows["best"]["edges"])
                + " Only edges that were found have an error; those that were missed are counted beside it. The paper "
                  "scores 30 flights of its own, says of no edge that it was missed, and splits windows at random.")
     return Figure("Errors at abrupt heights", [words.table_row(n, r) for n, r in rows.items()], caption,
@@ -36,7 +36,7 @@ def heights(job: Job) -> Figure:
 
 def against_baseline(job: Job) -> Figure:
     """Performance:1c: best, the paper's method and its baseline, side by side."""
-    ours, theirs, gain = SAID["baseline"].values
+    ours, theirs, gain = CLAIMS["baseline"].values
     rows = {name: summary.summarise(recorded.scores(job, name)[0]) for name in ("best", "paper", "baseline")}
     better = {n: 1.0 - rows[n]["mean_abs_error_m"] / rows["baseline"]["mean_abs_error_m"] for n in ("paper", "best")
               if rows[n]["mean_abs_error_m"] is not None}
@@ -52,6 +52,6 @@ def against_baseline(job: Job) -> Figure:
         pictures.paper_stars(left, {1: ours, 2: theirs})
         pictures.bars(right, table, "missed", "missed_low", "missed_high", "missed edges, %", factor=100.0)
 
-    caption = (recorded.said(job, rows["best"]["flights"], rows["best"]["edges"])
+    caption = (recorded.sample_sentence(job, rows["best"]["flights"], rows["best"]["edges"])
                + " Platforms only: no recorded flight crosses a material interface, over which the paper averages too.")
     return Figure("Errors of the method and of the baseline", table, caption, {"baseline": verdict}, draw)

@@ -11,7 +11,7 @@ import jinja2
 
 from airtouch import __version__
 from airtouch.logs.files import write_bytes
-from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNTESTABLE
 from airtouch.report.write import embed
 
 CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNTESTABLE: "open"}
@@ -28,7 +28,7 @@ def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
     template = environment.from_string((resources.files("airtouch.paper_figures") / "page.html").read_text("utf-8"))
     text = template.render(
         records=[{**entry, "image": _image(out, entry)} for entry in records.values()], classes=CLASSES, count=count,
-        verdicts=CLASSES, total=len(SAID), judged=len(verdicts), command=command, version=__version__,
+        verdicts=CLASSES, total=len(CLAIMS), judged=len(verdicts), command=command, version=__version__,
         quick=any(entry.get("quick") for entry in records.values()))
     path = out / "index.html"
     write_bytes(text.encode(), path, force=True)

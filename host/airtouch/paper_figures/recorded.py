@@ -73,7 +73,7 @@ def _air(flights: Path) -> list[Path]:
     return [folder for name in AIR if (folder := flights.parent / name).is_dir()]
 
 
-def said(job: Job, flights: int, edges: int) -> str:
+def sample_sentence(job: Job, flights: int, edges: int) -> str:
     """The sentences of a caption on the number of flights and edges, how they were split, and what was left out."""
     if job.quick:
         return (f"Recorded flights, {flights} of one fold ({edges} edges), by models of the other folds, briefly "

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.detector import best, paper
 from airtouch.kernels.network import parameter_bytes
 from airtouch.paper_figures import pictures, recorded, words
-from airtouch.paper_figures.claims import REPRODUCED, SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, REPRODUCED, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.parameters import DEFAULT
 from airtouch.reference.networks.int8_network import CONV, multiplications
@@ -41,7 +41,7 @@ def resources(job: Job) -> Figure:
          "parameter_bytes": parameter_bytes(ours.int8), "frame_bits": window_bits},
         {"what": "best, a step of 10 ms", "mac": own["mac_per_sample"], "flops": FLOPS_A_MAC * own["mac_per_sample"],
          "parameter_bytes": own["parameter_bytes"], "frame_bits": 8 * own["state_bytes"]}]
-    theirs_flops, said_flops = SAID["flops"].values
+    theirs_flops, said_flops = CLAIMS["flops"].values
     pixels = theirs_flops / FLOPS_A_MAC / (vision_mac / np.prod(PAPER_CAMERA))
     verdicts = {
         "flops": words.judged(_near(dense_mac, said_flops) and _near(FLOPS_A_MAC * vision_mac, theirs_flops),
@@ -51,12 +51,12 @@ def resources(job: Job) -> Figure:
                               "multiply-accumulates; 3900 million FLOPs are those of an image of "
                               f"{np.sqrt(pixels):.0f} x {np.sqrt(pixels):.0f}. 0.28 of 3900 is 0.007 %, as the text "
                               "says, not the table's 0.07 %"),
-        "parameters": words.judged(parameter_bytes(ours.int8) <= SAID["parameters"].values[1]
-                                   and _near(parameters, SAID["parameters"].values[0]),
+        "parameters": words.judged(parameter_bytes(ours.int8) <= CLAIMS["parameters"].values[1]
+                                   and _near(parameters, CLAIMS["parameters"].values[0]),
                                    f"{parameter_bytes(ours.int8):,} bytes as shipped; TEED has {parameters:,} weights "
                                    f"and biases: 58 kB at one byte each, {4 * parameters:,} bytes in float"),
         "training": _training(job, rows, vision_seconds),
-        "memory": words.judged(window_bits <= SAID["memory"].values[0] and frame_bits > 20 * window_bits,
+        "memory": words.judged(window_bits <= CLAIMS["memory"].values[0] and frame_bits > 20 * window_bits,
                                f"a window of features {window_bits:,} bits, {ring_bits:,} with the samples of its "
                                f"band power; a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 "
                                f"{8 * PAPER_CAMERA[0] * PAPER_CAMERA[1]:,}: less than a million, not millions")}
@@ -88,7 +88,7 @@ def _training(job: Job, rows: list[dict[str, Any]], vision_seconds: float) -> Ve
     timed = [f["cpu_seconds"] for f in folds if "cpu_seconds" in f] or [f["seconds"] for f in folds]
     seconds = float(np.mean(timed))
     rows[1]["training_s"] = seconds
-    verdict = REPRODUCED if seconds < SAID["training"].values[1] else UNTESTABLE
+    verdict = REPRODUCED if seconds < CLAIMS["training"].values[1] else UNTESTABLE
     return Verdict(verdict, f"paper's network {seconds / 60:.1f} min of processor time a fold here (n = {len(timed)}, "
                             "choice of thresholds and scoring included, "
                             f"{folds[0]['parameters'].get('epochs_run', '?')} epochs of one cycle in place of 200); "
@@ -105,5 +105,5 @@ def _dense_multiplications(model: Any) -> int:
     return total
 
 
-def _near(value: float, said: float, share: float = 0.1) -> bool:
-    return abs(value - said) <= share * said
+def _near(value: float, published: float, share: float = 0.1) -> bool:
+    return abs(value - published) <= share * published

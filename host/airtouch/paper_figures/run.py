@@ -66,10 +66,10 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
             if entry and entry["key"] == key and "missing" not in entry and not force]
     for name in done:
         job.tell(f"{name}: done before")
-    left = [name for name in chosen if name not in done]
-    groups = [part for group in GROUPS if (part := [name for name in left if name in group])]
+    undone = [name for name in chosen if name not in done]
+    groups = [part for group in GROUPS if (part := [name for name in undone if name in group])]
     if workers == 1 or len(groups) < 2:
-        make_all(left, job, out, key, command)
+        make_all(undone, job, out, key, command)
     else:
         _side_by_side(groups, job, out, key, command, workers)
     all_records = records(out)

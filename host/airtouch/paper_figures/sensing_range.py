@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.paper_figures import pictures, words
-from airtouch.paper_figures.claims import SAID
+from airtouch.paper_figures.claims import CLAIMS
 from airtouch.paper_figures.figure import Figure, Job
 from airtouch.simulation import effects
 from airtouch.simulation.effects.air.ground_effect import faded, thrust_ratio
@@ -67,7 +67,7 @@ def curves(radius_m: float, arm_m: float) -> dict[str, Callable[[np.ndarray], np
 
 def sensing_range(job: Job) -> Figure:
     """Section 8.1: heights at which the lift is THRESHOLD of the weight, and the lift at the paper's 3 m."""
-    mass, span, propeller, claimed = SAID["range"].values
+    mass, span, propeller, claimed = CLAIMS["range"].values
     small = vehicles.load("crazyflie-2.1-flow")
     craft = [("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
              ("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
@@ -84,7 +84,7 @@ def sensing_range(job: Job) -> Figure:
                  "range_m": reach(lambda h: measured(h, "frame-67g"))})
     large = [r for r in rows if r["mass_kg"] == mass]
     tiny = [r for r in rows if r["mass_kg"] == small.mass_kg]
-    kept = reach(lambda h: measured(h, SMALL))
+    small_reach_m = reach(lambda h: measured(h, SMALL))
     verdicts = {
         "range": words.judged(any(r["range_at_best_m"] >= claimed for r in large),
                               f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(large):.2f} to "
@@ -93,9 +93,9 @@ def sensing_range(job: Job) -> Figure:
                               f"{max(r['range_at_best_m'] for r in large):.1f} m at most. At 3 m "
                               f"{100 * max(r['lift_at_3_m_share'] for r in large):.2f} % of the weight is left at "
                               "most. Nothing was flown"),
-        "range-small": words.judged(kept <= SAID["range-small"].values[0],
+        "range-small": words.judged(small_reach_m <= CLAIMS["range-small"].values[0],
                                     f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at "
-                                    f"{kept:.3f} m of rotor height; published curves say {least(tiny):.3f} to "
+                                    f"{small_reach_m:.3f} m of rotor height; published curves say {least(tiny):.3f} to "
                                     f"{most(tiny):.3f} m")}
     caption = (f"Heights are of the rotor discs. The range is where the lift falls below {100 * THRESHOLD:.0f} % of "
                f"the weight. The force that thrust does not explain has a noise of {100 * NOISE:.1f} % rms at 100 Hz; "

@@ -10,7 +10,7 @@ from airtouch.detector.evaluation import summary
 from airtouch.detector.paper.training import SPARSITY
 from airtouch.kernels.network import infer_float, infer_int8, parameter_bytes
 from airtouch.paper_figures import pictures, recorded, words
-from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 
 FLOAT_BYTES = 4
@@ -29,7 +29,7 @@ def sizes(job: Job) -> Figure:
         accuracy = _accuracies(job, rows)
     except Missing as missing:
         accuracy = str(missing)
-    before, after = SAID["size"].values
+    before, after = CLAIMS["size"].values
     ours = rows[1]["bytes"]
     faster = times["float"] / times["int8"]
     lost = [r for r in rows if r.get("balanced_float") is not None]
@@ -58,7 +58,7 @@ def sizes(job: Job) -> Figure:
             right.plot([100 * r["zeros"] for r in some], [100 * r[key] for r in some], marker + "-", ms=4,
                        label=key.removeprefix("balanced_"), color=pictures.COLOURS["paper"],
                        alpha=1.0 if marker == "s" else 0.5)
-        for value in SAID["accuracy"].values:
+        for value in CLAIMS["accuracy"].values:
             right.axhline(100 * value, color=pictures.PAPER, ls="--", lw=1)
         right.set(xlabel="zeros in the first dense layer, %", ylabel="window accuracy, % (dashed: the paper's)",
                   ylim=(45, 100))

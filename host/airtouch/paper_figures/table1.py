@@ -4,7 +4,7 @@ from pathlib import Path
 
 from airtouch.errors import AirTouchError
 from airtouch.paper_figures import pictures, words
-from airtouch.paper_figures.claims import SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.power import ina219, stages
 
@@ -28,7 +28,7 @@ def measured(log: Path) -> Figure:
             for name, (mw, half) in ina219.added(powers).items()]
     last = list(powers.values())[-1]
     total, half = last.mw, last.half_mw
-    verdicts = {"power": words.judged(total - half <= SAID["power"].values[0],
+    verdicts = {"power": words.judged(total - half <= CLAIMS["power"].values[0],
                                       f"total {total:.1f} mW [{total - half:.1f}, {total + half:.1f}] over "
                                       f"{last.seconds:.0f} s"),
                 "negligible": _negligible(total - next(iter(powers.values())).mw, "measured")}
@@ -58,7 +58,7 @@ def estimated() -> Figure:
 
 
 def _negligible(mw: float, how: str) -> Verdict:
-    share = mw / SAID["negligible"].values[0]
+    share = mw / CLAIMS["negligible"].values[0]
     return words.judged(share < 0.05, f"{how} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the paper's "
                                       "own 43 mW are 1.4 %. The propellers' power was not measured here")
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.detector.evaluation import summary, tuning
 from airtouch.paper_figures import pictures, recorded, words
-from airtouch.paper_figures.claims import SAID, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 from airtouch.paper_figures.films import FELT, SIZE_LUX, everything, film_scores, films_of, lux_of
 from airtouch.vision import teed, weights
@@ -38,15 +38,15 @@ def light(job: Job) -> Figure:
                          for n in ("teed", "classical") if (n, lux) in rows)
 
     flights = "; ".join(f"{n} {words.metres(r)}, {words.missed(r)}" for n, r in ours.items())
-    bright, dark = SAID["light-bright"].values[0], [v for v in SAID["light-dark"].values if ("teed", v) in rows]
+    bright, dark = CLAIMS["light-bright"].values[0], [v for v in CLAIMS["light-dark"].values if ("teed", v) in rows]
     verdicts = {
         "light-airtouch": words.judged(
-            words.reaches(ours["paper"], SAID["light-airtouch"].values[0]),
+            words.reaches(ours["paper"], CLAIMS["light-airtouch"].values[0]),
             f"light plays no part in its signals; simulated, shipped networks: {flights}"
-            + (f"; best reaches {SAID['light-airtouch'].values[0]:g} m"
-               if words.reaches(ours["best"], SAID["light-airtouch"].values[0]) else "")),
+            + (f"; best reaches {CLAIMS['light-airtouch'].values[0]:g} m"
+               if words.reaches(ours["best"], CLAIMS["light-airtouch"].values[0]) else "")),
         "light-bright": words.judged(words.worse(rows["teed", bright], ours["best"]) and words.reaches(
-            rows["teed", bright], SAID["light-bright"].values[1]),
+            rows["teed", bright], CLAIMS["light-bright"].values[1]),
                                      f"{text(bright)}; best {words.metres(ours['best'])}"),
         "light-dark": words.judged(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
                                    "; ".join(text(v) for v in dark) + f"; best {words.metres(ours['best'])}. "
@@ -65,8 +65,8 @@ def light(job: Job) -> Figure:
                                  lw=0)
             pictures.logarithmic(axes, lux_of(job), "light, lux")
             axes.set(ylim=(0, None))
-        left.plot(bright, SAID["light-bright"].values[1], "k*", ms=8, label="paper: TEED")
-        left.plot([20, 50, 100], [SAID["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
+        left.plot(bright, CLAIMS["light-bright"].values[1], "k*", ms=8, label="paper: TEED")
+        left.plot([20, 50, 100], [CLAIMS["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
         _labelled(canvas, left, right)
 
     caption = (f"Simulated: {len(films)} flights, 4 cm over the platform, camera and AirTouch on the same flights; "
@@ -100,7 +100,7 @@ def network_size(job: Job) -> Figure:
                 pictures.curve(axes, list(by_bytes), list(by_bytes.values()), key, factor, pictures.colour("best"),
                                "best, recorded flights")
             _airtouch(axes, ours, key, factor)
-            axes.axvline(SAID["network-vision"].values[0], color=pictures.PAPER, ls="--", lw=1)
+            axes.axvline(CLAIMS["network-vision"].values[0], color=pictures.PAPER, ls="--", lw=1)
             pictures.logarithmic(axes, sizes, "parameters (of best: bytes)")
             axes.set(ylim=(0, None))
         _labelled(canvas, left, right)
@@ -131,26 +131,26 @@ def fusion(job: Job) -> Figure:
     films, seen, felt = everything(job)
     table, scores = [], {}
     for lux in lux_of(job):
-        found = {"camera": seen["teed", lux], "AirTouch": felt["best"], "both": seen["fusion", lux]}
-        for name, some in found.items():
+        detections = {"camera": seen["teed", lux], "AirTouch": felt["best"], "both": seen["fusion", lux]}
+        for name, some in detections.items():
             scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(films, some, strict=True)])
             row = summary.summarise(film_scores(films, some))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux,
                                          timed_f1=scores[name, lux]))
-        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(films, found)
+        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(films, detections)
     worst = [(r["fusion_loses"], r["loses_low"], r["lux"]) for r in table if r["detector"] == "both"]
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
     most = max(loss for loss, _, _ in worst)
     beyond = ", ".join(f"{v:g} lux" for _, low, v in worst if low > 0.0)
     if beyond:
-        said = f"both are below the better one beyond the 95 % interval of the difference at {beyond}"
+        outcome = f"both are below the better one beyond the 95 % interval of the difference at {beyond}"
     elif most > 0.0:
-        said = (f"both are below the better one by {most:.3f} at most, and nowhere beyond the 95 % interval of the "
+        outcome = (f"both are below the better one by {most:.3f} at most, and nowhere beyond the 95 % interval of the "
                 "difference")
     else:
-        said = f"both are at no light below the better one: {-most:.3f} above it at least"
-    verdict = words.judged(not beyond, f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; {said}")
+        outcome = f"both are at no light below the better one: {-most:.3f} above it at least"
+    verdict = words.judged(not beyond, f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; {outcome}")
 
     def draw(canvas):
         axes = canvas.subplots()
@@ -168,15 +168,15 @@ def fusion(job: Job) -> Figure:
     return Figure("Camera and AirTouch together", table, caption, {"backup": verdict}, draw)
 
 
-def _loss(films: Sequence[Any], found: dict[str, Any], draws: int = 2000) -> tuple[float, float, float]:
+def _loss(films: Sequence[Any], detections: dict[str, Any], draws: int = 2000) -> tuple[float, float, float]:
     """Timed F1 of the better sense less that of the fusion, and its 95 % interval by bootstrap over flights.
 
     The terms of the timed F1 are additive over flights, so each bootstrap draw is a sum.
     """
     counts = {n: np.array([len(f.edges) + len(d) for f, d in zip(films, some, strict=True)])
-              for n, some in found.items()}
+              for n, some in detections.items()}
     credits = {n: np.array([0.5 * c * tuning.timed_f1([(f.edges, d)])
-                            for f, d, c in zip(films, some, counts[n], strict=True)]) for n, some in found.items()}
+                            for f, d, c in zip(films, some, counts[n], strict=True)]) for n, some in detections.items()}
 
     def f1(name: str, weights: np.ndarray) -> np.ndarray:
         return 2.0 * (weights @ credits[name]) / np.maximum(weights @ counts[name], 1)

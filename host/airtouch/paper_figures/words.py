@@ -21,15 +21,15 @@ def percent(value: float | None, interval: tuple[float, float] | list[float] | N
     """A fraction with its interval as `2.9 % [0, 6.9]`."""
     if value is None:
         return "-"
-    said = f"{100 * value:.1f} %"
-    return said if interval is None else f"{said} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
+    text = f"{100 * value:.1f} %"
+    return text if interval is None else f"{text} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
 
 
 def missed(row: Mapping[str, Any]) -> str:
     """`2.9 % of 174 missed [0, 6.9]`."""
     interval = row["intervals"]["missed"]
-    said = f"{percent(row['missed'])} of {row['edges']} missed"
-    return said if interval is None else f"{said} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
+    text = f"{percent(row['missed'])} of {row['edges']} missed"
+    return text if interval is None else f"{text} [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
 
 
 def score(row: Mapping[str, Any]) -> str:
@@ -52,9 +52,9 @@ def worse(first: dict, second: dict) -> bool:
                for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
 
 
-def judged(yes: bool, found: str) -> Verdict:
+def judged(yes: bool, text: str) -> Verdict:
     """The verdict "reproduced" or "not reproduced", with the figures behind it."""
-    return Verdict(REPRODUCED if yes else NOT_REPRODUCED, found)
+    return Verdict(REPRODUCED if yes else NOT_REPRODUCED, text)
 
 
 def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:

@@ -15,7 +15,7 @@ QUANTITIES = {"time": ("time", "t", "millis", "timestamp"),
               "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
               "amperes": ("current", "amperes", "i"), "stage": ("stage", "phase", "module")}
 MEASURED = ("time", "volts", "amperes")
-USUAL = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
+FACTORS = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
 WITHOUT_HEADER = {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3), "stage": (3, 1.0)}
 MOST_BAD = 0.05  #: fraction of unreadable lines up to which a log is read; serial ports lose characters
 MOST_V, MOST_A = 26.0, 3.2  #: V and A, the INA219's range
@@ -102,19 +102,19 @@ def _possible(row: list[float], columns: dict[str, tuple[int, float]]) -> bool:
 
 def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, float]]:
     """Quantity -> (column, factor to SI) from names like time_ms, "Bus Voltage (V)", current_mA."""
-    found: dict[str, tuple[int, float]] = {}
+    columns: dict[str, tuple[int, float]] = {}
     for at, name in enumerate(header):
         words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
         unit = next((w for w in words[1:][::-1] if w in UNITS), None)
         for quantity, known in QUANTITIES.items():
-            if quantity not in found and words and words[0] in known:
-                found[quantity] = (at, UNITS[unit] if unit else USUAL.get(words[0], 1.0))
+            if quantity not in columns and words and words[0] in known:
+                columns[quantity] = (at, UNITS[unit] if unit else FACTORS.get(words[0], 1.0))
                 break
-    missing = [q for q in ("time", "volts", "amperes") if q not in found]
+    missing = [q for q in ("time", "volts", "amperes") if q not in columns]
     if missing:
         raise AirTouchError(f"{source}:{line}: no column for {', '.join(missing)} in {', '.join(header)!r}; "
                             "name them time_ms, bus_V, current_mA")
-    return found
+    return columns
 
 
 def power(trace: Trace, where: np.ndarray | None = None) -> Power:
@@ -158,8 +158,8 @@ def canonical(name: str, known: Sequence[str]) -> str:
 def added(stages: dict[str, Power]) -> dict[str, tuple[float, float]]:
     """Stage -> (mW added to the stage before it, half width of the 95 % interval). The first stage counts in full."""
     result, before = {}, None
-    for name, found in stages.items():
-        half = found.half_mw if before is None else math.hypot(found.half_mw, before.half_mw)
-        result[name] = (found.mw - (before.mw if before else 0.0), half)
-        before = found
+    for name, power in stages.items():
+        half = power.half_mw if before is None else math.hypot(power.half_mw, before.half_mw)
+        result[name] = (power.mw - (before.mw if before else 0.0), half)
+        before = power
     return result

@@ -14,11 +14,11 @@ from airtouch.power.ina219 import Power, added
 
 #: stage -> the paper's figure, mW (Table 1), in the order in which stages are switched on
 PAPER_MW = {"baseline": 78.0, "FC-FE": 6.0, "CCS-FF": 2.0, "filter": 2.0, "network": 33.0}
-PAPER_TOTAL_MW = 121.0
+PAPER_TOTAL_MW = 121.0  #: mW, the total of Table 1
 NAMES = {"baseline": "Basic drone module power", "FC-FE": "Fluctuation Components Feature Extraction",
          "CCS-FF": "Cascaded Cross-Spectrum Feature Fusion", "filter": "Double Phase Physical Filter",
          "network": "Physical Knowledge-aided Network"}
-STEP_HZ = 100.0
+STEP_HZ = 100.0  #: steps of the detector a second
 #: folder of the instruction counts; only in a checkout
 BUDGETS = Path(__file__).resolve().parents[3] / "tests" / "emulation"
 
@@ -45,7 +45,7 @@ def table(stages: dict[str, Power]) -> str:
 #: crazyflie-firmware, src/modules/src/system.c, vApplicationIdleHook: sleeping "currently saves about 20mA". That is
 #: an average over a processor that also works; the high value assumes that it works half of the time.
 STM32_MA = (20.0, 40.0)
-STM32_HZ = 168e6
+STM32_HZ = 168e6  #: the STM32F405 of the Crazyflie 2.1 at full speed
 STM32_CPI = (1.0, 2.0)  #: cycles per instruction, low and high; assumed: flash waits, loads and divisions take several
 BATTERY_V = 3.7  #: V; the regulator is linear, so the battery's current equals the processor's
 #: J per instruction of one of the GAP8's eight cores, including its board: PULP-DroNet needs 64 mW with the cluster

@@ -148,11 +148,11 @@ def _held_band_power(channels: np.ndarray, p: Parameters) -> tuple[np.ndarray, n
     n, band = len(channels), (p.band_low_hz, p.band_high_hz)
     band_bins(p.sample_rate_hz, p.band_window, band)
     ends = window_ends(n, p.band_window, p.band_hop)
-    every = band_power(channels, sample_rate_hz=p.sample_rate_hz, window=p.band_window, band_hz=band)
+    powers = band_power(channels, sample_rate_hz=p.sample_rate_hz, window=p.band_window, band_hz=band)
     ready = np.zeros(n, dtype=bool)
     ready[ends] = True
     last = np.maximum.accumulate(np.where(ready, np.arange(n), -1)) if n else np.zeros(0, dtype=int)
-    return ready, np.where(last[:, None] >= 0, every[np.maximum(last, 0)], np.nan)
+    return ready, np.where(last[:, None] >= 0, powers[np.maximum(last, 0)], np.nan)
 
 
 def _since(event: np.ndarray) -> np.ndarray:

@@ -86,9 +86,9 @@ def motion_channels(
     thrust = config.vehicle.thrust(np.column_stack([m1, m2, m3, m4])).sum(axis=1)
     airborne = mixed[:, 3] > config.arm_pwm
     gravity = config.vehicle.gravity_mps2
-    usual, lagged, slow = _slow(mixed, thrust, airborne, config)
+    mean_thrust, lagged, slow = _slow(mixed, thrust, airborne, config)
     raw = np.column_stack([acc[:, :2], acc[:, 2] - gravity, rate, mixed - slow,
-                           acc[:, 2] - gravity * lagged / np.maximum(usual, config.least_thrust_n)])
+                           acc[:, 2] - gravity * lagged / np.maximum(mean_thrust, config.least_thrust_n)])
     scaled = np.clip(raw / np.array(config.scale), -config.limit, config.limit)
     return np.column_stack([scaled, np.zeros(n)]), airborne
 
@@ -101,9 +101,9 @@ def _slow(
     First-order means; until `settle_samples` in the air they follow at once.
     """
     n = len(mixed)
-    usual, lagged, slow = np.zeros(n), np.zeros(n), np.zeros((n, 4))
+    mean_thrust, lagged, slow = np.zeros(n), np.zeros(n), np.zeros((n, 4))
     if n == 0:
-        return usual, lagged, slow
+        return mean_thrust, lagged, slow
     state, behind, mean, flown = mixed[0].copy(), thrust[0], thrust[0], 0
     for t in range(n):
         flown = flown + 1 if airborne[t] else 0
@@ -111,5 +111,5 @@ def _slow(
         gain = 1.0 / config.slow_samples if flown > config.settle_samples else 1.0
         state += gain * (mixed[t] - state)
         mean += gain * (behind - mean)
-        usual[t], lagged[t], slow[t] = mean, behind, state
-    return usual, lagged, slow
+        mean_thrust[t], lagged[t], slow[t] = mean, behind, state
+    return mean_thrust, lagged, slow

@@ -124,10 +124,10 @@ def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
 
 def _robust(ax: Axes, *values: np.ndarray) -> None:
     """Set limits from the middle 99 % of the values, so that take-off and landing do not set the scale."""
-    every = np.concatenate([np.ravel(v) for v in values])
-    every = every[np.isfinite(every)]
-    if len(every):
-        low, high = np.percentile(every, [0.5, 99.5])
+    joined = np.concatenate([np.ravel(v) for v in values])
+    joined = joined[np.isfinite(joined)]
+    if len(joined):
+        low, high = np.percentile(joined, [0.5, 99.5])
         pad = 0.2 * max(high - low, 1e-6)
         ax.set_ylim(low - pad, high + pad)
 

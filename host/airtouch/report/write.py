@@ -59,10 +59,10 @@ def answer(name: str, table: Mapping[str, Any]) -> str:
         return (f"{name}: {table['detections']} edges detected on {table['flights']} flights; "
                 "there is no true edge to compare with.")
     error = table["mean_abs_error_m"]
-    found = "none was found" if error is None else f"the edges found are {error:.3f} m off on average"
+    errors = "none was found" if error is None else f"the edges found are {error:.3f} m off on average"
     return (f"{name} on {table['flights']} flights with {table['edges']} edges: "
             f"{table['missed_count']} missed ({table['missed']:.0%}), {table['false_count']} false "
-            f"({table['false_per_minute']:.1f} a minute), {found}.")
+            f"({table['false_per_minute']:.1f} a minute), {errors}.")
 
 
 def in_words(score: FlightScore) -> str:

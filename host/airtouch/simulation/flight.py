@@ -53,10 +53,10 @@ def choose(plan: FlightPlan, effects: Chosen = (), without: Sequence[str] = ()) 
     """The effects of one flight: those of the scenario, with `effects` replaced or added and `without` removed."""
     for name in without:
         registry.get(name)
-    added = registry.activate(effects)
-    named = {a.effect.name for a in added}
-    kept = [(name, values) for name, values in plan.effects if name not in named]
-    return [a for a in registry.activate([*kept, *added]) if a.effect.name not in without]
+    chosen = registry.activate(effects)
+    named = {a.effect.name for a in chosen}
+    others = [(name, values) for name, values in plan.effects if name not in named]
+    return [a for a in registry.activate([*others, *chosen]) if a.effect.name not in without]
 
 
 def refuse_off(plan: FlightPlan, without: Sequence[str]) -> None:

@@ -20,8 +20,9 @@ from airtouch.vehicle import RANGE_MODULES, Vehicle, check_firmware, numbers
 
 KEYS = {"name", "summary", "firmware", "range_module", "vehicle", "values", "world", "platform", "mission", "effects"}
 FIRMWARE_KEYS = ("firmware", "range_module")  #: fields of a vehicle that may stand outside [vehicle]
+#: x from, to, y from, to: walls out of the reach (4 m) of the ranging sensors
 DEFAULT_ROOM_M = (-10.0, 10.0, -10.0, 10.0)
-CIRCLE_CORNERS = 24
+CIRCLE_CORNERS = 24  #: a polygon of so many corners is within 0.9 % of the radius of its circle
 
 
 @dataclass(frozen=True)
@@ -130,14 +131,14 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
 def _platform(table: Mapping[str, Any], where: str) -> world.Platform:
     """A platform from its table: shape rectangle (size_m), circle (radius_m) or polygon (corners_m)."""
     shape = table.get("shape", "rectangle")
-    wanted = {"rectangle": {"size_m"}, "circle": {"radius_m"}, "polygon": {"corners_m"}}
-    if shape not in wanted:
-        raise AirTouchError(f"{where}: no shape {shape!r}; known: {', '.join(wanted)}")
-    wrong = set(table) - wanted[shape] - {"shape", "centre_m", "angle_deg", "top_m", "material"}
-    missing = (wanted[shape] | {"top_m"}) - set(table)
+    needed = {"rectangle": {"size_m"}, "circle": {"radius_m"}, "polygon": {"corners_m"}}
+    if shape not in needed:
+        raise AirTouchError(f"{where}: no shape {shape!r}; known: {', '.join(needed)}")
+    wrong = set(table) - needed[shape] - {"shape", "centre_m", "angle_deg", "top_m", "material"}
+    missing = (needed[shape] | {"top_m"}) - set(table)
     if wrong or missing:
-        said = f"does not take {', '.join(sorted(wrong))}" if wrong else f"needs {', '.join(sorted(missing))}"
-        raise AirTouchError(f"{where}: a {shape} {said}")
+        fault = f"does not take {', '.join(sorted(wrong))}" if wrong else f"needs {', '.join(sorted(missing))}"
+        raise AirTouchError(f"{where}: a {shape} {fault}")
     if table["top_m"] < 0.0:
         raise AirTouchError(f"{where}: its top is below the floor")
     if shape == "rectangle":

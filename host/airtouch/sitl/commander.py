@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.simulation.firmware import setpoint as c
 from airtouch.sitl.planner import Planner
 
-PERIOD_S = 0.01
+PERIOD_S = 0.01  #: of a set-point, s
 LEVEL_OUT_S, SHUT_DOWN_S = 0.5, 2.0  #: s without a new set-point until the drone levels out, and until its motors stop
 MOST_CLIMB_M = 0.5  #: m, largest distance of the integrated height set-point from the drone
 MOST_TILT_DEG = 30.0

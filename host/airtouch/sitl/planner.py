@@ -18,7 +18,7 @@ FORMATS = {SET_GROUP: "<B", TAKEOFF: "<Bff", LAND: "<Bff", STOP: "<B", GO_TO: "<
            TAKEOFF_2: "<Bff?f", LAND_2: "<Bff?f", TAKEOFF_V: "<Bf?f?f", LAND_V: "<Bf?f?f",
            SPIRAL: "<BBBfffff", GO_TO_2: "<BBBfffff"}
 IDLE, FLYING, LANDING, DISABLED = "idle", "flying", "landing", "disabled"
-LEAST_DURATION_S = 0.05
+LEAST_DURATION_S = 0.05  #: s; a shorter time is taken as this one
 #: value and derivatives of s^4 .. s^7 at s = 1, inverted
 _ENDS = np.linalg.inv([[1.0, 1.0, 1.0, 1.0], [4.0, 5.0, 6.0, 7.0], [12.0, 20.0, 30.0, 42.0],
                        [24.0, 60.0, 120.0, 210.0]])

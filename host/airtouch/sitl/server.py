@@ -88,8 +88,8 @@ class Server:
         """Close the port. `run` does so at its end."""
         self._socket.close()
 
-    def run(self, told: Callable[[str], None] = lambda _: None) -> None:
-        """Serve until `stop`. told: called with each line of the drone's console."""
+    def run(self, say: Callable[[str], None] = lambda _: None) -> None:
+        """Serve until `stop`. say: called with each line of the drone's console."""
         start = time.monotonic() - self.drone.now_s / self.speed
         try:
             while not self._stop.is_set():
@@ -105,16 +105,16 @@ class Server:
                     start += behind / self.speed
                     self.slept_s += behind
                 self._receive()
-                self.step(told)
+                self.step(say)
         finally:
             self.close()
             if self.recorder:
                 self.recorder.write()
 
-    def step(self, told: Callable[[str], None]) -> None:
+    def step(self, say: Callable[[str], None]) -> None:
         """One step of PERIOD_S: packets from the client, faults that begin, the firmware, packets to the client.
 
-        told: is given what the firmware printed, line by line.
+        say: is given what the firmware printed, line by line.
         """
         drone = self.drone
         self._exchange(drone.now_s)
@@ -123,7 +123,7 @@ class Server:
             if self.client:
                 self._down.put(packet, self.client, drone.now_s)
         for line in self.firmware.printed:
-            told(line)
+            say(line)
         if self.recorder:
             self.recorder.add(drone.row)
         self._exchange(drone.now_s)

@@ -1,8 +1,8 @@
 """How strong recorded edges are beside simulated ones, by height, and simulated edges made as strong.
 
 Simulated edges of high flights are too weak: 6.5 cm and more over the platform, the median of vertical acceleration and
-motor mean around an edge is about half of the recorded one (host/docs/twin-findings.md). A detector that has learnt weak edges
-is unsure of them.
+motor mean around an edge is about half of the recorded one (host/docs/twin-findings.md). A detector that has learnt
+weak edges is unsure of them.
 """
 
 from collections.abc import Sequence

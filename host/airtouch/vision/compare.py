@@ -38,17 +38,17 @@ def filmed(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper
            tell: Callable[[str], None] = lambda _: None) -> dict[str, list[list[Sight]]]:
     """What each way to an edge map sees in each film at one light; every frame is rendered once."""
     camera = Camera()
-    found: dict[str, list[list[Sight]]] = {name: [] for name in mappers}
+    sights: dict[str, list[list[Sight]]] = {name: [] for name in mappers}
     for number, shot in enumerate(films, start=1):
-        seen: dict[str, list[Sight]] = {name: [] for name in mappers}
+        of_film: dict[str, list[Sight]] = {name: [] for name in mappers}
         for time_s, image in frames(camera, shot, lux, seed):
             small = lines.binned(image)
             for name, mapper in mappers.items():
-                seen[name].append(sight(camera, shot, time_s, lines.strongest(mapper(small), camera)))
-        for name, some in seen.items():
-            found[name].append(some)
+                of_film[name].append(sight(camera, shot, time_s, lines.strongest(mapper(small), camera)))
+        for name, some in of_film.items():
+            sights[name].append(some)
         tell(f"{lux:g} lux: {number} of {len(films)} flights")
-    return found
+    return sights
 
 
 def threshold(films: Sequence[Film], sights: Sights) -> float:
@@ -65,15 +65,15 @@ def crossings(films: Sequence[Film], sights: Sights, least: float) -> list[list[
     return [detections(some, least, shot.speed_mps) for shot, some in zip(films, sights, strict=True)]
 
 
-def lag(films: Sequence[Film], found: Sequence[Sequence[Detection]]) -> float:
+def lag(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
     """The median lag of crossings, samples. The down range that tells the truth is itself some hundredths of a second
     late, the camera is not, so that it comes out negative."""
-    return tuning.lag((shot.edges, some) for shot, some in zip(films, found, strict=True)) / SAMPLE_PERIOD_S
+    return tuning.lag((shot.edges, some) for shot, some in zip(films, by_film, strict=True)) / SAMPLE_PERIOD_S
 
 
-def without_lag(found: Sequence[Sequence[Detection]], samples: float) -> list[list[Detection]]:
+def without_lag(by_film: Sequence[Sequence[Detection]], samples: float) -> list[list[Detection]]:
     """Crossings with a constant lag taken off, as that of every detector is."""
-    return [[replace(d, sample=round(d.sample - samples)) for d in some] for some in found]
+    return [[replace(d, sample=round(d.sample - samples)) for d in some] for some in by_film]
 
 
 def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
@@ -81,17 +81,17 @@ def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
     detector = registry.get(name)
     model = detector.load(None)
     late = detector.lag_s(model) / SAMPLE_PERIOD_S
-    found = []
+    by_film = []
     for shot in films:
         moved = [replace(d, sample=round(d.sample - late)) for d in detector.run(shot.log, model).edges]
-        found.append([d for d in moved if shot.first_s <= d.sample * SAMPLE_PERIOD_S <= shot.last_s])
-    return found
+        by_film.append([d for d in moved if shot.first_s <= d.sample * SAMPLE_PERIOD_S <= shot.last_s])
+    return by_film
 
 
-def scored(films: Sequence[Film], found: Sequence[Sequence[Detection]]) -> list[FlightScore]:
+def scored(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> list[FlightScore]:
     """One score a film: its edges, and the crossings that are none a minute of film."""
     scores = []
-    for shot, some in zip(films, found, strict=True):
+    for shot, some in zip(films, by_film, strict=True):
         filming = np.zeros(len(shot.log), bool)
         filming[int(shot.first_s / SAMPLE_PERIOD_S):int(shot.last_s / SAMPLE_PERIOD_S)] = True
         inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in some]
@@ -100,35 +100,35 @@ def scored(films: Sequence[Film], found: Sequence[Sequence[Detection]]) -> list[
     return scores
 
 
-def fused(seen: Sequence[Detection], felt_there: Sequence[Detection], fusion: Fusion) -> list[Detection]:
+def fused(by_camera: Sequence[Detection], by_airtouch: Sequence[Detection], fusion: Fusion) -> list[Detection]:
     """Crossings of both: pairs at a weighted time, single ones where the fusion takes them."""
-    pairs = match([d.sample for d in seen], [d.sample for d in felt_there], TOGETHER_S / SAMPLE_PERIOD_S)
-    joined = [Detection(round(fusion.share * seen[i].sample + (1.0 - fusion.share) * felt_there[j].sample),
-                        felt_there[j].kind) for i, j in pairs]
+    pairs = match([d.sample for d in by_camera], [d.sample for d in by_airtouch], TOGETHER_S / SAMPLE_PERIOD_S)
+    joined = [Detection(round(fusion.share * by_camera[i].sample + (1.0 - fusion.share) * by_airtouch[j].sample),
+                        by_airtouch[j].kind) for i, j in pairs]
     if fusion.camera_alone:
-        joined += [d for i, d in enumerate(seen) if i not in {i for i, _ in pairs}]
+        joined += [d for i, d in enumerate(by_camera) if i not in {i for i, _ in pairs}]
     if fusion.airtouch_alone:
-        joined += [d for j, d in enumerate(felt_there) if j not in {j for _, j in pairs}]
+        joined += [d for j, d in enumerate(by_airtouch) if j not in {j for _, j in pairs}]
     return sorted(joined, key=lambda d: d.sample)
 
 
-def choose_fusion(films: Sequence[Film], seen: Sequence[Sequence[Detection]], felt_there: Sequence[Sequence[Detection]],
-                  ) -> Fusion:
+def choose_fusion(films: Sequence[Film], by_camera: Sequence[Sequence[Detection]],
+                  by_airtouch: Sequence[Sequence[Detection]]) -> Fusion:
     """The fusion by the films to train on: the inverse squared errors as weights, and the best timed F1.
 
     An edge that both find is always joined; whether single edges of either count is chosen by the timed F1. With few
     films a weight chosen by the timed F1, too, follows single edges.
     """
-    camera, airtouch = (_squared_error(films, some) for some in (seen, felt_there))
+    camera, airtouch = (_squared_error(films, some) for some in (by_camera, by_airtouch))
     choices = [Fusion(airtouch / (camera + airtouch), camera_alone, airtouch_alone)
                for camera_alone in (True, False) for airtouch_alone in (True, False)]
     return max(choices, key=lambda f: tuning.timed_f1(
-        [(shot.edges, fused(a, b, f)) for shot, a, b in zip(films, seen, felt_there, strict=True)]))
+        [(shot.edges, fused(a, b, f)) for shot, a, b in zip(films, by_camera, by_airtouch, strict=True)]))
 
 
-def _squared_error(films: Sequence[Film], found: Sequence[Sequence[Detection]]) -> float:
+def _squared_error(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
     """Mean squared error of the edges found, samples squared, rounding included; the tolerance's where none is."""
     tolerance = TOLERANCE_S / SAMPLE_PERIOD_S
-    errors = [some[j].sample - shot.edges[i].sample for shot, some in zip(films, found, strict=True)
+    errors = [some[j].sample - shot.edges[i].sample for shot, some in zip(films, by_film, strict=True)
               for i, j in match([e.sample for e in shot.edges], [d.sample for d in some], tolerance)]
     return float(np.mean(np.square(errors))) + ROUNDING if errors else tolerance ** 2

@@ -94,9 +94,9 @@ def detections(sights: Sequence[Sight], threshold: float, speed_mps: float) -> l
             groups[-1].append(s)
         else:
             groups.append([s])
-    found = []
+    edges = []
     for group in groups:
         times = np.array([s.time_s + s.ahead_m / speed_mps for s in group])
         middle_s = float(np.average(times, weights=[s.strength for s in group]))
-        found.append(Detection(round(middle_s / SAMPLE_PERIOD_S), "edge"))
-    return sorted(found, key=lambda d: d.sample)
+        edges.append(Detection(round(middle_s / SAMPLE_PERIOD_S), "edge"))
+    return sorted(edges, key=lambda d: d.sample)

@@ -13,8 +13,8 @@ import numpy as np
 
 from airtouch.vision.camera import Camera, blur_px
 
-TILE_PX = 512
-BLUR_STEP_PX = 5.0
+TILE_PX = 512  #: pixels of a texture, repeated over the plane
+BLUR_STEP_PX = 5.0  #: pixels of motion blur between two rendered poses of an exposure
 FLOOR_M_PER_PX, TOP_M_PER_PX = 2.0e-3, 2.5e-4  #: of the textures, finer than a pixel sees
 
 
@@ -64,9 +64,9 @@ def _rays(camera: Camera) -> np.ndarray:
 
 def project(camera: Camera, pose: Pose, points_m: np.ndarray) -> np.ndarray:
     """(n, 2) pixels (x, y) of points (n, 3) in front of the camera."""
-    seen = (points_m - pose.place_m) @ pose.attitude
-    return np.column_stack([camera.centre[0] - camera.focal_px * seen[:, 0] / seen[:, 2],
-                            camera.centre[1] + camera.focal_px * seen[:, 1] / seen[:, 2]])
+    in_camera = (points_m - pose.place_m) @ pose.attitude
+    return np.column_stack([camera.centre[0] - camera.focal_px * in_camera[:, 0] / in_camera[:, 2],
+                            camera.centre[1] + camera.focal_px * in_camera[:, 1] / in_camera[:, 2]])
 
 
 def view(camera: Camera, pose: Pose, scene: Scene) -> np.ndarray:
@@ -115,8 +115,8 @@ def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> 
 def _sampled(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
     """The texture at places, bilinear, repeated; the mean where a ray meets nothing."""
     u, v = (_wrapped(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px)) for a in (x, y))
-    found = cv2.remap(tile, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-    return found if np.isfinite(x).all() else np.where(np.isfinite(x), found, tile.mean())
+    grey = cv2.remap(tile, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return grey if np.isfinite(x).all() else np.where(np.isfinite(x), grey, tile.mean())
 
 
 def _wrapped(place_px: np.ndarray) -> np.ndarray:

@@ -122,11 +122,11 @@ def build_keras(widths: tuple[int, int, int] = WIDTHS) -> "keras.Model":
 
 def weights_of_keras(model: "keras.Model") -> dict[str, np.ndarray]:
     """"NAME.kernel" and "NAME.bias" of every layer."""
-    found = {}
+    weights = {}
     for name in layers():
         kernel, bias = model.get_layer(name.replace(".", "_")).get_weights()
-        found[f"{name}.kernel"], found[f"{name}.bias"] = kernel, bias
-    return found
+        weights[f"{name}.kernel"], weights[f"{name}.bias"] = kernel, bias
+    return weights
 
 
 def _keras_smish(x):

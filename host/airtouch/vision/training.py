@@ -60,9 +60,9 @@ def train(name: str, images: np.ndarray, truth: np.ndarray, steps: int = STEPS, 
     import keras
     from keras import ops
 
-    def loss(wanted, logit):
-        each = ops.maximum(logit, 0.0) - logit * wanted + ops.log1p(ops.exp(-ops.abs(logit)))
-        return ops.mean(each * (1.0 + (EDGES_WEIGH - 1.0) * wanted))
+    def loss(goal, logit):
+        each = ops.maximum(logit, 0.0) - logit * goal + ops.log1p(ops.exp(-ops.abs(logit)))
+        return ops.mean(each * (1.0 + (EDGES_WEIGH - 1.0) * goal))
 
     model = teed.build_keras(SIZES[name])
     model.compile(keras.optimizers.Adam(PEAK_RATE), loss=loss)
@@ -89,8 +89,8 @@ def main() -> None:
             raise AirTouchError(f"{name}: training did not converge; another seed")
         seconds = time.process_time() - started
         path = Path(__file__).with_name(f"{name}.npz")
-        kept: dict[str, Any] = {k: w.astype(np.float16) for k, w in weights.items()}
-        np.savez_compressed(path, seconds=seconds, **kept)
+        halves: dict[str, Any] = {k: w.astype(np.float16) for k, w in weights.items()}
+        np.savez_compressed(path, seconds=seconds, **halves)
         print(f"{path.name}: {teed.parameters(SIZES[name]):,} parameters, {seconds:.0f} s of processor time",
               flush=True)
 

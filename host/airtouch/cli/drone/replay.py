@@ -63,8 +63,8 @@ def _in_words(edge) -> str:
     if edge.detected_sample is None:
         return f"{true}: missed"
     metres = "" if edge.error_m is None else f" = {edge.error_m:+.3f} m"
-    said = f"said at {edge.detected_sample / 100:.2f} s"
-    return f"{true}: {said}, error {edge.error_s:+.2f} s{metres} (+ is early)"
+    report = f"said at {edge.detected_sample / 100:.2f} s"
+    return f"{true}: {report}, error {edge.error_s:+.2f} s{metres} (+ is early)"
 
 
 class screen:

@@ -29,10 +29,10 @@ def find_flights() -> Path | None:
 
 def need_flights(folder: Path | None = None) -> Path:
     """The given folder, else that of `find_flights`. Raises a usage error if there is none."""
-    found = folder or find_flights()
-    if found is None:
+    chosen = folder or find_flights()
+    if chosen is None:
         raise click.UsageError("no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS")
-    return found
+    return chosen
 
 
 def _inner(folder: Path) -> Path:

@@ -16,7 +16,7 @@ from airtouch.crazyflie.connection.link import connect, disconnect
 from airtouch.crazyflie.connection.log_blocks import LogBlocks, Sample
 from airtouch.errors import AirTouchError
 
-CONNECT_S = 20.0
+CONNECT_S = 20.0  #: s to connect, fetching all tables included; assumed
 TAKEN_S = 0.1  #: s for the drone to correct a parameter that is out of range
 ECHO_CHANNEL, LINKCTRL = 0, 15
 KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
@@ -157,7 +157,7 @@ class Drone:
         if not self.lost.is_set():
             self.crazyflie.link_statistics.latency.ping()
 
-    def said(self) -> list[str]:
+    def console_lines(self) -> list[str]:
         """The complete lines of its console since the last call."""
         *lines, self._text = (self._text + "".join(drain(self._console))).split("\n")
         return [line.strip() for line in lines if line.strip()]

@@ -46,10 +46,10 @@ def default_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airtouch" / "drones"
 
 
-def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str], None]) -> Any:
+def connect(uri: str, cache: Path | None, patience_s: float, console: Callable[[str], None]) -> Any:
     """A connected cflib Crazyflie. A drone that keeps sending packets may take longer than `patience_s`.
 
-    told: called with pieces of the console's text, from the first on.
+    console: called with pieces of the console's text, from the first on.
     Raises AirTouchError if nobody answers.
     """
     cflib_or_error()
@@ -63,7 +63,7 @@ def connect(uri: str, cache: Path | None, patience_s: float, told: Callable[[str
         for failed in (cf.connection_failed, cf.connection_lost):
             failed.add_callback(lambda _, text, f=failure, done=done: (f.append(str(text)), done.set()))
         cf.packet_received.add_callback(lambda _, heard_s=heard_s: heard_s.append(time.monotonic()))
-        cf.console.receivedChar.add_callback(told)
+        cf.console.receivedChar.add_callback(console)
         cf.open_link(uri)
         if cf.link and uri.startswith("udp"):
             cf.link.needs_resending = True  # UDP loses packets; cflib assumes that it does not

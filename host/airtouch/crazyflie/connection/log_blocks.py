@@ -42,13 +42,13 @@ class Sample:
 class Attempt:
     """A request for a block under one number.
 
-    said: (command, error) of each refusal, None for the first packet of data.
+    answers: (command, error) of each refusal, None for the first packet of data.
     repeated: commands that were sent again.
     """
 
     block: Block
     config: Any  #: cflib's LogConfig
-    said: "queue.SimpleQueue[tuple[int, int] | None]" = field(default_factory=queue.SimpleQueue)
+    answers: "queue.SimpleQueue[tuple[int, int] | None]" = field(default_factory=queue.SimpleQueue)
     repeated: set[int] = field(default_factory=set)
     whole: bool = False
 
@@ -78,11 +78,11 @@ class LogBlocks:
         reason = f"log block {block.name}: the drone sends none of it; is the link good?"
         for _ in range(BLOCK_ATTEMPTS):
             attempt, until = self._ask(block), time.monotonic() + BLOCK_S
-            while attempt.said.empty() and time.monotonic() < until:
+            while attempt.answers.empty() and time.monotonic() < until:
                 time.sleep(0.01)
-            if attempt.said.empty():
+            if attempt.answers.empty():
                 continue
-            refusal = attempt.said.get()
+            refusal = attempt.answers.get()
             if refusal is None:
                 return
             command, code = refusal
@@ -103,7 +103,7 @@ class LogBlocks:
             if self._newest.get(block.name) is attempt:
                 if not attempt.whole:
                     attempt.whole = True
-                    attempt.said.put(None)
+                    attempt.answers.put(None)
                 self._samples.put(Sample(block.name, stamp, time.monotonic(), values))
 
         config.data_received_cb.add_callback(take)
@@ -132,7 +132,7 @@ class LogBlocks:
         attempt = self._attempts().get(number)
         if attempt is not None:
             if size < attempt.block.size:
-                attempt.said.put((CREATE_BLOCK, INCOMPLETE))
+                attempt.answers.put((CREATE_BLOCK, INCOMPLETE))
         elif time.monotonic() - self._deleted_s.get(number, float("-inf")) > FORGET_S:
             from cflib.crtp.crtpstack import CRTPPacket
 
@@ -149,7 +149,7 @@ class LogBlocks:
         attempt = self._attempts().get(number)
         if attempt is None or command in attempt.repeated and code in (errno.EEXIST, errno.E2BIG):
             return
-        attempt.said.put((command, code))
+        attempt.answers.put((command, code))
 
     def _on_repeat(self, packet: Any) -> None:
         if (packet.port, packet.channel) == (LOG_PORT, SETTINGS_CHANNEL) and len(packet.data) >= 2:

@@ -76,15 +76,15 @@ def with_gaps(times_ms: np.ndarray, columns: Mapping[str, np.ndarray], before_ms
     """
     before = times_ms[0] - period_ms if before_ms is None else before_ms
     newest = np.maximum.accumulate(np.r_[before, times_ms])[:-1]
-    kept = times_ms > newest
-    times = times_ms[kept]
+    later = times_ms > newest
+    times = times_ms[later]
     steps = np.diff(np.r_[before, times])
     missing = np.clip((steps + period_ms // 2) // period_ms - 1, 0, MOST_FILLED).astype(int)
     at = np.cumsum(missing + 1) - 1
     total = int(at[-1]) + 1 if len(at) else 0
     filled = {name: np.full(total, np.nan) for name in columns}
     for name, values in columns.items():
-        filled[name][at] = np.asarray(values, dtype=np.float64)[kept]
+        filled[name][at] = np.asarray(values, dtype=np.float64)[later]
     clock = np.full(total, -1, dtype=np.int64)
     clock[at] = times
     for i in np.flatnonzero(clock < 0)[::-1]:

@@ -144,9 +144,9 @@ def parse(data: bytes, source: str) -> BestModel:
     if "tflite" not in arrays or arrays["tflite"].dtype != np.uint8:
         raise AirTouchError(f"{source}: the TFLite file is missing from this model; {archive.REMEDY}")
     layers = [{part: arrays[f"int8.{layer.name}.{part}"] for part in _INT8} for layer in recipe.graph]
-    for made in layers:
-        positive = (made["scale"] > 0).all() and (made["weight_scale"] > 0).all()
-        if not positive or not ((made["zero_point"] >= -128) & (made["zero_point"] <= 127)).all():
+    for part in layers:
+        positive = (part["scale"] > 0).all() and (part["weight_scale"] > 0).all()
+        if not positive or not ((part["zero_point"] >= -128) & (part["zero_point"] <= 127)).all():
             raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
     int8 = network_of(layers, recipe)
     archive.check_range(int8.layers, source)

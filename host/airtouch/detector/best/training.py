@@ -110,20 +110,20 @@ def compiled_step(recipe: Recipe) -> tuple:
 def _save_state(path: Path, state: Sequence, rng: np.random.Generator, step: int) -> None:
     """Write the state of the training, whole or not at all."""
     arrays: dict[str, Any] = {f"v{i}": np.asarray(v) for i, v in enumerate(state)}
-    made = io.BytesIO()
-    np.savez(made, step=step, rng=json.dumps(rng.bit_generator.state), **arrays)
-    write_bytes(made.getvalue(), path, force=True)
+    buffer = io.BytesIO()
+    np.savez(buffer, step=step, rng=json.dumps(rng.bit_generator.state), **arrays)
+    write_bytes(buffer.getvalue(), path, force=True)
 
 
 def _resumed(path: Path, state: Sequence, rng: np.random.Generator) -> int:
     """Set variables and random numbers to the saved state; the next step, 0 without a saved state."""
     if not path.is_file():
         return 0
-    with np.load(path) as kept:
+    with np.load(path) as saved:
         for i, variable in enumerate(state):
-            variable.assign(kept[f"v{i}"])
-        rng.bit_generator.state = json.loads(str(kept["rng"]))
-        return int(kept["step"])
+            variable.assign(saved[f"v{i}"])
+        rng.bit_generator.state = json.loads(str(saved["rng"]))
+        return int(saved["step"])
 
 
 def _rank(model, masks: list, recipe: Recipe, position: float) -> None:  # noqa: ANN001

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-BINS = 10
+BINS = 10  #: of equal width; Guo et al. 2017 use 15
 
 
 def reliability(probability: np.ndarray, over: np.ndarray, bins: int = BINS) -> np.ndarray:

@@ -91,7 +91,7 @@ def felt(log: FlightLog, detector: str = "best", model: Path | None = None) -> T
                  getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
 
 
-def edge_map(log: FlightLog, found: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,
+def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,
              speed_mps: float | None = None, heading_deg: float = 0.0) -> EdgeMap:
     """The map of the edges that were found in a flight, by a detector with a lag or in the down range.
 
@@ -99,9 +99,9 @@ def edge_map(log: FlightLog, found: Sequence[Edge | Detection], *, lag_s: float 
     distances from the first edge mean something then, and that is the origin. Raises as `track` does.
     """
     xy, measured = track(log, speed_mps, heading_deg)
-    if not measured and found:
-        xy = xy - xy[max(round(found[0].sample - lag_s / PERIOD_S), 0)]
-    points = edge_points(xy, [e.sample for e in found], [e.kind for e in found], sigma_s=sigma_s, lag_s=lag_s)
+    if not measured and edges:
+        xy = xy - xy[max(round(edges[0].sample - lag_s / PERIOD_S), 0)]
+    points = edge_points(xy, [e.sample for e in edges], [e.kind for e in edges], sigma_s=sigma_s, lag_s=lag_s)
     position = "logged" if measured else "dead reckoning, from the first edge"
     return EdgeMap(xy, points, platforms(points), position, lag_s, sigma_s)
 
@@ -215,13 +215,13 @@ def _fit(group: list[tuple[EdgePoint, EdgePoint]]) -> Platform:
     return Platform(LineString(near), LineString(far), outline, rectangle, sigma)
 
 
-def geojson(points: list[EdgePoint], found: list[Platform], properties: dict) -> dict:
+def geojson(points: list[EdgePoint], platforms: list[Platform], properties: dict) -> dict:
     """A GeoJSON FeatureCollection in a local metric plane (not longitude and latitude; it says so)."""
     features = [
         _feature(Point(p.x_m, p.y_m), role="edge", kind=p.kind, sample=p.sample, sigma_m=round(p.sigma_m, 4))
         for p in points
     ]
-    for number, platform in enumerate(found):
+    for number, platform in enumerate(platforms):
         shared = {"platform": number, "sigma_m": round(platform.sigma_m, 4)}
         features += [_feature(line, role=role, **shared)
                      for role, line in (("near side", platform.near), ("far side", platform.far))

@@ -48,13 +48,13 @@ class Variant:
         windows = training.Windows(*(np.concatenate([getattr(p, name) for p in parts])
                                   for name in ("x", "over", "alert", "flight")))
         held = training.held_out(len(flights), seed)
-        kept = ~np.isin(windows.flight, held)
-        network, losses = training.fit_keras(windows.select(kept), windows.select(~kept), epochs, 0.0, BLOCK,
+        used = ~np.isin(windows.flight, held)
+        network, losses = training.fit_keras(windows.select(used), windows.select(~used), epochs, 0.0, BLOCK,
                                           self.df_lambda, lambda *_: None)
         converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
         unseen = [flights[i] for i in held] or list(flights)
         model = VariantModel(network, DEFAULT, 0.0, converged)
-        settings, lag, _ = paper.choose_decoding([self._seen(log, model) for log in unseen],
+        settings, lag, _ = paper.choose_decoding([self._decoding_inputs(log, model) for log in unseen],
                                                  [logs.true_edges(log) for log in unseen], self.physical_filter)
         return replace(model, settings=settings, lag_s=lag)
 
@@ -62,7 +62,7 @@ class Variant:
         """P(over a platform) and edges of one flight."""
         if model is None:
             raise AirTouchError("a variant has no shipped model")
-        probability, armed, alert = self._seen(log, model)
+        probability, armed, alert = self._decoding_inputs(log, model)
         return Trace(probability, decode(probability, armed, alert if self.physical_filter else None, model.settings))
 
     def load(self, path: Path | None) -> "VariantModel":
@@ -95,7 +95,7 @@ class Variant:
         over = over_platform(logs.true_edges(log), len(log)).astype(np.float32)
         return training.Windows(x, over[ends], alert[ends].astype(np.float32), np.full(len(ends), index, np.int32))
 
-    def _seen(self, log: FlightLog, model: "VariantModel") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _decoding_inputs(self, log: FlightLog, model: "VariantModel") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """P(over) (n,), armed (n,), alerts (n,)."""
         fused, armed, alert = self._features(log)
         x, ends = feature_windows(fused, self.rows)
@@ -129,6 +129,6 @@ def random_windows(flights: Sequence[FlightLog], *, seed: int = 0, epochs: int =
     weights, _ = training.fit_windows(windows.select(~test), nothing, epochs, 0.0, BLOCK, DEFAULT_LAMBDA,
                                    lambda *_: None)
     logits = infer_float(float_layers(weights), windows.x[test])
-    said, over = logits[:, 1] > logits[:, 0], windows.over[test] > 0.5
-    return {"balanced_accuracy": float(0.5 * (said[over].mean() + (~said[~over]).mean())),
+    predicted, over = logits[:, 1] > logits[:, 0], windows.over[test] > 0.5
+    return {"balanced_accuracy": float(0.5 * (predicted[over].mean() + (~predicted[~over]).mean())),
             "windows": int(test.sum()), "epochs": epochs}

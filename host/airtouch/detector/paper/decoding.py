@@ -51,12 +51,12 @@ def edge_codes(probability: np.ndarray, armed: np.ndarray, parameters: Parameter
 
 def detections(edge: np.ndarray, probability: np.ndarray) -> list[Detection]:
     """Edge codes (n,) of the pipeline, C or reference, as detections."""
-    found = []
+    edges = []
     for sample in np.flatnonzero(edge != NONE):
         entry = edge[sample] == ENTRY
         p = float(probability[sample])
-        found.append(Detection(int(sample), "entry" if entry else "exit", p if entry else 1.0 - p))
-    return found
+        edges.append(Detection(int(sample), "entry" if entry else "exit", p if entry else 1.0 - p))
+    return edges
 
 
 def physical_filter(edges: list[Detection], alert: np.ndarray, hold: int) -> list[Detection]:

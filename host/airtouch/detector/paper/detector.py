@@ -35,7 +35,7 @@ EXIT = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
 DWELL = (25, 50, 100, 150)
 HOLD = (25, 50, 100, 200)
 #: Of one flight: P(over a platform), armed, alert of FR-CFAR; (n,) each.
-Seen = tuple[np.ndarray, np.ndarray, np.ndarray]
+DecodingInputs = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def run(log: FlightLog, model: Model | None = None) -> Trace:
@@ -98,27 +98,27 @@ def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = T
 
 def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
     """The model with decoding settings and lag for the best timed F1 over the flights."""
-    seen: list[Seen] = []
+    inputs: list[DecodingInputs] = []
     for log in flights:
         features = flight_features(log)
-        seen.append((probability_of(model, features.fused), features.armed, features.alert))
-    settings, lag, score = choose_decoding(seen, [logs.true_edges(log) for log in flights], physical_filter)
+        inputs.append((probability_of(model, features.fused), features.armed, features.alert))
+    settings, lag, score = choose_decoding(inputs, [logs.true_edges(log) for log in flights], physical_filter)
     return replace(model, metadata={
         **model.metadata, "parameters": asdict(settings), "lag_s": lag, "physical_filter": physical_filter,
         "tuned_on": [os.path.basename(log.source) for log in flights], "tuned_timed_f1": score})
 
 
-def choose_decoding(seen: Sequence[Seen], truth: Sequence[Sequence[logs.Edge]], physical_filter: bool,
+def choose_decoding(inputs: Sequence[DecodingInputs], truth: Sequence[Sequence[logs.Edge]], physical_filter: bool,
                     ) -> tuple[Parameters, float, float]:
-    """(settings, lag in seconds, timed F1) of the best of `candidates`; truth: the true edges of each flight seen."""
+    """(settings, lag in seconds, timed F1) of the best of `candidates`; truth: the true edges of each flight."""
     @cache
     def unfiltered(entry: float, leave: float, dwell: int, i: int) -> list[Detection]:
         settings = replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell)
-        return decode(seen[i][0], seen[i][1], None, settings)
+        return decode(inputs[i][0], inputs[i][1], None, settings)
 
     def detect(settings: Parameters, i: int) -> list[Detection]:
         edges = unfiltered(settings.probability_entry, settings.probability_exit, settings.dwell_samples, i)
-        return filtered(edges, seen[i][2], settings.alert_hold) if physical_filter else edges
+        return filtered(edges, inputs[i][2], settings.alert_hold) if physical_filter else edges
 
     return tuning.choose(candidates(physical_filter), truth, detect)
 

@@ -24,8 +24,9 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.networks.int8_network import rolling_multiplications
 
 STRIDE = 4  #: samples to one answer: what the two pools make together, so that no row is computed in vain
-SPARSITY = 0.96
-CONV_SPARSITY = 0.8
+#: zeros of the first dense layer and of the second convolution: a step within 8 k instructions of a RISC-V core
+#: (host/docs/gap8-network.md)
+SPARSITY, CONV_SPARSITY = 0.96, 0.8
 
 
 def run(log: FlightLog, model: Model | None = None) -> Trace:

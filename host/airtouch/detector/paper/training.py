@@ -20,14 +20,14 @@ from airtouch.kernels.network import infer_float, infer_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 
-EPOCHS = 10
-BATCH = 128
-SPARSITY = 0.8
+EPOCHS = 10  #: the 200 of the paper overfit once flights are held out (host/docs/train.md)
+BATCH = 128  #: windows; the paper takes 32
+SPARSITY = 0.8  #: zeros of the first dense layer; what it costs: host/docs/ablations.md
 HELD_OUT = 0.15  #: share of the flights that decide when to stop
 PRUNED_BY = 0.6  #: share of the steps after which the zeros stay where they are
 PATIENCE = 3  #: epochs without a lower loss on the held-out flights
 PEAK_RATE = 2e-3  #: learning rate at the top of the one cycle
-BATCHES_A_CALL = 50
+BATCHES_A_CALL = 50  #: for speed: batches between two returns to Python
 STRIDE = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
 
 #: progress(stage, done, total, note), stage "features" (flights) or "epochs"
@@ -77,8 +77,8 @@ def train_paper(
     """
     _check(epochs, sparsity, block, df_lambda, conv_sparsity)
     use_tensorflow(seed)
-    told = progress or (lambda *_: None)
-    features = features_of(flights, told)
+    report = progress or (lambda *_: None)
+    features = features_of(flights, report)
     scale = None
     if fixed_scale:
         scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features, strict=True)])
@@ -89,7 +89,7 @@ def train_paper(
         raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
                             "give more flights")
     weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block,
-                               df_lambda, told, conv_sparsity)
+                               df_lambda, report, conv_sparsity)
     int8, tflite = quantisation.quantise(weights, windows.x[kept])
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
@@ -104,11 +104,11 @@ def train_paper(
 
 def features_of(flights: Sequence[FlightLog], progress: Progress) -> list[Features]:
     """The features of every flight."""
-    found = []
+    features = []
     for index, log in enumerate(flights):
-        found.append(flight_features(log))
+        features.append(flight_features(log))
         progress("features", index + 1, len(flights), os.path.basename(log.source))
-    return found
+    return features
 
 
 def training_windows(flights: Sequence[FlightLog], progress: Progress) -> Windows:
@@ -150,8 +150,8 @@ def accuracy(model: Model, windows: Windows) -> dict[str, float | int | None]:
     if len(np.unique(windows.over)) == 2:
         for name, logits in (("float", infer_float(model.float_layers, windows.x)),
                              ("int8", infer_int8(model, windows.x))):
-            said = logits[:, 1] > logits[:, 0]
-            result[name] = float(np.mean([np.mean(said[windows.over == c] == c) for c in (0.0, 1.0)]))
+            predicted = logits[:, 1] > logits[:, 0]
+            result[name] = float(np.mean([np.mean(predicted[windows.over == c] == c) for c in (0.0, 1.0)]))
     return result
 
 
@@ -207,9 +207,9 @@ def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block
                   steps_per_execution=min(BATCHES_A_CALL, batches))
     stopping = keras.callbacks.EarlyStopping(patience=PATIENCE, restore_best_weights=True,
                                              start_from_epoch=pruned_epochs)
-    told = keras.callbacks.LambdaCallback(
+    report = keras.callbacks.LambdaCallback(
         on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
-    callbacks += [told] + ([stopping] if len(held.x) else [])
+    callbacks += [report] + ([stopping] if len(held.x) else [])
     history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
                         shuffle=False,
                         validation_data=_batches(held, shuffle=False) if len(held.x) else None)

@@ -63,12 +63,12 @@ def parse(data: bytes, source: str) -> tuple[dict[str, np.ndarray], dict[str, An
     return arrays, metadata
 
 
-def check_kind(metadata: dict[str, Any], wanted: Mapping[str, Any], source: str) -> None:
-    """Take `wanted` keys out of the metadata; AirTouchError where one is another value."""
-    for key, value in wanted.items():
-        found = metadata.pop(key, None)
-        if found != value:
-            raise AirTouchError(f"{source}: model {key} {found!r}, this detector needs {value!r}; {REMEDY}")
+def check_kind(metadata: dict[str, Any], expected: Mapping[str, Any], source: str) -> None:
+    """Take `expected` keys out of the metadata; AirTouchError where one is another value."""
+    for key, value in expected.items():
+        actual = metadata.pop(key, None)
+        if actual != value:
+            raise AirTouchError(f"{source}: model {key} {actual!r}, this detector needs {value!r}; {REMEDY}")
 
 
 def check_arrays(arrays: Mapping[str, np.ndarray], shapes: Shapes, source: str) -> None:

@@ -57,9 +57,9 @@ def check(model: Exportable, folder: Path, name: str = "") -> None:
         lines = text.splitlines()
         if len(lines) < 2 or not lines[0].startswith(MARK) or not lines[1].startswith(_DIGEST):
             raise AirTouchError(f"{path}: foreign, not written by `airtouch export`; {again}")
-        found = lines[1].removeprefix(_DIGEST)
-        if found != model.digest:
-            raise AirTouchError(f"{path}: stale or foreign, made from model {found[:12]}, "
+        digest = lines[1].removeprefix(_DIGEST)
+        if digest != model.digest:
+            raise AirTouchError(f"{path}: stale or foreign, made from model {digest[:12]}, "
                                 f"the current one is {model.digest[:12]}; {again}")
         if text != expected:
             raise AirTouchError(f"{path}: made from this model, but edited since, or written by another "

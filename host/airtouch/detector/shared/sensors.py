@@ -20,7 +20,7 @@ FLYING_PWM = 40000.0  #: what missing motors read in the air; their channels are
 #: rad/s, rms change of the rates from sample to sample over FLYING_WINDOW samples, above which the drone flies: of
 #: 49,979 samples on the ground none reach 0.0127, of 431,415 in the air none fall below 0.0184 (the authors' flights).
 FLYING_CHANGE_RADPS = 0.015
-FLYING_WINDOW = 50
+FLYING_WINDOW = 50  #: samples, half a second
 
 
 @dataclass(frozen=True)

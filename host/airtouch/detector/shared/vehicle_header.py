@@ -66,11 +66,11 @@ def check(vehicle: Vehicle, folder: Path) -> Path:
     """The header's path; AirTouchError unless it is what the vehicle exports to."""
     path = folder / f"{vehicle.name}.h"
     try:
-        found = path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
-        found, reason = "", f"cannot be read ({error.strerror})"
+        text, reason = "", f"cannot be read ({error.strerror})"
     else:
         reason = "stale, edited, or of another version"
-    if found != render(vehicle):
+    if text != render(vehicle):
         raise AirTouchError(f"{path}: {reason}; run `airtouch export --vehicle {vehicle.name} --force`")
     return path

@@ -112,30 +112,30 @@ def _duration(clock: np.ndarray, samples: int, period: float) -> float:
     return float(timed[-1] - timed[0]) if len(timed) else max(samples - 1, 0) * period
 
 
-def _in_words(log: FlightLog, found: dict[str, Any], phases: list[Segment], period: float | None) -> list[str]:
+def _in_words(log: FlightLog, faults: dict[str, Any], phases: list[Segment], period: float | None) -> list[str]:
     words = []
     if nothing_logged(log):
         return ["nothing was logged: every value of every channel is missing"]
-    if found["gaps"]:
-        lost = sum(gap.lost for gap in found["gaps"])
-        longest = max(gap.seconds for gap in found["gaps"])
-        words.append(f"{lost} samples lost in {len(found['gaps'])} gaps, the longest {longest:.2f} s")
-    if found["clock_repeats"]:
-        words.append(f"the clock stands still {found['clock_repeats']} times")
-    if found["clock_backwards"]:
-        words.append(f"the clock runs backwards {found['clock_backwards']} times")
+    if faults["gaps"]:
+        lost = sum(gap.lost for gap in faults["gaps"])
+        longest = max(gap.seconds for gap in faults["gaps"])
+        words.append(f"{lost} samples lost in {len(faults['gaps'])} gaps, the longest {longest:.2f} s")
+    if faults["clock_repeats"]:
+        words.append(f"the clock stands still {faults['clock_repeats']} times")
+    if faults["clock_backwards"]:
+        words.append(f"the clock runs backwards {faults['clock_backwards']} times")
     if log.has("t_s") and period is None and len(log) > 1:
         words.append("the clock does not run, or not in seconds")
-    for name, count in found["missing"].items():
+    for name, count in faults["missing"].items():
         words.append(f"{name}: {count} of {len(log)} samples missing")
-    words += [f"{b} repeats {a}" for a, b in found["duplicated"]]
-    for name, start, stop in found["stuck"]:
+    words += [f"{b} repeats {a}" for a, b in faults["duplicated"]]
+    for name, start, stop in faults["stuck"]:
         whole = stop - start == len(log)
         place = f"{name} is stuck from sample {start} to {stop}"
         words.append(f"{name} never changes" if whole else place)
-    for name, count in found["saturated"].items():
+    for name, count in faults["saturated"].items():
         words.append(f"{name}: {count} samples at the end of its scale")
-    for name, at in found["spikes"].items():
+    for name, at in faults["spikes"].items():
         words.append(f"{name}: {len(at)} isolated spikes, first at sample {at[0]}")
     in_air = sum(phase.stop - phase.start for phase in phases if phase.kind != "ground") * sample_period(log)
     if not in_air:

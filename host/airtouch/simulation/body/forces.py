@@ -65,9 +65,9 @@ def _fill(plant, state, ground, hover_speed):
         s[at.ACCELERATION + i] = slope[3 + i]
         s[at.POSITION + i] = pose[i]
     matrix(q, s, at.ROTATION)
-    found, lowest = _common_surface(plant, pose, s, ground), 1e9
+    below_all, lowest = _common_surface(plant, pose, s, ground), 1e9
     for i in range(4):
-        lowest = min(lowest, _rotor(plant, state, ground, found, i))
+        lowest = min(lowest, _rotor(plant, state, ground, below_all, i))
     s[at.HEIGHT] = lowest
 
 
@@ -82,16 +82,19 @@ def _common_surface(plant, pose, s, ground):
 
 
 @inlined
-def _rotor(plant, state, ground, found, i):
-    """The signals of rotor i; found: row of the surface below all, or world.NONE. Its height over what is below, m."""
+def _rotor(plant, state, ground, below_all, i):
+    """The signals of rotor i; below_all: row of the surface below all rotors, or world.NONE.
+
+    Returns its height over what is below, m.
+    """
     s, pose, speed, r = state.forces.signals, state.forces.state, state.forces.rotor_speed[i], at.ROTATION
     x, y = plant.rotor_x[i] - plant.com[0], plant.rotor_y[i] - plant.com[1]
     s[at.ROTOR_X + i], s[at.ROTOR_Y + i] = x, y
     s[at.ROTOR_SPEED + i] = speed
     s[at.THRUST + i] = plant.thrust_per_speed2 * speed * speed * state.body.gain[i]
     z = pose[2] + s[r + 6] * x + s[r + 7] * y
-    lower, upper, cover = found, found, 0.0
-    if found == world.NONE:
+    lower, upper, cover = below_all, below_all, 0.0
+    if below_all == world.NONE:
         lower, upper, cover = world.below(ground, pose[0] + s[r] * x + s[r + 1] * y,
                                           pose[1] + s[r + 3] * x + s[r + 4] * y, z, plant.rotor_radius)
     surface = ground.surface

@@ -12,7 +12,7 @@ from airtouch.simulation.sensors import filters
 
 _F = np.float64
 DELAY_ROWS = 64  #: of the delay line, a power of two: delays of up to 63 physics steps
-TURN = 2.0 * math.pi
+TURN = 2.0 * math.pi  #: rad
 STATE = np.dtype([
     ("pwm", _F, (4,)),  # commands, 0..65535
     ("delay_line", _F, (DELAY_ROWS, 4)),  # the last of them, one row a step

@@ -50,7 +50,7 @@ def unregister(name: str) -> None:
     get(name)
     del EFFECTS[name]
     _SOURCE.pop(name, None)
-    for key in [k for k, found in _LOADED.items() if any(e.name == name for e in found)]:
+    for key in [k for k, loaded in _LOADED.items() if any(e.name == name for e in loaded)]:
         del _LOADED[key]
 
 
@@ -93,11 +93,11 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
     name, _, rest = text.partition(":")
     effect = get(name.strip())
     units = {p.name: p.unit for p in effect.parameters}
-    given: dict[str, float | str] = {}
+    chosen: dict[str, float | str] = {}
     for part in filter(None, (p.strip() for p in rest.split(","))):
         key, equals, quantity = (piece.strip() for piece in part.partition("="))
         if key == "preset" and equals:
-            given[key] = quantity
+            chosen[key] = quantity
             continue
         match = _QUANTITY.match(quantity)
         if not equals or not match:
@@ -109,17 +109,17 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
         if unit not in (("",) if expected == "1" else (expected, expected.removeprefix("1"))):  # 0.3/s is 0.3 1/s
             want = "no unit" if expected == "1" else f"the unit {units[key]}"
             raise AirTouchError(f"{effect.name}: {key}={quantity} needs {want}")
-        given[key] = float(match.group(1))
-    return effect.name, effect.values(given)
+        chosen[key] = float(match.group(1))
+    return effect.name, effect.values(chosen)
 
 
 def load_file(path: str | Path) -> list[Effect]:
     """Register every `Effect` that a Python file defines at its top level, and return them."""
     if not Path(path).is_file():
         raise AirTouchError(f"{path}: no such file of effects")
-    found = load_text(Path(path).read_text(encoding="utf-8"), str(path))
-    _SOURCE.update(dict.fromkeys((e.name for e in found), str(path)))
-    return found
+    loaded = load_text(Path(path).read_text(encoding="utf-8"), str(path))
+    _SOURCE.update(dict.fromkeys((e.name for e in loaded), str(path)))
+    return loaded
 
 
 def load_text(text: str, source: str = "effect file") -> list[Effect]:
@@ -136,10 +136,10 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
     except Exception as error:
         raise AirTouchError(f"{source}{_line_of(error, source)}: {type(error).__name__}: "
                             f"{str(error).splitlines()[0]}") from None
-    found = [v for v in scope.values() if isinstance(v, Effect)]
-    if not found:
+    defined = [v for v in scope.values() if isinstance(v, Effect)]
+    if not defined:
         raise AirTouchError(f"{source}: defines no Effect")
-    _LOADED[key] = [register(e) for e in found]
+    _LOADED[key] = [register(e) for e in defined]
     return _LOADED[key]
 
 

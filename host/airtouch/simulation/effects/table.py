@@ -58,10 +58,10 @@ def updated(text: str) -> str:
     return _between(_between(text, BEGIN, END, table()), BEGIN_NAMES, END_NAMES, names_table())
 
 
-def _between(text: str, begin: str, end: str, made: str) -> str:
+def _between(text: str, begin: str, end: str, middle: str) -> str:
     before, _, rest = text.partition(begin)
     _, _, after = rest.partition(end)
-    return f"{before}{begin}\n{made}{end}{after}"
+    return f"{before}{begin}\n{middle}{end}{after}"
 
 
 if __name__ == "__main__":

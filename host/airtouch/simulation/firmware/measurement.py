@@ -44,13 +44,13 @@ def correct_flow(settings, est, reading):
     s = settings.flow
     k = reading.dt * s.pixels / s.aperture_rad
     height = max(est.x[2], s.least_height_m)  # of both updates: taken before the first
-    seen = k * est.r[2, 2] / height
+    counts_per_mps = k * est.r[2, 2] / height
     ahead, aside, std = est.v[0], est.v[1], reading.std / s.counts_per_pixel
     turn_x, turn_y = k * est.gyro[0], k * est.gyro[1]
-    error = reading.forward / s.counts_per_pixel - seen * ahead + turn_y
-    _update(est, Measurement(Z, -seen * ahead / height, VX, seen, error, std))
-    error = reading.left / s.counts_per_pixel - seen * aside - turn_x
-    _update(est, Measurement(Z, -seen * aside / height, VY, seen, error, std))
+    error = reading.forward / s.counts_per_pixel - counts_per_mps * ahead + turn_y
+    _update(est, Measurement(Z, -counts_per_mps * ahead / height, VX, counts_per_mps, error, std))
+    error = reading.left / s.counts_per_pixel - counts_per_mps * aside - turn_x
+    _update(est, Measurement(Z, -counts_per_mps * aside / height, VY, counts_per_mps, error, std))
 
 
 @jit

@@ -2,8 +2,8 @@
 
 from airtouch.simulation.compiled import jit
 
-MOST = 65535.0
-MOST_TURN = 32767.0
+MOST = 65535.0  #: the firmware's largest motor command, UINT16_MAX
+MOST_TURN = 32767.0  #: its largest roll, pitch or yaw command, INT16_MAX
 
 
 @jit

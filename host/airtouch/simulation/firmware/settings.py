@@ -144,15 +144,15 @@ def parse(text: str, source: str) -> np.ndarray:
     table.pop("summary", None)
     if base is not None and not (isinstance(base, str) and base != source):
         raise AirTouchError(f"{source}: base must name another firmware")
-    made = load(base) if base else np.zeros(1, DTYPE)
+    rows = load(base) if base else np.zeros(1, DTYPE)
     unknown = sorted(set(table) - set(KEYS) - {"loops"})
     if unknown:
         raise AirTouchError(f"{source}: unknown section {', '.join(unknown)}; known: loops, {', '.join(KEYS)}")
-    row = made[0]
-    for section, given in table.items():
-        if not isinstance(given, Mapping):
+    row = rows[0]
+    for section, keys in table.items():
+        if not isinstance(keys, Mapping):
             raise AirTouchError(f"{source}: [{section}] must be a table")
-        for key, value in given.items():
+        for key, value in keys.items():
             if section == "loops":
                 _loop(row["loops"], key, value, source)
             else:
@@ -164,7 +164,7 @@ def parse(text: str, source: str) -> np.ndarray:
         if missing:
             raise AirTouchError(f"{source}: missing {', '.join(sorted(missing))} (or a base)")
     _check(row, source)
-    return made
+    return rows
 
 
 def _loop(loops: np.ndarray, key: str, value: Any, source: str) -> None:

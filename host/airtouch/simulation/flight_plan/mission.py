@@ -10,7 +10,7 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation.firmware import setpoint as c
 from airtouch.simulation.flight_plan.world import NONE, World, first_below, top_at
 
-RATE_HZ = 100
+RATE_HZ = 100  #: rows of set-points a second, as a client sends them
 MAX_SPEED_MPS = 1.0  #: the firmware's own limit (PID_POS_VEL_X_MAX)
 KEYS = {
     "wait": {"time_s"}, "take-off": {"height_m", "time_s"}, "hover": {"time_s", "pulse_mps", "every_s"},
@@ -19,7 +19,7 @@ KEYS = {
 }
 NEEDED = {"take-off": {"height_m"}, "hover": {"time_s"}, "wait": {"time_s"}, "go": {"speed_mps"},
           "zigzag": {"size_m", "spacing_m", "speed_mps"}}
-MAX_FLIGHT_S = 3600.0
+MAX_FLIGHT_S = 3600.0  #: a longer time is a typing error; a battery lasts 7 minutes
 PULSE_ROWS = 2  #: set-point rows of a velocity pulse in hover: 20 ms, as of the authors' pilot program
 
 
@@ -79,8 +79,8 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
         wrong = set(step) - KEYS[kind] - {"do"}
         missing = NEEDED.get(kind, set()) - set(step)
         if wrong or missing:
-            said, keys = ("does not take", wrong) if wrong else ("needs", missing)
-            raise AirTouchError(f"{place}: {kind} {said} {', '.join(sorted(keys))}")
+            fault, keys = ("does not take", wrong) if wrong else ("needs", missing)
+            raise AirTouchError(f"{place}: {kind} {fault} {', '.join(sorted(keys))}")
         for key in ("time_s", "speed_mps", "spacing_m"):
             if key in step and not 0.0 < float(step[key]) < MAX_FLIGHT_S:
                 raise AirTouchError(f"{place}: {key} = {step[key]} must be positive")

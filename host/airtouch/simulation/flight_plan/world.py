@@ -127,7 +127,7 @@ def common(world, x, y, low, high, reach):
 
     NONE where an edge, or a platform between the two heights, sets discs apart.
     """
-    found = len(world.first) - 1
+    surface_row = len(world.first) - 1
     for k in range(len(world.first) - 1):
         if world.surface[k, TOP] > high + ABOVE_M:
             break
@@ -137,8 +137,8 @@ def common(world, x, y, low, high, reach):
         if depth > -reach:
             if depth < reach or world.surface[k, TOP] > low + ABOVE_M:
                 return NONE
-            found = k
-    return found
+            surface_row = k
+    return surface_row
 
 
 @jit

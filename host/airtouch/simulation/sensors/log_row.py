@@ -3,7 +3,7 @@
 from airtouch.simulation.body.rotation import euler
 from airtouch.simulation.compiled import jit
 
-RPM_OF_RADPS = 9.549296585513721
+RPM_OF_RADPS = 9.549296585513721  #: 30 / pi
 (T, ACC, GYRO, PWM, DOWN, WALLS, VBAT, POSITION, VELOCITY, ANGLES, RPM, ACC_WORLD, COLUMNS) = (
     0, 1, 4, 7, 11, 12, 16, 17, 20, 23, 26, 30, 33)  #: first place of each; COLUMNS: length of a row
 

@@ -17,7 +17,7 @@ RANGES, FLOWS = 16, 64  #: readings that the delay lines hold
 MAX_RANGE_M = 4.0  #: beyond it a time-of-flight sensor says "invalid"
 CONE_COVER = 0.5  #: the down range sees the higher surface once it fills this share of the spot
 CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees carries most of the light)
-LEAST_SPOT_M = 0.002
+LEAST_SPOT_M = 0.002  #: radius of the spot where the sensor stands on the ground, so that shares are defined
 #: share of the new surface in a reading that saw two: where it is more than this, a reading beyond an edge overshoots
 OVERSHOOT_SHARE = 0.5
 LONG_AGO_S = 1000.0  #: since the last change below, at the start of a flight

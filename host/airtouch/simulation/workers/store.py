@@ -63,14 +63,14 @@ def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
 def failures(folder: Path) -> list[dict[str, Any]]:
     """Flights that diverged, by number; a line cut short by a kill is skipped."""
     path = folder / FAILED
-    found = {}
+    entries = {}
     for line in path.read_text().splitlines() if path.is_file() else []:
         try:
             entry = json.loads(line)
         except json.JSONDecodeError:
             continue
-        found[entry["flight"]] = entry
-    return [found[n] for n in sorted(found)]
+        entries[entry["flight"]] = entry
+    return [entries[n] for n in sorted(entries)]
 
 
 def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | None:

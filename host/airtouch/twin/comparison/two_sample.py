@@ -22,7 +22,7 @@ USED = ch.DOWN  #: number of channels that the classifier gets: all except the d
 FOLDS = 5
 STEPS = 255  #: bins of each feature, scikit-learn's maximum
 REPLICATES = 500  #: draws of the bootstrap
-LEVEL = 0.95
+LEVEL = 0.95  #: of the intervals, by bootstrap over flights
 FEWEST = 4  #: least number of flights of each kind in a phase
 
 

@@ -81,15 +81,15 @@ def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, f
     out.mkdir(parents=True, exist_ok=True)
     workers = workers or available_cores()
     aim, levers, asked = _asked(recorded, vehicle, flights, seed)
-    with bar("fitting") as told:
+    with bar("fitting") as report:
         state = fit.fit(aim, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
                         fixed=lever_set.FIXED, kept=out / FIT,
-                        progress=lambda done, total, now: told(done, total, f"misfit {fit.total(now):.2f}"))
+                        progress=lambda done, total, now: report(done, total, f"misfit {fit.total(now):.2f}"))
     if state.refined is None:
-        with bar("edges") as told:
+        with bar("edges") as report:
             state.refined = edge_fit.refine(
                 aim, vehicle, levers, fit.best(state), flights=edge_fit.share(flights), seed=seed, workers=workers,
-                fixed=lever_set.FIXED, progress=lambda done, total: told(done, total, "")).values
+                fixed=lever_set.FIXED, progress=lambda done, total: report(done, total, "")).values
         fit.save(out / FIT, state, asked)
     files.write(out, vehicle, levers, state.refined, recorded.courses, lever_set.FIXED, force=True)
     return Calibrated(aim, levers, state.refined, state.history)

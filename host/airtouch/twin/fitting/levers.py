@@ -145,8 +145,8 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
 
     spread: write levers with a spread as ranges. Raises AirTouchError for a lever of an unknown effect or parameter.
     """
-    out: dict[str, Any] = {name: dict(given) if isinstance(given, Mapping) else list(given)
-                           for name, given in (fixed or {}).items()}
+    out: dict[str, Any] = {name: dict(settings) if isinstance(settings, Mapping) else list(settings)
+                           for name, settings in (fixed or {}).items()}
     trims = np.zeros(4)
     width = 0.0
     for lever, value in zip(levers, values, strict=True):
@@ -155,9 +155,9 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
             width = max(width, lever.spread or 0.0)
         elif lever.of not in (VEHICLE, MISSION):
             out.setdefault(lever.of, {})[lever.key] = _node(lever, float(value), spread)
-    for name, given in out.items():
+    for name, settings in out.items():
         known = {p.name for p in registry.get(name).parameters} | {"preset"}
-        for one in given if isinstance(given, list) else [given]:
+        for one in settings if isinstance(settings, list) else [settings]:
             if set(one) - known:
                 raise AirTouchError(f"levers: {name} has no parameter {', '.join(sorted(set(one) - known))}")
     if any(lever.of == "trim" for lever in levers):

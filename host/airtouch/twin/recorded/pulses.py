@@ -29,7 +29,7 @@ def period(log: FlightLog, start: int, stop: int) -> float:
         return 0.0
     jumps = np.clip(jumps / size, -CLIP, CLIP)
     sample = np.arange(len(jumps))
-    spread, best, found = jumps.std(), CLEAR, 0.0
+    spread, best, best_s = jumps.std(), CLEAR, 0.0
     for seconds in PERIODS_S:
         samples = seconds * RATE_HZ
         if len(jumps) < LEAST_PULSES * samples:
@@ -38,5 +38,5 @@ def period(log: FlightLog, start: int, stop: int) -> float:
         mean = np.bincount(place, jumps)[:int(samples)] / np.bincount(place)[:int(samples)]
         score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / spread
         if score > best:
-            best, found = score, float(seconds)
-    return round(found, 3)
+            best, best_s = score, float(seconds)
+    return round(best_s, 3)

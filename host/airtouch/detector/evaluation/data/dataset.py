@@ -73,7 +73,7 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
     what does not exist and for a folder without flights.
     """
     manifests: dict[Path, dict[str, Condition]] = {}
-    found: dict[Path, FlightFile] = {}
+    members: dict[Path, FlightFile] = {}
     for path in map(Path, paths):
         if not path.exists():
             raise AirTouchError(f"{path}: no such file or folder")
@@ -89,14 +89,14 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
                 condition = replace(condition, day=day_of(file))
             if condition.speed_mps is None and speed_mps is not None:
                 condition = replace(condition, speed_mps=speed_mps)
-            found.setdefault(file.resolve(), FlightFile(file, condition))
-    return list(found.values())
+            members.setdefault(file.resolve(), FlightFile(file, condition))
+    return list(members.values())
 
 
 def day_of(path: Path) -> str | None:
     """The day in a file's name, four digits before four of the time (`imu_data_0126-1906`), or None."""
-    found = re.search(r"(\d{4})-\d{4}", path.name)
-    return found.group(1) if found else None
+    match = re.search(r"(\d{4})-\d{4}", path.name)
+    return match.group(1) if match else None
 
 
 def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:

@@ -78,7 +78,7 @@ def spread(files: list[FlightFile], most: int) -> list[FlightFile]:
 
 def readable(files: Sequence[FlightFile]) -> tuple[list[FlightLog], list[tuple[str, str]]]:
     """Logs to train on, and what cannot be used with the reason. Raises AirTouchError where none can."""
-    found, left_out = readable_flights(files)
-    if not found:
+    readable_by_path, left_out = readable_flights(files)
+    if not readable_by_path:
         raise AirTouchError(f"no flight to train on; the first was left out because: {left_out[0][1]}")
-    return list(found.values()), left_out
+    return list(readable_by_path.values()), left_out

@@ -32,27 +32,27 @@ def training_flights(
     """
     if count < 1 or seed < 0:
         raise AirTouchError("simulated flights: at least one, with seed 0 or more")
-    told = progress or (lambda *_: None)
+    report = progress or (lambda *_: None)
     scene = name if isinstance(name, Scenario) else scenario.load(name)
     on = list(dict.fromkeys(effect for effect, _ in scenario.draw_flight(scene, seed, 0).effects))
     choose(scenario.draw_flight(scene, seed, 0), (), without)  # an unknown effect is named
     absent = [effect for effect in without if effect not in on]
     if absent:
         raise AirTouchError(f"{absent[0]} is off in {scene.name} already; on are: {', '.join(on) or 'none'}")
-    kept: list[FlightLog] = []
+    usable: list[FlightLog] = []
     left_out = 0
     for flown in batch.flights(scene, range(SPARE * count), vehicle=vehicle, without=without, seed=seed):
         if isinstance(flown, FlightLog) and _usable(flown):
-            kept.append(flown)
-            told("simulated flights", len(kept), count, "")
+            usable.append(flown)
+            report("simulated flights", len(usable), count, "")
         else:
             left_out += 1
-        if len(kept) == count:
+        if len(usable) == count:
             break
-    if len(kept) < count:
-        raise AirTouchError(f"{scene.name}: only {len(kept)} of {SPARE * count} flights ended well and "
+    if len(usable) < count:
+        raise AirTouchError(f"{scene.name}: only {len(usable)} of {SPARE * count} flights ended well and "
                             "crossed an edge; choose another scenario")
-    return kept, {"scenario": scene.name, "flights": count, "seed": seed, "left_out": left_out,
+    return usable, {"scenario": scene.name, "flights": count, "seed": seed, "left_out": left_out,
                   "effects": [effect for effect in on if effect not in without], "without": list(without)}
 
 
