@@ -22,50 +22,23 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-import tomllib
 import zipfile
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-FUZZ = ROOT / "tests" / "fuzz"
+from fuzz_build import BUILD, FUZZ, LONG, ROOT, build, engine, product_sources, targets
+
 SEEDS = FUZZ / "seeds"
-BUILD = ROOT / "build" / "fuzz"
-SANITIZERS = "address,undefined,float-cast-overflow,float-divide-by-zero"
-FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-fno-sanitize-recover=all"]
-INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link",
-            "firmware/app/src", "gap8/kernels", "gap8/model", "gap8/app/src"]
-XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
-#: A target's own flags, for its harness and the sources below gap8/, and whose source it is.
-VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
-# In long runs, the shipped network's kernels with address alone: half of the time of the targets that run it at every
-# step. `gap8` runs the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
-ADDRESS = ("-fno-sanitize=undefined,float-cast-overflow,float-divide-by-zero",)
-SHIPPED = ("app", "stream_detector")
 # Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
 # says it.
 OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
            "ASAN_OPTIONS": "quarantine_size_mb=2:thread_local_quarantine_size_kb=64:malloc_context_size=0"}
-LONG = ("-O2",)  # of runs in which the inputs cost more than the compiler: a third less for those of a network
 LONGEST = 2048  # bytes of an input
 TIMEOUT = 20  # seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
 BATCH = 50_000  # inputs that are run with one seed, and counted together
 SEED_BYTES = 9_000  # kept of a target, at most, with what the archive needs for each input
 ENTRY_BYTES = 110  # of the archive
-
-
-@dataclass(frozen=True)
-class Engine:
-    """A compiler and the flags that make a target."""
-
-    name: str
-    compiler: str
-    product: tuple[str, ...]  # the sources that fly: their edges are counted, the harness's are not
-    link: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -79,97 +52,6 @@ class Result:
     cpu: float  # seconds
     finding: Path | None
     log: Path
-
-
-def targets() -> dict[str, Path]:
-    """The targets by name, each with its source."""
-    found = {path.stem: path for path in sorted(FUZZ.glob("*/*.c"))}
-    return found | {name: found[base] for name, (base, _) in VARIANTS.items() if base in found}
-
-
-def _works(compiler: str, *flags: str) -> bool:
-    with tempfile.TemporaryDirectory() as folder:
-        source = Path(folder) / "probe.c"
-        source.write_text("#include <stddef.h>\nint LLVMFuzzerTestOneInput(const char *d, size_t n);\n"
-                          "int LLVMFuzzerTestOneInput(const char *d, size_t n) { return d == NULL && n > 0; }\n"
-                          "#ifdef MAIN\nint main(void) { return 0; }\n#endif\n")
-        done = subprocess.run([compiler, *flags, source, "-o", Path(folder) / "probe"], capture_output=True)
-        return done.returncode == 0
-
-
-@cache
-def engine(wanted: str = "") -> Engine | None:
-    """The best engine of this machine, or the wanted one; None without one."""
-    clang = shutil.which(os.environ.get("CLANG", "clang"))
-    if wanted in ("", "libfuzzer") and clang and _works(clang, f"-fsanitize=fuzzer,{SANITIZERS}"):
-        # Without tracing comparisons, which costs half of the time: the harnesses draw what parsers compare with.
-        return Engine("libfuzzer", clang, ("-fsanitize-coverage=inline-8bit-counters,indirect-calls,pc-table",),
-                      (f"-fsanitize=fuzzer,{SANITIZERS}",))
-    cc = shutil.which(os.environ.get("CC", "cc"))
-    if wanted in ("", "standalone") and cc and _works(cc, f"-fsanitize={SANITIZERS}", "-DMAIN"):
-        return Engine("standalone", cc, (), (f"-fsanitize={SANITIZERS}",))
-    return None
-
-
-def product_sources() -> list[Path]:
-    """The C that flies, as pyproject.toml lists it for the host's library."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    listed = project["tool"]["setuptools"]["ext-modules"][0]["sources"]
-    return [ROOT / name for name in listed if not name.startswith("host/")]
-
-
-@cache
-def _headers() -> bytes:
-    folders = [FUZZ, *(ROOT / name for name in INCLUDES)]
-    paths = sorted({path for folder in folders for path in folder.glob("*.h")})
-    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).digest()
-
-
-def _compile(made_by: Engine, source: Path, flags: tuple[str, ...]) -> Path:
-    """The object of a source; made once for each content of source and headers."""
-    # The harness needs address alone: redzones around what it gives to the product.
-    checks = "address" if FUZZ in source.parents else SANITIZERS
-    command = [made_by.compiler, *FLAGS, f"-fsanitize={checks}", *flags, *(f"-I{ROOT / name}" for name in INCLUDES)]
-    content = source.read_bytes() + _headers() + "\0".join(command).encode()
-    target = BUILD / "objects" / f"{source.stem}-{hashlib.sha256(content).hexdigest()[:16]}.o"
-    if not target.exists():
-        target.parent.mkdir(parents=True, exist_ok=True)
-        part = target.with_suffix(f".{os.getpid()}-{threading.get_ident()}")  # two threads may make one
-        done = subprocess.run([*command, "-c", source, "-o", part], capture_output=True, text=True)
-        if done.returncode:
-            raise SystemExit(f"{source}:\n{done.stderr}")
-        part.rename(target)
-    return target
-
-
-def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None = None, folder: Path | None = None,
-          flags: tuple[str, ...] = (), only: list[Path] | None = None) -> dict[str, Path]:
-    """The programs of the named targets.
-
-    replaced: other sources in the place of the product's; only: of these alone.
-    """
-    folder = folder or BUILD / "bin" / "".join((made_by.name, *flags))  # a test may build beside a long run
-    folder.mkdir(parents=True, exist_ok=True)
-    sources = [(replaced or {}).get(path, path) for path in only or product_sources()]
-    counted = made_by.product + flags
-    driver = [FUZZ / "standalone.c"] if made_by.name == "standalone" else []
-
-    def program(name: str) -> tuple[str, Path]:
-        more = (*VARIANTS.get(name, ("", []))[1], *(ADDRESS if flags == LONG and name in SHIPPED else ()))
-        objects = [_compile(made_by, path, flags + more) for path in (targets()[name], *driver)]
-        # From an archive only what the target needs is linked in, and counted.
-        library = folder / f"lib{name}.a"
-        library.unlink(missing_ok=True)
-        members = [_compile(made_by, path, counted + (more if "gap8" in path.parts else ())) for path in sources]
-        subprocess.run(["ar", "rcs", library, *members], check=True)
-        made = folder / name
-        subprocess.run([made_by.compiler, *made_by.link, *flags, *objects, library, "-lm", "-o", made], check=True)
-        library.unlink()
-        return name, made
-
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda path: _compile(made_by, path, counted), sources))
-        return dict(pool.map(program, names))
 
 
 def corpus(name: str, folder: Path | None = None) -> Path:

@@ -8,7 +8,8 @@ import subprocess
 
 import pytest
 
-from tools import fuzz
+import fuzz
+import fuzz_build
 
 MUTATIONS = 300
 #: Defects by target: a source, what stands there and what is put in its place.
@@ -24,19 +25,19 @@ PLANTED = {
 
 @pytest.fixture(scope="module")
 def engine():
-    found = fuzz.engine()
+    found = fuzz_build.engine()
     if found is None:
         pytest.skip("no C compiler with sanitizers on this machine")
     return found
 
 
 #: Without the chip's path of the int8 kernels, which tests/gap8 holds equal to the other one.
-NAMES = [name for name in fuzz.targets() if fuzz.VARIANTS.get(name, (name,))[0] == name]
+NAMES = [name for name in fuzz_build.targets() if fuzz_build.VARIANTS.get(name, (name,))[0] == name]
 
 
 @pytest.fixture(scope="module")
 def programs(engine):
-    return fuzz.build(NAMES, engine)
+    return fuzz_build.build(NAMES, engine)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -49,23 +50,23 @@ def test_nothing_is_found(programs, name, tmp_path):
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_defect_is_found(engine, name, tmp_path):
     path, right, wrong = PLANTED[name]
-    source = fuzz.ROOT / path
+    source = fuzz_build.ROOT / path
     text = source.read_text()
     assert text.count(right) == 1, f"{path} has changed: plant another defect"
     planted = tmp_path / source.name
     planted.write_text(text.replace(right, wrong))
-    program = fuzz.build([name], engine, {source: planted}, tmp_path)[name]
+    program = fuzz_build.build([name], engine, {source: planted}, tmp_path)[name]
     assert fuzz.run(name, program, 20_000, folder=tmp_path).finding is not None
 
 
 def test_the_driver_of_our_own_finds_a_planted_defect(tmp_path):
-    engine = fuzz.engine("standalone")
+    engine = fuzz_build.engine("standalone")
     if engine is None:
         pytest.skip("no C compiler with sanitizers on this machine")
     path, right, wrong = PLANTED["parser"]
-    planted = tmp_path / "edge_link.c"
-    planted.write_text((fuzz.ROOT / path).read_text().replace(right, wrong))
-    program = fuzz.build(["parser"], engine, {fuzz.ROOT / path: planted}, tmp_path, only=[fuzz.ROOT / path])["parser"]
+    source, planted = fuzz_build.ROOT / path, tmp_path / "edge_link.c"
+    planted.write_text(source.read_text().replace(right, wrong))
+    program = fuzz_build.build(["parser"], engine, {source: planted}, tmp_path, only=[source])["parser"]
     result = fuzz.run("parser", program, 20_000, folder=tmp_path)
     assert result.finding is not None
     elsewhere = tmp_path / "elsewhere"

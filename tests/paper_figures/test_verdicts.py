@@ -43,7 +43,7 @@ def flights(error_m, missed=0.0, count=20, seed=0, balanced=0.9, **condition):
 
 @pytest.fixture
 def job(tmp_path, monkeypatch):
-    monkeypatch.setattr(recorded, "said", lambda *_: "Recorded flights.")
+    monkeypatch.setattr(recorded, "sample_sentence", lambda *_: "Recorded flights.")
     monkeypatch.setattr(recorded, "left_out", lambda _: "")
     return Job(tmp_path, tmp_path / "work")
 
