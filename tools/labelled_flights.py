@@ -1,7 +1,7 @@
 """What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
     python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled
-        [--twin FOLDER | --beside FOLDER]
+        [--twin FOLDER [--unlabelled] | --beside FOLDER]
         [--labelled 2 --labelled 5] [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
 Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
@@ -11,11 +11,13 @@ learning.
 --start must not know a flight that is scored; given twice, the first scores the first group (folds 0 to 2) and the
 second the other: a twin's detector, whose twin was fitted to the other half. With --twin, as often as --start, training
 does not go on from --start: a new network learns the K flights together with edges of that twin, laid over the free air
-of all flights of the other groups, as `airtouch adapt --from scratch` does. With --beside, training goes on from
---start with the K flights and those of that folder, half of the crops each, as `airtouch adapt` does with simulated
-ones: so that it does not forget what the K lack. What is in --out already is not done again,
-so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 % interval by bootstrap over the
-flights scored, each with all its draws; last, the missed edges of each height in the manifest.
+of all flights of the other groups, as `airtouch adapt --from scratch` does. With --unlabelled there is a row more: the
+other flights of those groups are learnt too, without their down range, with the edges that the detector of the row
+before reports. With --beside, training goes on from --start with the K flights and those of that folder, half of the
+crops each, as `airtouch adapt` does with simulated ones: so that it does not forget what the K lack. What is in --out
+already is not done again, so a run that was stopped goes on. Prints a Markdown table: mean over all draws, 95 %
+interval by bootstrap over the flights scored, each with all its draws; last, the missed edges of each height in the
+manifest, and the false edges before, over and behind the platform.
 """
 
 import argparse
@@ -102,30 +104,44 @@ def recorded_beside(folders: Sequence[Path], speed: float | None, pool: Sequence
     return adapt.Flown([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
 
 
+def named(asked: Sequence[Any]) -> str:
+    """Short hash of what a training depends on, for a file's name."""
+    return hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
+
+
 def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
          pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: BestModel | None,
          flown: adapt.Flown | None, options: argparse.Namespace) -> list[FlightScore]:
     """One training and its scores, or what an earlier run found."""
-    steps = {"start": 0, "labelled": options.steps, "alone": options.alone_steps}[row]
+    steps = {"start": 0, "labelled": options.steps, "unlabelled": options.steps, "alone": options.alone_steps}[row]
     asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
              [f.path.name for f in held], [f.log.source for f in pool]]
-    if flown and row == "labelled":
+    if flown and row in ("labelled", "unlabelled"):
         asked += [bool(options.beside), adapt.TWIN_STEPS, repr(adapt.MIXED_DECODER),
                   [training_set.flight_hash(log) for log in flown.logs]]
-    key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
-    kept = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{key}.json"
+    kept = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named(asked)}.json"
     if kept.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(kept.read_text())]
     some = drawn(pool, count, draw)
+
+    def labelled() -> BestModel:
+        if start is not None and flown:
+            return adapt.together(start if options.beside else None, start, some, flown, seed, None, COMMAND)
+        return best.fit([f.log for f in some], seed=seed, start=start, steps=options.steps, command=COMMAND)
+
     if row == "start":
         if start is None:
             raise AirTouchError("no model to start from: give --start")
         model = start
-    elif start is not None and flown and row == "labelled":
-        model = adapt.together(start if options.beside else None, start, some, flown, seed, None, COMMAND)
+    elif row == "alone":
+        model = best.fit([f.log for f in some], seed=seed, steps=steps, command=COMMAND)
     else:
-        model = best.fit([f.log for f in some], seed=seed, start=start if row == "labelled" else None, steps=steps,
-                         command=COMMAND)
+        file = f"labelled_{count}_draw{draw}_seed{seed}_{named(asked[1:])}.npz"
+        model = adapt.kept_model(options.out / file, labelled)
+    if row == "unlabelled" and flown:
+        names = {f.log.source for f in some}
+        others = [adapt.without_range(f) for f in pool if f.log.source not in names]
+        model = adapt.self_trained(None, model, some, others, flown, seed, None, COMMAND)
     scores = scored(model, held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), kept, force=True)
     return scores
@@ -142,6 +158,16 @@ def missed_by_height(scores: Sequence[FlightScore]) -> str:
     return ", ".join(f"{height} {missed}/{every}" for height, (missed, every) in sorted(counts.items())) or "-"
 
 
+def false_by_place(scores: Sequence[FlightScore]) -> str:
+    """False edges before the first true edge, between the true edges and behind the last: "12 / 0 / 4"."""
+    counts = [0, 0, 0]
+    for score in scores:
+        places = [edge.true_sample for edge in score.edges]
+        for at in score.false or ():
+            counts[int(at >= min(places, default=at + 1)) + int(at >= max(places, default=at + 1))] += 1
+    return " / ".join(map(str, counts))
+
+
 def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     """One row of the table."""
     found: dict[str, Any] = summarise(merged(scores))
@@ -155,7 +181,7 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
 
     cells = (title, str(draws), f"{found['flights']} / {found['edges'] // draws}", text("mean_abs_error_m", 1, 3),
              text("mean_abs_error_s", 1, 2), text("missed", 100, 1), text("false_per_minute", 1, 2),
-             missed_by_height(scores))
+             missed_by_height(scores), false_by_place(scores))
     return f"| {' | '.join(cells)} |"
 
 
@@ -171,6 +197,8 @@ def main() -> None:
                              "--start")
     parser.add_argument("--beside", type=Path, action="append", default=[],
                         help="folder of labelled flights to learn beside the K; none of them may be scored")
+    parser.add_argument("--unlabelled", action="store_true",
+                        help="with --twin: a row more, with the other flights learnt without their labels")
     parser.add_argument("--by", choices=("halves", "day"), default="halves")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"))
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
@@ -192,6 +220,8 @@ def main() -> None:
     if len(options.twin) not in (0, len(options.start)):
         raise SystemExit(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for each, "
                          "or none")
+    if options.unlabelled and not options.twin:
+        raise SystemExit("--unlabelled learns beside a twin's edges: give --twin")
     if options.beside and (options.twin or not options.start):
         raise SystemExit("--beside goes on from a model: give --start, and no --twin")
     models = [best.load(path) for path in options.start]
@@ -211,14 +241,16 @@ def main() -> None:
                                flown.get(group), options)
         print(line(title, scores, len(draws)), flush=True)
 
-    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height |\n"
-          "|---|---|---|---|---|---|---|---|", flush=True)
+    print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height "
+          "| false before / over / behind |\n|---|---|---|---|---|---|---|---|---|", flush=True)
     every = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
     if starts:
         row("as it is", "start", 0, [(0, 0)])
     for count in options.labelled or (2, 5, 10, 20):
         if starts:
             row(f"and {count} labelled", "labelled", count, every)
+        if options.unlabelled:
+            row(f"and {count} labelled, the others without labels", "unlabelled", count, every)
         if options.alone_steps:
             row(f"{count} labelled alone", "alone", count, every)
 

@@ -74,6 +74,32 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
         run(monkeypatch, *call, "--beside", beside, "--twin", tmp_path)
 
 
+def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monkeypatch, capsys):
+    """One labelled flight, the other of its day without down range; the scored day is in neither training."""
+    best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
+    monkeypatch.setattr(labelled_flights, "simulated", lambda folder, pool: adapt.Flown([made_flight(20)], [None]))
+    monkeypatch.setattr(adapt, "TWIN_STEPS", {"shipped": 3, "scratch": 3})
+    taught = []
+
+    def self_trained(start, teacher, labelled, others, *rest):
+        taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in others]))
+        assert start is None and all(not f.labelled for f in others)
+        return teacher
+
+    monkeypatch.setattr(adapt, "self_trained", self_trained)
+    trained, fit = [], best.fit
+    monkeypatch.setattr(best, "fit", lambda flights, *a, **o: trained.append(len(flights)) or fit(flights, *a, **o))
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--unlabelled")
+    run(monkeypatch, *call, "--twin", tmp_path)
+    late = [pair for pair in taught if pair[1]]
+    assert sorted(sorted(a + b) for a, b in late) == [["f0.csv", "f2.csv"], ["f1.csv", "f3.csv"]]
+    assert trained == [2, 2], "the last row goes on from the models of the row before"
+    assert "| and 1 labelled, the others without labels | 1 | 4 / 8 |" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="give --twin"):
+        run(monkeypatch, *call)
+
+
 def test_a_start_that_knows_a_flight_is_refused(house, tmp_path, monkeypatch):
     best.fit([made_flight(1)], recipe=SMALL).save(tmp_path / "start.npz")
     with pytest.raises(AirTouchError, match="was trained on this flight"):
@@ -102,6 +128,13 @@ def test_missed_edges_are_counted_by_height():
                  for h, edges in (("low", (found, found)), ("h82", (found, missed))))
     assert labelled_flights.missed_by_height([low, high, high]) == "h82 2/4, low 0/2"
     assert labelled_flights.missed_by_height([FlightScore("a", Condition(), (missed,), (), 1, 30.0)]) == "-"
+
+
+def test_false_edges_are_counted_by_place():
+    edges = (EdgeScore("entry", 100), EdgeScore("exit", 200))
+    some = [FlightScore("a", Condition(), edges, (20, 90, 150, 200, 300, 400), 6, 30.0),
+            FlightScore("b", Condition(), edges, (), 0, 30.0), FlightScore("c", Condition(), (), (5,), 1, 30.0)]
+    assert labelled_flights.false_by_place(some) == "3 / 1 / 3"
 
 
 def test_smaller_draws_lie_within_larger_ones():

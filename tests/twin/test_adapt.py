@@ -152,19 +152,58 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     assert max(sizes[1::2]) <= min(sizes[0::2]) // 2 + 1
 
 
-def test_labelled_flights_are_half_of_what_is_learnt(made, monkeypatch):
+@pytest.fixture
+def trainings(monkeypatch):
+    """What every training is asked for; each returns another object, which labels every second flight in full."""
+    asked = []
+
+    def fit(flights, seed, **options):
+        asked.append({**options, "flights": flights})
+        return f"model {len(asked)}"
+
+    def labels(flights, model):
+        asked.append(model)
+        edge = [logs.Edge(100 * (i + 1), kind, np.nan, np.nan) for i, kind in enumerate(("entry", "exit", "entry"))]
+        return [(edge[:2], [], edge)[i % 3] for i in range(len(flights))]
+
+    monkeypatch.setattr(best, "fit", fit)
+    monkeypatch.setattr(best, "pseudo_labels", labels)
+    return asked
+
+
+def test_labelled_flights_are_half_of_what_is_learnt(made, trainings):
     """From `start`, with the twin's flights beside them; flights without labels go on from the twin's detector."""
-    asked = {}
-    monkeypatch.setattr(best, "fit", lambda flights, seed, **o: asked.update(o, flights=flights))
-    monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
     simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
     labelled, start, twin = flights_of(made, 2), object(), object()
-    adapt.together(start, twin, labelled, simulated, 0, None, "")
-    assert asked["start"] is start and len(asked["flights"]) == 7 and asked["pseudo_labels"][:2] == [None, None]
+    assert adapt.together(start, twin, labelled, simulated, 0, None, "") == "model 1"
+    (asked, *_) = trainings
+    assert asked["start"] is start and len(asked["flights"]) == 7 and asked["pseudo_labels"] == [None] * 7
     assert sum(asked["emphasis"][:2]) == pytest.approx(sum(asked["emphasis"][2:]))
+    trainings.clear()
     adapt.together(None, twin, flights_of(made, 2, down=False), simulated, 0, None, "")
-    assert asked["start"] is twin and asked["pseudo_labels"][:2] == [[], []] and set(asked["emphasis"]) == {1.0}
+    assert trainings[0] is twin and trainings[1]["start"] is twin and "emphasis" not in trainings[1]
+    assert len(trainings[1]["pseudo_labels"]) == len(trainings[1]["flights"]) == 2 + 5
     assert adapt.together(start, twin, [], simulated, 0, None, "") is twin
+
+
+def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
+    """Of five flights without labels those in which it sees an entry without exit, or nothing, are left out."""
+    simulated = adapt.Flown([log for _, log, _ in made[:4]], [None] * 4)
+    flights = [*flights_of(made, 3), *flights_of(made, 8, down=False)[3:]]
+    model = adapt.together(None, object(), flights, simulated, 0, None, "")
+    first, teacher, second = (x for x in trainings if not isinstance(x, list))
+    assert len(first["flights"]) == 3 + 4 and teacher == "model 1" and model == "model 3"
+    assert second["flights"][3:5] == [flights[3].log, flights[6].log] and len(second["flights"]) == 3 + 2 + 4
+    assert [len(x) if x else x for x in second["pseudo_labels"]] == [None] * 3 + [2, 2] + [None] * 4
+    thirds = [sum(second["emphasis"][i:k]) for i, k in ((0, 3), (3, 5), (5, 9))]
+    assert thirds == pytest.approx([thirds[0]] * 3)
+
+
+def test_a_teacher_that_sees_nothing_is_the_detector(made, trainings, monkeypatch):
+    monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
+    simulated = adapt.Flown([made[0][1]], [None])
+    flights = [*flights_of(made, 2), *flights_of(made, 4, down=False)[2:]]
+    assert adapt.together(None, object(), flights, simulated, 0, None, "") == "model 1" and len(trainings) == 1
 
 
 def score(error_m):

@@ -1,7 +1,8 @@
 """A detector for the drone of given flights, trained on simulated flights of its twin and on the flights themselves.
 
-Edges in the down range are the labels. Flights without down range get the edges that the twin's detector reports
-(pseudo-labels). Expected errors are measured on held-out flights.
+Edges in the down range are the labels. Flights without down range get the edges that a detector reports
+(pseudo-labels): the one trained on the labelled flights, else the twin's. Expected errors are measured on held-out
+flights.
 """
 
 import hashlib
@@ -35,6 +36,7 @@ TWIN_STEPS = {"shipped": 400, "scratch": 1000}  #: training steps on the twin's 
 TUNE_STEPS = 300  #: further training steps on flights without labels
 MIXED = 12  #: least number of simulated flights among the recorded ones in those steps
 FOLDS = 4
+STAGES = 2  #: changes with what the stages do, so that stored ones of another version are not taken
 FEWEST = 4  #: least number of labelled flights for a hold-out
 #: Decoder of a detector that has been trained on the twin alone: its logits are lower over recorded edges than over
 #: simulated ones, and recorded free air leaves room below. Chosen on folds 0 to 2 with two trainings out of nine
@@ -107,7 +109,7 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     held, half = [], []
     if hold_out and len(labelled) >= FEWEST:
         held, half = held_out_scores(flights, labelled, flown, start, twin, work, key, seed, progress, command)
-    last = [_without_range(f) for f in flights] if withhold else flights
+    last = [without_range(f) for f in flights] if withhold else flights
     name = "unlabelled" if withhold else "all"
     model = kept_model(work / f"{name}_{key}.npz",
                    lambda: together(start, twin, last, flown, seed, _named(progress, "all flights"), command))
@@ -142,22 +144,48 @@ def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight]
     """A detector trained on recorded and simulated flights; the twin's detector itself without recorded ones.
 
     With labelled flights it is trained from `start` on both kinds, each with half of the crops: a network that is
-    trained further on a few labelled flights alone forgets the edges that those lack. Without labelled flights the
-    twin's detector is trained further with pseudo-labels.
+    trained further on a few labelled flights alone forgets the edges that those lack. Flights without labels are then
+    labelled by it (`self_trained`). Without labelled flights the twin's detector is trained further with pseudo-labels.
     """
     if not flights:
         return twin
-    labelled = any(f.labelled for f in flights)
+    labelled = [f for f in flights if f.labelled]
+    others = [f for f in flights if not f.labelled]
+    if labelled:
+        model = _mixed(start, labelled, [], [], flown, seed, progress, command)
+        return self_trained(start, model, labelled, others, flown, seed, progress, command)
     logs = [f.log for f in flights]
-    labels: list[Any] = [None if f.labelled else label
-                         for f, label in zip(flights, best.pseudo_labels(logs, twin), strict=True)]
-    count = len(flown.logs) if labelled else min(max(MIXED, len(logs)), len(flown.logs))
-    share = count / len(logs) if labelled else 1.0
-    mixed: dict[str, Any] = {"start": start, "decoder": None if start else MIXED_DECODER}
-    settings = mixed if labelled else {"start": twin}
-    return best.fit([*logs, *flown.logs[:count]], seed, pseudo_labels=[*labels, *flown.edges[:count]],
-                    emphasis=[share] * len(logs) + [1.0] * count, progress=progress, command=command,
-                    steps=TWIN_STEPS["shipped" if start else "scratch"] if labelled else TUNE_STEPS, **settings)
+    count = min(max(MIXED, len(logs)), len(flown.logs))
+    return best.fit([*logs, *flown.logs[:count]], seed, start=twin, progress=progress, command=command,
+                    pseudo_labels=[*best.pseudo_labels(logs, twin), *flown.edges[:count]], steps=TUNE_STEPS)
+
+
+def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence[Flight], others: Sequence[Flight],
+                 flown: Flown, seed: int, progress: Progress | None, command: str) -> BestModel:
+    """A detector trained from `start` on labelled flights, flights that the teacher labels, and simulated ones.
+
+    Each kind has a third of the crops. Flights in which the teacher sees no platform, or not both edges of each, are
+    left out: they may be over one that it missed. The teacher itself where none is left.
+    """
+    labels = best.pseudo_labels([f.log for f in others], teacher)
+    sure = [(f, edges) for f, edges in zip(others, labels, strict=True)
+            if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
+    if not sure:
+        return teacher
+    taught, seen = zip(*sure, strict=True)
+    return _mixed(start, labelled, taught, seen, flown, seed, progress, command)
+
+
+def _mixed(start: BestModel | None, labelled: Sequence[Flight], taught: Sequence[Flight],
+           seen: Sequence[list[Edge] | None], flown: Flown, seed: int, progress: Progress | None,
+           command: str) -> BestModel:
+    """One training on labelled flights, flights `taught` with the edges `seen`, and simulated ones, alike in weight."""
+    count = len(flown.logs)
+    weights = [count / len(labelled)] * len(labelled) + [count / max(len(taught), 1)] * len(taught) + [1.0] * count
+    return best.fit([*(f.log for f in (*labelled, *taught)), *flown.logs], seed, start=start,
+                    pseudo_labels=[*[None] * len(labelled), *seen, *flown.edges], emphasis=weights,
+                    decoder=None if start else MIXED_DECODER, progress=progress, command=command,
+                    steps=TWIN_STEPS["shipped" if start else "scratch"])
 
 
 def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
@@ -201,7 +229,7 @@ def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] 
             "exponent": exponent}
 
 
-def _without_range(flight: Flight) -> Flight:
+def without_range(flight: Flight) -> Flight:
     """The flight without its down range."""
     log = flight.log
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
@@ -233,7 +261,7 @@ def _named(progress: Progress | None, name: str) -> Progress | None:
 
 def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
-    settings = (scene.table, vehicle, seed, SIMULATED, TWIN_STEPS, TUNE_STEPS, MIXED, DECODER, MIXED_DECODER,
+    settings = (STAGES, scene.table, vehicle, seed, SIMULATED, TWIN_STEPS, TUNE_STEPS, MIXED, DECODER, MIXED_DECODER,
                 edge_strength.LEAST, edge_strength.MOST)
     total = hashlib.sha256(repr(settings).encode())
     for flight in flights:
