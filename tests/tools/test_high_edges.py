@@ -1,0 +1,58 @@
+"""By what a detector feels a platform: known where the network reads one channel, or the noise is made."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from airtouch.detector.best.batches import channels_of
+from airtouch.detector.best.network import weight_shapes
+from airtouch.twin.recorded.course import course
+from made_flight import SMALL, made_flight
+from tools import high_edges
+
+
+def one_channel(channel):
+    """A network whose "over" logit reads this channel alone."""
+    rng = np.random.default_rng(0)
+    weights = {name: rng.normal(0.0, 0.3, shape).astype(np.float32)
+               for name, shape in weight_shapes(SMALL.graph).items()}
+    first = weights["layer0.kernel"]
+    (axis,) = (i for i, size in enumerate(first.shape) if size == len(high_edges.NAMES))
+    np.moveaxis(first, axis, 0)[np.arange(first.shape[axis]) != channel] = 0.0
+    return SimpleNamespace(recipe=SMALL, weights=weights)
+
+
+@pytest.mark.parametrize("name", ["gyro y", "motor mean"])
+def test_only_the_channel_that_is_read_matters_when_muted(name):
+    log = made_flight(0)
+    x, _ = channels_of(log)
+    edges = np.flatnonzero(np.abs(np.diff(log["zrange_m"])) > 0.05)
+    flown = SimpleNamespace(entry=int(edges[0]), exit=int(edges[-1]))
+    channel = high_edges.CHANNELS.index(name)
+    assert np.ptp(x[flown.entry:flown.exit, channel]) > 0.0
+    changes = high_edges.muted(log, flown, one_channel(channel))[1:]
+    assert changes[channel] != 0.0
+    np.testing.assert_array_equal(np.delete(changes, channel), 0.0)
+
+
+def test_shaking_over_a_platform_is_counted_above_3_hz_only():
+    rng, t = np.random.default_rng(1), np.arange(1200) / 100.0
+    values = rng.normal(0.0, 1.0, (1200, 10)) + 5.0 * np.sin(2 * np.pi * 0.5 * t)[:, None]
+    values[600:900] += rng.normal(0.0, 3.0**0.5, (300, 10))
+    before, over = high_edges.shaking(values, 600, 900)
+    assert np.sqrt(over / before).mean() == pytest.approx(2.0, rel=0.1)
+    assert before.mean() < 1.1, "the slow swing counts"
+
+
+def test_hover_and_the_second_before_the_entry_are_apart():
+    log = made_flight(0)
+    columns = {name: values.copy() for name, values in log.columns.items()}
+    flown = course(log, 0.3)
+    hover = flown.phases()["hover"]
+    columns["gyro_y_radps"][hover] += np.random.default_rng(2).normal(0.0, 0.2618 * 3, hover.stop - hover.start)
+    rough, before = high_edges.calm(type(log)(columns, log.meta), flown)
+    same, calm = high_edges.calm(log, flown)
+    pitch = high_edges.CHANNELS.index("gyro y")
+    assert rough[pitch] > same[pitch] + 1.0
+    np.testing.assert_allclose(before, calm, atol=1e-9)

@@ -1,0 +1,136 @@
+"""By what a detector feels a high platform, and what simulated edges lack of it.
+
+    python tools/high_edges.py FOLDER... --fold 0 --fold 1 --fold 2 --model MODEL.npz... [--twin FOLDER]
+
+Prints three tables of the flights over one platform, by class of height:
+1. the "over" logit over the platform (median), and its change where one channel is muted (held at 0); each flight by
+   the --model that was not trained on it, so the models of a cross-validation can be given together;
+2. standard deviation of the channels in hover and in the last second before the entry: the air in which edges lie;
+3. with --twin: standard deviation above 3 Hz over the platform divided by that before it, recorded, and with the
+   twin's responses (`airtouch.twin.overlay`) added to the recorded air.
+"""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from airtouch import vehicle
+from airtouch.detector import best
+from airtouch.detector.best.batches import channels_of
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.best.network import float_logits
+from airtouch.detector.best.recipe import STRIDE
+from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.shared import training_set
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+from airtouch.reference.motion_channels import NAMES
+from airtouch.simulation import scenario
+from airtouch.twin import adapt, files, overlay
+from airtouch.twin.overlay import RATE_HZ
+from airtouch.twin.recorded.course import Course, course
+from airtouch.twin.recorded.features import CLASSES, height_class
+
+CHANNELS = NAMES[:-1]  #: without the empty one
+SPLIT_HZ = 3.0
+SETTLED, BEFORE = slice(30, -10), slice(-300, -40)  #: samples: over a platform from the entry on; before the entry
+COLUMNS = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "m1", "m2", "m3", "m4")
+RESPONSES = 60
+
+
+def muted(log: FlightLog, flown: Course, model: BestModel) -> np.ndarray:
+    """(1 + channels,): median "over" logit over the platform, and its changes with each channel held at 0."""
+    x, _ = channels_of(log, model.recipe.motion)
+    steps = slice((flown.entry + SETTLED.start) // STRIDE, (flown.exit + SETTLED.stop) // STRIDE)
+
+    def over(values: np.ndarray) -> float:
+        return float(np.median(float_logits(model.weights, model.recipe.graph, values)[steps, 0]))
+
+    whole = over(x)
+    return np.array([whole, *(over(np.where(np.arange(x.shape[1]) == i, 0.0, x)) - whole
+                              for i in range(len(CHANNELS)))])
+
+
+def fast(values: np.ndarray) -> np.ndarray:
+    """The part of values (n, k) above SPLIT_HZ."""
+    return sosfiltfilt(butter(2, SPLIT_HZ, "high", fs=RATE_HZ, output="sos"), values, axis=0)
+
+
+def calm(log: FlightLog, flown: Course) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations (channels,) in hover and in the last second before the entry."""
+    x = channels_of(log)[0][:, :len(CHANNELS)]
+    return x[flown.phases()["hover"]].std(axis=0), x[flown.entry - RATE_HZ:flown.entry - RATE_HZ // 10].std(axis=0)
+
+
+def shaking(values: np.ndarray, entry: int, leave: int) -> tuple[np.ndarray, np.ndarray]:
+    """Variances (10,) above SPLIT_HZ of overlay.COLUMNS before and over the platform."""
+    swift = fast(values)
+    return (swift[max(entry + BEFORE.start, 0):max(entry + BEFORE.stop, 1)].var(axis=0),
+            swift[entry + SETTLED.start:leave + SETTLED.stop].var(axis=0))
+
+
+def row(title: str, count: int, values: Sequence[float], form: str) -> str:
+    """One line of a Markdown table."""
+    return f"| {title} | {count} | " + " | ".join(form.format(v) for v in values) + " |"
+
+
+def head(first: str, names: Sequence[str]) -> str:
+    """The first two lines of a Markdown table."""
+    return f"\n| {first} | flights | " + " | ".join(names) + " |\n|" + "---|" * (len(names) + 2)
+
+
+def main() -> None:
+    """The tables, by class of height."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--fold", type=int, action="append", help="only flights of this fold; may be repeated")
+    parser.add_argument("--model", type=Path, action="append", default=[], help="a `best` model; may be repeated")
+    parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
+    options = parser.parse_args()
+    models = [best.load(path) for path in options.model]
+    listed = [f for f in dataset.collect(options.folders) if not options.fold or f.condition.fold in options.fold]
+    usable, left_out = adapt.readable(listed)
+    if left_out:
+        raise SystemExit(f"not usable: {left_out[0][1]}")
+    groups: dict[str, list[tuple[FlightLog, Course]]] = {name: [] for name in CLASSES}
+    for flight in usable:
+        try:
+            flown = course(flight.log, 0.3)
+        except AirTouchError as error:
+            raise SystemExit(str(error)) from None
+        name = height_class(flown.clearance_m)
+        if name:
+            groups[name].append((flight.log, flown))
+    if models:
+        print(head("over logit; muted", ["whole", *CHANNELS]))
+        for name, some in groups.items():
+            found = [muted(log, flown, model) for log, flown in some for model in models
+                     if not training_set.contains(model.metadata, log)]
+            if found:
+                print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
+    print(head("standard deviation, usual swings", CHANNELS))
+    for name, some in groups.items():
+        pairs = [calm(log, flown) for log, flown in some if flown.phases()["hover"].stop - flown.level > 2 * RATE_HZ]
+        for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):
+            print(row(f"{name}, {title}", len(part), np.median(part, axis=0).tolist(), "{:.2f}"), flush=True)
+    if options.twin:
+        craft = vehicle.load(str(options.twin / files.VEHICLE))
+        laid = overlay.responses(scenario.load(options.twin / files.SCENARIO), craft, RESPONSES)
+        print(head("above 3 Hz, over the platform / before", COLUMNS))
+        for name, some in groups.items():
+            pairs = [shaking(overlay.values_of(log), flown.entry, flown.exit) for log, flown in some
+                     if flown.entry > -BEFORE.start]
+            added = [shaking(r.values, *(e.sample for e in r.edges))[1] for r in laid
+                     if height_class(r.edges[0].height_after_m) == name]
+            if pairs and added:
+                before, over = (np.median(part, axis=0) for part in zip(*pairs, strict=True))
+                print(row(f"{name}, recorded", len(pairs), np.sqrt(over / before).tolist(), "{:.1f}"))
+                both = np.sqrt((before + np.median(added, axis=0)) / before)
+                print(row(f"{name}, simulated", len(added), both.tolist(), "{:.1f}"), flush=True)
+
+
+if __name__ == "__main__":
+    main()
