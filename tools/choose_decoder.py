@@ -78,25 +78,25 @@ def score(flight: Flight, config: DecoderConfig, lag: float) -> FlightScore:
                         detections, lag)
 
 
-def figures(flights: list[Flight], found: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
+def figures(flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]], lag: float) -> dict[str, float]:
     """Mean error of the edges found, share missed, false a minute."""
-    errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, found, strict=True)])
+    errors = np.concatenate([np.abs(d - lag) * f.speed for f, (d, _) in zip(flights, outcomes_of, strict=True)])
     edges = sum(len(f.edges) for f in flights)
-    late = np.concatenate([d - lag for d, _ in found])
+    late = np.concatenate([d - lag for d, _ in outcomes_of])
     return {"error_m": float(errors.mean()) if len(errors) else MISS_M, "missed": 1 - len(errors) / edges,
             "rms_s": float(np.sqrt(np.mean(np.square(late)))) if len(late) else np.nan,
-            "false_per_minute": sum(n for _, n in found) / sum(f.minutes for f in flights)}
+            "false_per_minute": sum(n for _, n in outcomes_of) / sum(f.minutes for f in flights)}
 
 
-def lag_of(found: list[tuple[np.ndarray, int]]) -> float:
+def lag_of(outcomes_of: list[tuple[np.ndarray, int]]) -> float:
     """Median delay, seconds."""
-    delays = np.concatenate([d for d, _ in found])
+    delays = np.concatenate([d for d, _ in outcomes_of])
     return float(np.median(delays)) if len(delays) else 0.0
 
 
-def cost(flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> float:
+def cost(flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> float:
     """Metres: mean error with misses at MISS_M, and FALSE_M for each false edge a minute."""
-    f = figures(flights, found, lag_of(found))
+    f = figures(flights, outcomes_of, lag_of(outcomes_of))
     return f["error_m"] * (1 - f["missed"]) + MISS_M * f["missed"] + FALSE_M * f["false_per_minute"]
 
 
@@ -146,10 +146,10 @@ def main() -> None:
         show_scores.write_json(options.json, result, force=True)
 
 
-def show(title: str, flights: list[Flight], found: list[tuple[np.ndarray, int]]) -> None:
+def show(title: str, flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:
     """One line of figures."""
-    lag = lag_of(found)
-    print(f"{title}: {_text(figures(flights, found, lag))}, lag {lag:.2f} s")
+    lag = lag_of(outcomes_of)
+    print(f"{title}: {_text(figures(flights, outcomes_of, lag))}, lag {lag:.2f} s")
 
 
 def _text(f: dict[str, float]) -> str:

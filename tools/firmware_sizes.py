@@ -33,10 +33,10 @@ class Sizes:
 
 def parse(output: str) -> Sizes:
     """The sizes that the firmware's makefile prints at its end; SystemExit where it printed none."""
-    found = {name: (int(used), int(room)) for name, used, room in REPORT.findall(output)}
-    if set(found) != set(MEMORIES):
+    regions = {name: (int(used), int(room)) for name, used, room in REPORT.findall(output)}
+    if set(regions) != set(MEMORIES):
         raise SystemExit("the firmware's makefile printed no sizes")
-    return Sizes(*zip(*(found[name] for name in MEMORIES), strict=True))
+    return Sizes(*zip(*(regions[name] for name in MEMORIES), strict=True))
 
 
 def row(what: str, sizes: Sizes, stock: Sizes | None = None, deepest: int | None = None) -> str:

@@ -174,27 +174,27 @@ def main() -> None:
     parser.add_argument("--replay", nargs="+", metavar="FILE", help="run these inputs once")
     parser.add_argument("--keep", action="store_true", help="make the corpus small and keep it in tests/fuzz/seeds")
     parser.add_argument("--coverage", action="store_true", help="print which lines the corpus reaches")
-    wanted = parser.parse_args()
-    names = wanted.targets or list(targets())
+    options = parser.parse_args()
+    names = options.targets or list(targets())
     if unknown := set(names) - set(targets()):
         parser.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(targets())}")
-    if wanted.coverage:
+    if options.coverage:
         return cover(names)
-    made_by = engine(wanted.engine)
+    made_by = engine(options.engine)
     if made_by is None:
         raise SystemExit("no compiler with sanitizers here: apt-get install clang")
     programs = build(names, made_by, flags=LONG)
-    if wanted.replay:
-        sys.exit(max(subprocess.run([programs[name], *wanted.replay]).returncode for name in names))
-    if wanted.keep:
+    if options.replay:
+        sys.exit(max(subprocess.run([programs[name], *options.replay]).returncode for name in names))
+    if options.keep:
         for name in names:
             print("{}: {} seeds, {} bytes".format(name, *keep(name, programs[name])))
         return None
-    print(f"{made_by.name}, {made_by.compiler}, mutations of seed {wanted.seed}\n"
+    print(f"{made_by.name}, {made_by.compiler}, mutations of seed {options.seed}\n"
           f"{'target':16} {'inputs':>9} {'edges':>6} {'features':>8} {'CPU s':>6}  result", flush=True)
     failed = False
     for name in names:
-        result = run_batches(name, programs[name], wanted.runs, wanted.seed, wanted.resume)
+        result = run_batches(name, programs[name], options.runs, options.seed, options.resume)
         failed |= result.finding is not None
         verdict = "nothing found" if result.finding is None else (
             f"FOUND, see {result.log.relative_to(ROOT)}; replay: "

@@ -41,8 +41,8 @@ class Engine:
 
 def targets() -> dict[str, Path]:
     """The targets by name, each with its source."""
-    found = {path.stem: path for path in sorted(FUZZ.glob("*/*.c"))}
-    return found | {name: found[base] for name, (base, _) in VARIANTS.items() if base in found}
+    sources = {path.stem: path for path in sorted(FUZZ.glob("*/*.c"))}
+    return sources | {name: sources[base] for name, (base, _) in VARIANTS.items() if base in sources}
 
 
 def _works(compiler: str, *flags: str) -> bool:
@@ -56,15 +56,15 @@ def _works(compiler: str, *flags: str) -> bool:
 
 
 @cache
-def engine(wanted: str = "") -> Engine | None:
-    """The best engine of this machine, or the wanted one; None without one."""
+def engine(name: str = "") -> Engine | None:
+    """The best engine of this machine, or the one of this name; None without one."""
     clang = shutil.which(os.environ.get("CLANG", "clang"))
-    if wanted in ("", "libfuzzer") and clang and _works(clang, f"-fsanitize=fuzzer,{SANITIZERS}"):
+    if name in ("", "libfuzzer") and clang and _works(clang, f"-fsanitize=fuzzer,{SANITIZERS}"):
         # Without tracing comparisons, which costs half of the time: the harnesses draw what parsers compare with.
         return Engine("libfuzzer", clang, ("-fsanitize-coverage=inline-8bit-counters,indirect-calls,pc-table",),
                       (f"-fsanitize=fuzzer,{SANITIZERS}",))
     cc = shutil.which(os.environ.get("CC", "cc"))
-    if wanted in ("", "standalone") and cc and _works(cc, f"-fsanitize={SANITIZERS}", "-DMAIN"):
+    if name in ("", "standalone") and cc and _works(cc, f"-fsanitize={SANITIZERS}", "-DMAIN"):
         return Engine("standalone", cc, (), (f"-fsanitize={SANITIZERS}",))
     return None
 

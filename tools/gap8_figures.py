@@ -74,28 +74,30 @@ def cost(row: Row, model: Any) -> dict[str, Any]:
     """Bytes, multiplications, instructions and cycles of a model."""
     chip = gap8_counts.compile_model(model)
     network = model.int8
-    found: dict[str, Any] = {"parameters": parameter_bytes(network), "flash": chip.flash_bytes}
+    figures: dict[str, Any] = {"parameters": parameter_bytes(network), "flash": chip.flash_bytes}
     if chip.kind == "stream":
         run = gap8_counts.stream(chip, golden_flight(network)[0][:200])
         arena, columns = stream_arena_bytes(network), network.channels
-        found["mac"] = network.multiplications / network.stride
+        figures["mac"] = network.multiplications / network.stride
     elif chip.kind == "rolling":
         stride = paper.stride(model)
         run = gap8_counts.rolling(chip, export.golden_samples(network, stride)[0][:200], stride)
         arena, columns = rolling_size(network, stride).arena_bytes, network.input_shape[1]
-        found["mac"] = rolling_multiplications(network, stride)
+        figures["mac"] = rolling_multiplications(network, stride)
     else:
         run = gap8_counts.windows(chip, export.golden_vectors(network)[0])
-        arena, columns, found["mac"] = arena_bytes(network), int(np.prod(network.input_shape)), multiplications(network)
-    found |= {"instructions": float(run.instructions.mean()), "worst": int(run.instructions.max()), "stack": run.stack,
+        figures["mac"] = multiplications(network)
+        arena, columns = arena_bytes(network), int(np.prod(network.input_shape))
+    figures |= {"instructions": float(run.instructions.mean()), "worst": int(run.instructions.max()),
+                "stack": run.stack,
               "l1": chip.constant_bytes + arena + columns + run.stack}
     if chip.kind != "stream":
         cluster = gap8_counts.compile_model(model, gap8_counts.XPULP)
         window = export.golden_vectors(network)[0][0]
         for cores in (1, 8):
             cycles, _ = gap8_counts.team_cycles(cluster, window, cores)
-            found[f"cycles_{cores}"], found[f"branching_{cores}"] = cycles.looped, cycles.cycles
-    return found
+            figures[f"cycles_{cores}"], figures[f"branching_{cores}"] = cycles.looped, cycles.cycles
+    return figures
 
 
 def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any], Any]:

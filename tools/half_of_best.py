@@ -46,8 +46,9 @@ def main(folder: Path) -> None:
         halves.append(same(edges, best.run(later(log)).edges, 1))
         if log.has(*ACC_WORLD):
             headings.append(same(edges, best.run(turned(log)).edges))
-    for what, found in (("a log one sample shorter at its start", halves), ("a heading of 90 degrees more", headings)):
-        print(f"{what}: the same edges within {CLOSE / 100:.1f} s in {np.sum(found)} of {len(found)} flights")
+    for what, results in (("a log one sample shorter at its start", halves),
+                          ("a heading of 90 degrees more", headings)):
+        print(f"{what}: the same edges within {CLOSE / 100:.1f} s in {np.sum(results)} of {len(results)} flights")
 
 
 if __name__ == "__main__":

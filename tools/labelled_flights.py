@@ -119,9 +119,9 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     if flown and row in ("labelled", "unlabelled"):
         asked += [bool(options.beside), adapt.TWIN_STEPS, repr(adapt.MIXED_DECODER),
                   [training_set.flight_hash(log) for log in flown.logs]]
-    kept = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named(asked)}.json"
-    if kept.is_file():
-        return [FlightScore.from_dict(entry) for entry in json.loads(kept.read_text())]
+    path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named(asked)}.json"
+    if path.is_file():
+        return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
     some = drawn(pool, count, draw)
 
     def labelled() -> BestModel:
@@ -143,7 +143,7 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
         others = [adapt.without_range(f) for f in pool if f.log.source not in names]
         model = adapt.self_trained(None, model, some, others, flown, seed, None, COMMAND)
     scores = scored(model, held, readable)
-    write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), kept, force=True)
+    write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), path, force=True)
     return scores
 
 

@@ -50,9 +50,9 @@ def row(detector: str, without: str, options: argparse.Namespace,
     asked = {"detector": detector, "without": without, "scenario": options.scenario,
              "flights": options.flights, "seed": options.seed, **own, "tested": [f.path.name for f in files]}
     key = hashlib.sha256((json.dumps(asked) + sources()).encode()).hexdigest()[:12]
-    kept = options.out / f"{detector}_without_{without}_{key}.json"
-    if kept.is_file():
-        return json.loads(kept.read_text())
+    path = options.out / f"{detector}_without_{without}_{key}.json"
+    if path.is_file():
+        return json.loads(path.read_text())
     started = time.monotonic()
     flown, what = simulated.training_flights(options.flights, options.scenario, seed=options.seed,
                                              without=() if without == ALL else (without,))
@@ -63,22 +63,22 @@ def row(detector: str, without: str, options: argparse.Namespace,
         raise SystemExit(f"not scored: {left_out[0][1]}")
     found = {**summarise(scores), "trained": what, "lag_s": module.lag_s(model), "options": own,
              "seconds": round(time.monotonic() - started)}
-    write_bytes(json.dumps(found, indent=1).encode(), kept, force=True)
+    write_bytes(json.dumps(found, indent=1).encode(), path, force=True)
     return found
 
 
-def line(detector: str, without: str, found: dict[str, Any]) -> str:
+def line(detector: str, without: str, result: dict[str, Any]) -> str:
     """One line of a Markdown table, 95 % intervals by flight."""
     def cell(name: str, scale: float, digits: int, unit: str = "") -> str:
-        interval = found["intervals"].get(name)
-        if found[name] is None:
+        interval = result["intervals"].get(name)
+        if result[name] is None:
             return "-"
-        value, *ends = (f"{scale * x:.{digits}f}" for x in (found[name], *(interval or ())))
+        value, *ends = (f"{scale * x:.{digits}f}" for x in (result[name], *(interval or ())))
         return f"{value}{unit}" + (f" ({ends[0]} to {ends[1]})" if ends else "")
 
     what = "all on" if without == ALL else f"`{without}` off"
     cells = (f"{detector}, {what}", cell("mean_abs_error_m", 1, 3, " m"), cell("missed", 100, 1, " %"),
-             cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0, " %"), f"{found['lag_s']:.2f} s")
+             cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0, " %"), f"{result['lag_s']:.2f} s")
     return f"| {' | '.join(cells)} |"
 
 

@@ -49,17 +49,17 @@ def later(log: FlightLog, begin: int) -> FlightLog:
     return FlightLog({name: values[begin:] for name, values in log.columns.items()}, log.meta)
 
 
-def show(what: str, seconds: float, found: Replay) -> None:
+def show(what: str, seconds: float, result: Replay) -> None:
     """A line of the table, and what differed."""
-    task, words = found.least_left
-    print(f"{what}: {found.steps} steps, {found.different} differ, prob within {found.prob_off:.1g}; edges "
-          f"{' '.join(f'{kind}@{step}' for step, kind in found.edges) or 'none'}\n  late {found.late}, longest step "
-          f"{found.longest_us} us; app's stack {found.stack_bytes} of 1600 bytes, least left of any task {4 * words} "
+    task, words = result.least_left
+    print(f"{what}: {result.steps} steps, {result.different} differ, prob within {result.prob_off:.1g}; edges "
+          f"{' '.join(f'{kind}@{step}' for step, kind in result.edges) or 'none'}\n  late {result.late}, longest step "
+          f"{result.longest_us} us; app's stack {result.stack_bytes} of 1600 bytes, least left of any task {4 * words} "
           f"({task});\n  instructions of a step, with what preempted it: mean "
-          f"{PER_US * int(np.mean(found.loads_us)):,}, longest {PER_US * max(found.loads_us):,}, to {PER_US};\n  "
-          f"{found.steps / 100:.1f} s of flight in {seconds:.0f} s", flush=True)
-    if found.first:
-        print(f"  first difference: {found.first}")
+          f"{PER_US * int(np.mean(result.loads_us)):,}, longest {PER_US * max(result.loads_us):,}, to {PER_US};\n  "
+          f"{result.steps / 100:.1f} s of flight in {seconds:.0f} s", flush=True)
+    if result.first:
+        print(f"  first difference: {result.first}")
 
 
 def main(arguments: list[str]) -> int:
@@ -79,25 +79,25 @@ def main(arguments: list[str]) -> int:
                         help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
     parser.add_argument("--config", help="of firmware/app: app-config-tap and the like")
     parser.add_argument("--platform", default="cf2", choices=VEHICLES, help="of the firmware (cf2)")
-    given = parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
     build.tools()
-    if not given.built:
-        config = "app-config-height" if given.height else "app-config-gap8" if given.gap8 else "app-config"
-        build.compile_firmware(given.base.expanduser().resolve(), given.config or config, given.platform)
+    if not options.built:
+        config = "app-config-height" if options.height else "app-config-gap8" if options.gap8 else "app-config"
+        build.compile_firmware(options.base.expanduser().resolve(), options.config or config, options.platform)
     elf = build.link()
-    if given.fly:
+    if options.fly:
         return 0 if report(elf) else 1
-    if given.height:
-        return 0 if height.report(elf, given.seeds, given.only) else 1
-    if given.gap8:
-        log = read(given.flights[0]) if given.flights else recorded(1)[0]
-        return 0 if gap8.report(elf, later(log, given.begin), given.steps) else 1
-    logs = [read(path) for path in given.flights] or recorded(2)
+    if options.height:
+        return 0 if height.report(elf, options.seeds, options.only) else 1
+    if options.gap8:
+        log = read(options.flights[0]) if options.flights else recorded(1)[0]
+        return 0 if gap8.report(elf, later(log, options.begin), options.steps) else 1
+    logs = [read(path) for path in options.flights] or recorded(2)
     different = 0
     for i, log in enumerate(logs):
         changes: dict[int, dict[str, float]] = CHANGES if i == len(logs) - 1 else {}
         begun = time.monotonic()
-        found = replay(elf, later(log, given.begin), given.steps, changes, VEHICLES[build.platform()])
+        found = replay(elf, later(log, options.begin), options.steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
         show(name, time.monotonic() - begun, found)

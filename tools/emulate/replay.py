@@ -131,15 +131,15 @@ def stack(left: Mapping[str, int]) -> tuple[int, tuple[str, int]]:
     return 4 * (APP_STACK_WORDS - left["APP"]), min(left.items(), key=lambda item: item[1])
 
 
-def compare(found: Replay, step: int, board: Mapping[str, float], desktop: Mapping[str, float]) -> None:
+def compare(result: Replay, step: int, board: Mapping[str, float], desktop: Mapping[str, float]) -> None:
     """Count a step and what differs in it: log variables of the board (with their group) and of the desktop."""
     other = [name for name in LOGS if name != "prob" and differs(name, board[f"airtouch.{name}"], desktop[name])]
     one, two = float(board["airtouch.prob"]), float(desktop["prob"])
     if np.isnan(one) != np.isnan(two):
         other.append("prob")
     elif one != two:
-        found.prob_off = max(found.prob_off, abs(one - two) / max(abs(one), abs(two)))
-    found.steps += 1
-    found.different += bool(other)
-    if other and not found.first:
-        found.first = f"step {step}: " + ", ".join(f"{n} {board[f'airtouch.{n}']} for {desktop[n]}" for n in other[:4])
+        result.prob_off = max(result.prob_off, abs(one - two) / max(abs(one), abs(two)))
+    result.steps += 1
+    result.different += bool(other)
+    if other and not result.first:
+        result.first = f"step {step}: " + ", ".join(f"{n} {board[f'airtouch.{n}']} for {desktop[n]}" for n in other[:4])

@@ -107,9 +107,9 @@ def _symbol_table(data: bytes, headers: list[dict]) -> Iterator[tuple[str, int, 
 
 
 def _symbols(data: bytes, headers: list[dict], thumb: bool) -> list[Symbol]:
-    found = []
+    symbols = []
     for name, value, size, info, section in _symbol_table(data, headers):
         function = info & 15 == _FUNCTION
         if section and info & 15 <= _FUNCTION:
-            found.append(Symbol(name, value & ~1 if function and thumb else value, size, function, info >> 4 != 0))
-    return found
+            symbols.append(Symbol(name, value & ~1 if function and thumb else value, size, function, info >> 4 != 0))
+    return symbols
