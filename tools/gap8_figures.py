@@ -90,7 +90,7 @@ def cost(row: Row, model: Any) -> dict[str, Any]:
         arena, columns = arena_bytes(network), int(np.prod(network.input_shape))
     figures |= {"instructions": float(run.instructions.mean()), "worst": int(run.instructions.max()),
                 "stack": run.stack,
-              "l1": chip.constant_bytes + arena + columns + run.stack}
+                "l1": chip.constant_bytes + arena + columns + run.stack}
     if chip.kind != "stream":
         cluster = gap8_counts.compile_model(model, gap8_counts.XPULP)
         window = export.golden_vectors(network)[0][0]
