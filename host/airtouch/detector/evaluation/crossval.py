@@ -5,6 +5,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,44 +51,74 @@ def crossval(
         raise AirTouchError(f"{name} has no physical filter to switch off")
     folds = by_fold(files) if folds is None else folds
     out.mkdir(parents=True, exist_ok=True)
+    study = _Study(name, detector, seed, options or {}, physical_filter, silenced, silent_training, free_air, out)
     readable, left_out = readable_flights(files, evaluate.spare_of(detector))
     scores: list[FlightScore] = []
     entries: list[dict[str, Any]] = []
-    shown, given = dict(options or {}), dict(options or {})
-    if free_air:
-        shown["free_air"] = [training_set.flight_hash(log) for log in free_air]
-        given["free_air"] = free_air
-    if silent_training:
-        shown["silent"] = silenced
     for fold, members in folds.items():
-        held = {f.path for f in members}
-        test = [f for f in members if f.path in readable]
-        train = [sensors.without(readable[f.path], silenced if silent_training else ())
-                 for f in files if f.path in readable and f.path not in held]
-        key = cache_key(name, files, members, seed, shown)
-        variant = "".join(("" if physical_filter else "-unfiltered", *(f"-no-{sensor}" for sensor in silenced)))
-        cache = out / f"{name}{variant}_fold{fold}_{key}.json"
+        key = cache_key(name, files, members, seed, study.hashed())
+        cache = out / f"{name}{study.variant()}_fold{fold}_{key}.json"
         entry = cached(cache)
         if entry is None:
-            tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
-            started, cpu_before = time.monotonic(), time.process_time()
-            kept = out / f"{name}_fold{fold}_{key}.npz"
-            model = model_of_fold(detector, train, kept, seed, given)
-            if not physical_filter and isinstance(detector, Filtered):
-                model = detector.retune(model, train, False)
-            results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], silenced), detector, model).score
-                       for f in test]
-            entry = {"fold": fold, "model": kept.name, "lag_s": detector.lag_s(model),
-                     "parameters": detector.parameters(model),
-                     "seconds": round(time.monotonic() - started, 1),
-                     "cpu_seconds": round(time.process_time() - cpu_before, 1),
-                     "per_flight": [s.as_dict() for s in results]}
+            entry = _score_fold(study, fold, key, files, members, readable, tell)
             write_bytes(json.dumps(entry, allow_nan=False).encode(), cache, force=True)
         else:
             tell(f"fold {fold}: done before, {cache.name}")
         scores += [FlightScore.from_dict(s) for s in entry["per_flight"]]
         entries.append({k: v for k, v in entry.items() if k != "per_flight"})
     return scores, entries, left_out
+
+
+@dataclass(frozen=True)
+class _Study:
+    """How every fold is trained and scored: the arguments of `crossval` of these names."""
+
+    name: str
+    detector: Detector
+    seed: int
+    options: dict[str, Any]
+    physical_filter: bool
+    silenced: tuple[str, ...]
+    silent_training: bool
+    free_air: Sequence[FlightLog]
+    out: Path
+
+    def fit_options(self) -> dict[str, Any]:
+        """Arguments of the detector's `fit`."""
+        return {**self.options, **({"free_air": self.free_air} if self.free_air else {})}
+
+    def hashed(self) -> dict[str, Any]:
+        """What the name of a fold's model depends on, beside flights and seed."""
+        options = dict(self.options)
+        if self.free_air:
+            options["free_air"] = [training_set.flight_hash(log) for log in self.free_air]
+        if self.silent_training:
+            options["silent"] = self.silenced
+        return options
+
+    def variant(self) -> str:
+        """Part of the name of a fold's scores: what is done to a trained model or to the flights that it scores."""
+        return "".join(("" if self.physical_filter else "-unfiltered", *(f"-no-{s}" for s in self.silenced)))
+
+
+def _score_fold(study: _Study, fold: int, key: str, files: Sequence[FlightFile], members: Sequence[FlightFile],
+                readable: dict[Path, FlightLog], tell: Tell) -> dict[str, Any]:
+    """A fold's entry: a model of the other flights, its settings, and the scores of the members."""
+    detector, held = study.detector, {f.path for f in members}
+    test = [f for f in members if f.path in readable]
+    train = [sensors.without(readable[f.path], study.silenced if study.silent_training else ())
+             for f in files if f.path in readable and f.path not in held]
+    tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
+    started, cpu_before = time.monotonic(), time.process_time()
+    path = study.out / f"{study.name}_fold{fold}_{key}.npz"
+    model = model_of_fold(detector, train, path, study.seed, study.fit_options())
+    if not study.physical_filter and isinstance(detector, Filtered):
+        model = detector.retune(model, train, False)
+    results = [evaluate.evaluate_flight(f, sensors.without(readable[f.path], study.silenced), detector, model).score
+               for f in test]
+    return {"fold": fold, "model": path.name, "lag_s": detector.lag_s(model), "parameters": detector.parameters(model),
+            "seconds": round(time.monotonic() - started, 1),
+            "cpu_seconds": round(time.process_time() - cpu_before, 1), "per_flight": [s.as_dict() for s in results]}
 
 
 def readable_flights(files: Sequence[FlightFile], spare: int = 0,
