@@ -22,13 +22,13 @@ from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.sitl import app as sitl
+from firmware.make import ROOT, make
 from tools import stack
 from tools.emulator import build
 from tools.emulator.cores import CORTEX_M4
 from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 
-ROOT = Path(__file__).parents[3]
 APP = ROOT / "firmware" / "app" / "src"
 GLUE = (APP / "airtouch_app.c").read_text()
 KERNELS = ("band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
@@ -162,76 +162,6 @@ def test_the_build_lists_every_source_that_the_core_needs():
     text = (APP / "Kbuild").read_text()
     built = {Path(name).stem for name in re.findall(r"[\w./]+\.o", text)}
     assert {source.stem for source in SOURCES} <= built
-
-
-@pytest.fixture
-def checkout(tmp_path):
-    """What `make firmware` takes for a checkout of the firmware, up to the first source that it compiles."""
-    for file in ("tools/make/oot.mk", "vendor/FreeRTOS/include/FreeRTOS.h", "vendor/CMSIS/CMSIS/x",
-                 *(f"configs/{name}_defconfig" for name in ("cf2", "cf21bl", "bolt"))):
-        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / file).touch()
-    return tmp_path
-
-
-def make(*arguments):
-    environment = {k: v for k, v in os.environ.items() if k not in ("CRAZYFLIE_BASE", "PLATFORM", "VEHICLE", "CONFIG")}
-    return subprocess.run(["make", "-C", ROOT, *map(str, arguments)], capture_output=True, text=True, env=environment)
-
-
-@pytest.mark.parametrize("missing, words", [(None, "say where the firmware's sources are"),
-                                            ("tools/make/oot.mk", "is no checkout of bitcraze/crazyflie-firmware"),
-                                            ("vendor/FreeRTOS/include/FreeRTOS.h", "lacks its submodules")])
-def test_make_firmware_says_what_is_missing(missing, words, checkout):
-    if missing:
-        (checkout / missing).unlink()
-    run = make("firmware", *([f"CRAZYFLIE_BASE={checkout}"] if missing else []))
-    assert run.returncode != 0 and words in run.stderr
-
-
-@pytest.mark.parametrize("arguments, words", [
-    (["CONFIG=app-config-tab"], "no firmware/app/app-config-tab; CONFIG is one of app-config"),
-    (["PLATFORM=cf3"], "the firmware has no configs/cf3_defconfig"),
-    (["PLATFORM=cf21bl"], "trained for the thrust curve of crazyflie-2.1-flow, not of crazyflie-2.1-brushless"),
-    (["PLATFORM=cf21bl", "VEHICLE=crazyflie-2.1-flow"], "crazyflie-2.1-flow is flown by platform cf2, not by cf21bl"),
-    (["VEHICLE=crazyflie-2.1-brushless"], "crazyflie-2.1-brushless is flown by platform cf21bl, not by cf2"),
-    (["PLATFORM=bolt"], "no vehicle of AirTouch flies bolt"),
-    (["VEHICLE=host/airtouch/vehicles/crazyflie-2.1.toml"], "is no header that `airtouch export --vehicle` wrote"),
-    (["VEHICLE=mine"], "no firmware/app/vehicles/mine.h; VEHICLE is one of crazyflie-2.1"),
-])
-def test_make_firmware_refuses_what_does_not_fit(arguments, words, checkout):
-    run = make("firmware", f"CRAZYFLIE_BASE={checkout}", *arguments)
-    assert run.returncode != 0 and words in run.stderr
-
-
-@pytest.mark.parametrize("config, platform, vehicle, networks", [
-    ("app-config", "cf2", "", ""), ("app-config-gap8-tap", "cf2", "crazyflie-2.1", ""),
-    ("app-config", "cf21bl", "", "no"), ("app-config", "cf2", "firmware/app/vehicles/crazyflie-2.1-flow.h", "")])
-def test_what_fits_comes_as_far_as_the_compiler(config, platform, vehicle, networks, checkout):
-    for tool in ("sed", "basename", "paste"):
-        (checkout / tool).symlink_to(shutil.which(tool))
-    run = subprocess.run([shutil.which("sh"), "firmware/app/build.sh", checkout, config, platform, vehicle, networks],
-                         cwd=ROOT, capture_output=True, text=True, env={"PATH": str(checkout)})
-    assert run.returncode != 0 and run.stderr.startswith("make firmware: no arm-none-eabi-gcc")
-
-
-@pytest.mark.parametrize("arguments, flashed", [
-    ([], "build/firmware/cf21bl.bin"), (["PLATFORM=cf2"], "build/firmware/cf2.bin"), (["IMAGE=x y.bin"], "x y.bin"),
-    (["CHECK=1"], "build/firmware/cf21bl.bin --check"), (["CONFIG=app-config-tap"], "build/firmware/cf2-tap.bin"),
-    (["PLATFORM=cf2", "CONFIG=app-config"], "build/firmware/cf2.bin"),
-    (["URI=radio://0/80/2M/E7E7E7E7E7"], "build/firmware/cf21bl.bin --uri radio://0/80/2M/E7E7E7E7E7")])
-def test_make_flash_takes_the_image_last_built(arguments, flashed, tmp_path):
-    (tmp_path / "build/firmware").mkdir(parents=True)
-    (tmp_path / ".venv/bin").mkdir(parents=True)
-    (tmp_path / ".venv/bin/airtouch").write_text('#!/bin/sh\necho "$@"\n')
-    (tmp_path / ".venv/bin/airtouch").chmod(0o755)
-    command = ["-C", tmp_path, "-f", ROOT / "Makefile", "-o", ".venv/.kernels", "--no-print-directory", "flash"]
-    if not arguments:
-        run = make(*command)
-        assert run.returncode != 0 and "make flash: no image" in run.stderr
-    (tmp_path / "build/firmware/image").write_text("build/firmware/cf21bl.bin\n")
-    run = make(*command, *arguments)
-    assert run.returncode == 0 and run.stdout.split() == f"flash {flashed}".split(), run.stderr
 
 
 @pytest.mark.slow
