@@ -33,3 +33,18 @@ def test_a_file_that_a_run_left_is_seen(tmp_path):
     (tmp_path / "crash-1-0").touch()
     subprocess.run(["git", "add", "."], cwd=tmp_path, check=True)
     assert strangers(tmp_path) == {"crash-1-0"}
+
+
+#: folders of tests that mirror none: of tools/emulator and tools/emulate, and the fuzz targets of all C
+OWN = {"emulation", "fuzz"}
+
+
+def test_a_folder_of_tests_is_named_as_the_folder_that_it_tests():
+    tests = ROOT / "tests"
+    folders = {path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py")} - {"."}
+    assert {f for f in folders if not any((base / f).is_dir() for base in (ROOT, ROOT / "host/airtouch"))} == OWN
+
+
+def test_no_folder_of_tests_holds_more_than_a_reader_overlooks():
+    folders = {path.parent for path in (ROOT / "tests").rglob("test_*.py")}
+    assert {str(f.relative_to(ROOT)): n for f in folders if (n := len(list(f.glob("test_*.py")))) > 15} == {}
