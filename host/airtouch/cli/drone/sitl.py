@@ -1,9 +1,12 @@
 """`airtouch sitl`: a virtual Crazyflie on a UDP port, for cflib, cfclient and `airtouch collect`."""
 
 import signal
+import sys
 from pathlib import Path
 
 import click
+
+STARTING = "starting; the first time compiles the simulator, which takes a minute"
 
 
 @click.command("sitl")
@@ -32,8 +35,9 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
 
     Connect with cflib, cfclient or `airtouch collect --uri udp://127.0.0.1:19850`.
     """
-    # before the imports, which take seconds
-    click.echo("starting; the first time compiles the simulator, which takes a minute", err=True)
+    watched = sys.stderr.isatty()
+    if watched:  # before the imports, which take two seconds
+        click.echo(STARTING, err=True)
     from airtouch.crazyflie import mission
     from airtouch.logs.files import check_free
     from airtouch.simulation import effects
@@ -46,6 +50,8 @@ def command(scenario: str, port: int, host: str, speed: float, vehicle: str, cho
     scene = mission.scene_of(scenario)
     refuse_off(draw_flight(scene, seed, flight), without)
     acting, failures = [effects.parse(text) for text in chosen], [fault_of(text) for text in faults]
+    if not watched:  # after the settings: a wrong one is one line
+        click.echo(STARTING, err=True)
     server = Server(scene, port=port, host=host, speed=speed, vehicle=vehicle,
                     effects=acting, without=without, seed=seed, flight=flight, faults=failures,
                     ai_deck=not no_ai_deck, record=record, force=force)
