@@ -1,6 +1,6 @@
 /**
  * @file app_log.h
- * The log values of the app's core, and its health. Called by app_core.c alone.
+ * The log values of the app's core, and its health. Called by the core alone.
  */
 #pragma once
 

@@ -22,28 +22,28 @@ static uint16_t clampSteps(uint16_t *value, uint16_t low, uint16_t high) {
   return changed;
 }
 
-static uint16_t clampSetting(float *value, float low, float high, float usual) {
-  const float right = clampFloat(isfinite(*value) ? *value : usual, low, high);
+static uint16_t clampSetting(float *value, float low, float high, float shipped) {
+  const float right = clampFloat(isfinite(*value) ? *value : shipped, low, high);
   const uint16_t changed = right != *value;
   *value = right;
   return changed;
 }
 
 uint16_t appParamsClamp(appParams_t *params) {
-  appParams_t usual;
-  appParamsDefaults(&usual);
+  appParams_t shipped;
+  appParamsDefaults(&shipped);
   uint16_t changed = clampByte(&params->enable, 1);
   changed = (uint16_t)(changed + clampByte(&params->detector, APP_PAPER_STREAM_GAP8));
   changed = (uint16_t)(changed + clampByte(&params->filter, APP_FILTER_AS_TRAINED));
   // 5 bins of 0.5 Hz are all that the band's storage has room for, at least one must lie within.
-  changed = (uint16_t)(changed + clampSetting(&params->bandWidth, 0.6f, 2.0f, usual.bandWidth));
-  changed = (uint16_t)(changed + clampSetting(&params->bandMid, 2.0f, 48.0f, usual.bandMid));
-  changed = (uint16_t)(changed + clampSetting(&params->pFa, 1e-12f, 0.5f, usual.pFa));
-  changed = (uint16_t)(changed + clampSetting(&params->probabilityIn, 0.02f, 0.99f, usual.probabilityIn));
+  changed = (uint16_t)(changed + clampSetting(&params->bandWidth, 0.6f, 2.0f, shipped.bandWidth));
+  changed = (uint16_t)(changed + clampSetting(&params->bandMid, 2.0f, 48.0f, shipped.bandMid));
+  changed = (uint16_t)(changed + clampSetting(&params->pFa, 1e-12f, 0.5f, shipped.pFa));
+  changed = (uint16_t)(changed + clampSetting(&params->probabilityIn, 0.02f, 0.99f, shipped.probabilityIn));
   const float below = params->probabilityIn - 0.01f;
-  changed = (uint16_t)(changed + clampSetting(&params->probabilityOut, 0.01f, below, usual.probabilityOut));
-  changed = (uint16_t)(changed + clampSetting(&params->scoreIn, -8.0f, 12.0f, usual.scoreIn));
-  changed = (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, usual.scoreOut));
+  changed = (uint16_t)(changed + clampSetting(&params->probabilityOut, 0.01f, below, shipped.probabilityOut));
+  changed = (uint16_t)(changed + clampSetting(&params->scoreIn, -8.0f, 12.0f, shipped.scoreIn));
+  changed = (uint16_t)(changed + clampSetting(&params->scoreOut, -8.0f, 12.0f, shipped.scoreOut));
   changed = (uint16_t)(changed + clampSteps(&params->probabilityDwell, 10, 1000));
   return (uint16_t)(changed + clampSteps(&params->alertHold, 1, 1000));
 }

@@ -33,7 +33,8 @@ APP = ROOT / "firmware" / "app" / "src"
 GLUE = (APP / "airtouch_app.c").read_text()
 KERNELS = ("band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
            "fr_cfar", "motion_channels", "stream_detector")
-SOURCES = [*(APP / f"app_{name}.c" for name in ("core", "level", "local", "log", "paper", "params")),
+CORE = ("begin", "core", "edges", "gap8", "level", "local", "log", "paper", "params")
+SOURCES = [*(APP / f"app_{name}.c" for name in CORE),
            *(ROOT / "firmware" / "link" / f"{name}.c" for name in ("edge_link", "link_sender")),
            *(ROOT / "firmware" / "kernels" / f"{name}.c" for name in KERNELS),
            *(ROOT / "gap8" / "kernels" / f"{name}.c" for name in ("dense_int8", "sparse_dense_int8", "stream_int8")),
