@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
 from airtouch.simulation import loop, scenario
 from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
 from airtouch.simulation.scenario import draw_flight
-from tools.emulate import build, compare, flight, height
+from airtouch.simulation.sensors import log_row
+from tools.emulate import build, compare, flight, height, side_by_side
 from tools.emulate import plant as at
 from tools.emulate.plant import Plant
 
@@ -91,6 +94,143 @@ def test_a_command_that_differs_is_counted():
     assert compare.differing(one, other)[0] == 0
     other.pwm[60, 2] += 3
     assert compare.differing(one, other) == (1, 100, 60, 3)
+
+
+class Desk:
+    """A board on a desk: its motors stand still. `said` is what it was told."""
+
+    said: list[bytes] = []
+    console = "Self test passed!"
+
+    def __init__(self, _elf, _mode, names, **_options):
+        self.names = names
+        Desk.said = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def on(self, _kind, _handler):
+        pass
+
+    def go(self):
+        pass
+
+    def hear(self, _kind):
+        return b""
+
+    def values(self, _report):
+        return dict.fromkeys(self.names, 0.0) | {"latency_us": 7}
+
+    def say(self, kind, content):
+        Desk.said.append(kind.encode() + content)
+
+    def end(self):
+        return {}
+
+
+@pytest.mark.parametrize("name, armed", [("crazyflie-2.1-flow", 0), ("crazyflie-2.1-brushless", 1)])
+def test_the_brushless_drone_alone_is_armed(monkeypatch, name, armed):
+    monkeypatch.setattr(flight, "Board", Desk)
+    found = flight.fly(Path("any.elf"), scenario.parse(HOVER, "hover"), vehicles.load(name), 1)
+    arm = b"L" + struct.pack("<BBB", 0, 3, 9 << 4 | 3 << 2 | 1) + b"\x01\x01"
+    assert Desk.said.count(arm) == armed
+    assert found.table.shape[1] == flight.COLUMNS and found.latency_us == 7
+    assert found.table[-1, flight.TRUE_X:flight.TRUE_X + 2] == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_reports_belong_to_crossings_of_their_kind_one_to_one():
+    crossed = [(5.0, "entry"), (8.0, "exit"), (12.0, "entry")]
+    late = height.felt(crossed, [(6.0, "entry"), (6.5, "entry"), (8.5, "entry"), (12.3, "exit"), (14.6, "entry")])
+    assert late == pytest.approx([1.0]), "an entry for an exit, a second report and one too late are false"
+
+
+def leg(**given):
+    return height.Leg(**{"ending": "ok", "low_m": 0.7, "high_m": 0.9, "crossed": [], "reported": [], "end_m": 0.4,
+                         "own_end_m": 0.0, "latency_us": 77} | given)
+
+
+def test_a_summary_counts_flights_edges_and_false_reports():
+    crossed = [(5.0, "entry"), (8.0, "exit")]
+    legs = [leg(low_m=0.6, crossed=crossed, reported=[(5.5, "entry"), (10.0, "exit")]),
+            leg(ending="it turned over after 3 s", high_m=1.9, crossed=crossed, reported=[(1.0, "exit")])]
+    assert height.summary(legs) == ("1 of 2 ended well, 0.60 to 1.90 m; felt 2 of 4 (1 within 1.5 s), 0.5 to 2.0 s "
+                                    "late; 1 false")
+    assert height.summary([leg()]) == "1 of 1 ended well, 0.70 to 0.90 m; felt 0 of 0; 0 false"
+
+
+def test_flights_that_were_kept_are_not_flown_again(monkeypatch, tmp_path, capsys):
+    flown = []
+
+    def fly(_elf, _scenario, _vehicle, seed, **_options):
+        flown.append(seed)
+        table = np.zeros((3, flight.COLUMNS))
+        table[:, flight.T] = 5.0
+        return flight.Flown(table=table, edges=[(5.0, "entry", 0.1)])
+
+    monkeypatch.setattr(height, "fly", fly)
+    elf = tmp_path / "board.elf"
+    elf.write_bytes(b"one")
+    assert height.report(elf, seeds=2, only="flat", folder=tmp_path / "flights") and flown == [1, 1, 2, 2]
+    first = capsys.readouterr().out
+    assert height.report(elf, seeds=2, only="flat", folder=tmp_path / "flights") and flown == [1, 1, 2, 2]
+    assert capsys.readouterr().out == first
+    elf.write_bytes(b"another")
+    height.report(elf, seeds=1, only="flat", folder=tmp_path / "flights")
+    assert flown == [1, 1, 2, 2, 1, 1], "another image flies anew"
+
+
+def test_a_case_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(AirTouchError, match="no case begins with 'slope'; --only is the beginning of one of: platform"):
+        height.report(tmp_path / "board.elf", only="slope")
+
+
+def test_a_ramp_is_not_why_the_drone_comes_back_beside_its_start():
+    """The mission flies velocities, so what sensors and wind are off by adds up: as much over a flat floor."""
+    missions = [height.mission(next(case for case in height.CASES if case.name.startswith(name)))
+                for name in ("flat floor", "ramp")]
+    flat, ramp = (np.array([side_by_side.own_loop(one, compare.vehicle(), seed)[-1, log_row.POSITION]
+                            for seed in range(1, 7)]) for one in missions)
+    assert side_by_side.rms([flat]) > 0.2 and np.abs(ramp - flat).max() < 0.1
+
+
+def test_both_loops_draw_the_same_noise(plant):
+    """After the seconds on the floor the IMU's random numbers stand where they do in the emulated flight."""
+    flown = scenario.parse(HOVER, "hover")
+    own = side_by_side.own_loop(flown, compare.vehicle(), 1)
+    assert own.shape == (len(draw_flight(flown, 1, 0).setpoints), log_row.COLUMNS)
+    assert own[0, log_row.T] == pytest.approx(flight.BOOT_S) and own[-1, log_row.POSITION + 2] > 0.4
+
+
+def test_loops_apart_by_an_offset_and_by_other_noise():
+    own = np.zeros((100, log_row.COLUMNS))
+    table = np.zeros((120, flight.COLUMNS))
+    table[:, flight.T] = 0.01 * np.arange(-10, 110)
+    table[:, flight.TRUE_X + 2] = 0.3
+    table[:, flight.MOTOR] = 1000.0 * (-1.0) ** np.arange(120)
+    pair = side_by_side.together(flight.Flown(table=table), own, 0.2, 0.5)
+    assert [len(part) for part in pair] == [30, 30] and pair[0][0, flight.T] == pytest.approx(0.2)
+    other = own[:30].copy()
+    other[:, log_row.PWM] = 5.0
+    rows = {row.channel: row for row in side_by_side.apart([pair, (pair[0], other)])}
+    assert (rows["z, m"].loops, rows["z, m"].emulated, rows["z, m"].draws) == pytest.approx((0.3, 0.0, 0.0))
+    assert rows["motor 1, PWM"].emulated == pytest.approx(1000.0) and rows["motor 1, PWM"].draws == pytest.approx(5.0)
+    assert rows["motor 2, PWM"].loops == 0.0 and np.isnan(side_by_side.apart([pair])[0].draws)
+    rows = {row.channel: row for row in side_by_side.apart([pair], [other])}
+    assert rows["motor 1, PWM"].draws == pytest.approx(5.0) and rows["motor 1, PWM"].own == 0.0
+
+
+def test_traces_are_written_side_by_side_and_not_over_others(tmp_path):
+    own = np.zeros((50, log_row.COLUMNS))
+    table = np.ones((50, flight.COLUMNS))
+    side_by_side.write_traces(tmp_path / "traces.csv", flight.Flown(table=table), own)
+    head, *rows = (tmp_path / "traces.csv").read_text().splitlines()
+    assert head.startswith("t_s,x m emulated,x m own,") and len(rows) == 50
+    assert rows[0].split(",")[:3] == ["1", "1", "0"] and len(head.split(",")) == len(rows[0].split(","))
+    with pytest.raises(AirTouchError, match="exists already; use --force"):
+        side_by_side.write_traces(tmp_path / "traces.csv", flight.Flown(table=table), own)
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from airtouch import vehicle as vehicles
 from airtouch.detector import best
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import AppCore
+from airtouch.logs import write
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 from airtouch.simulation.scenario import draw_flight
@@ -93,6 +94,14 @@ def test_a_folder_that_is_no_checkout_is_refused(path_with, tmp_path, refused):
     refused(tmp_path, f"{tools}:{os.environ['PATH']}", "is no checkout of bitcraze/crazyflie-firmware")
 
 
+def test_a_copy_without_its_history_is_refused(path_with, tmp_path, refused):
+    (tmp_path / "tools/make").mkdir(parents=True)
+    (tmp_path / "tools/make/oot.mk").touch()
+    tools = path_with("arm-none-eabi-gcc", "qemu-system-arm")
+    refused(tmp_path, f"{tools}:{os.environ['PATH']}", "does not say which release it is, and the board is written for "
+                                                       "2026.08: git clone --recursive --branch 2026.08")
+
+
 def test_another_release_is_refused(path_with, tmp_path, refused):
     base = tmp_path / "base"
     (base / "tools/make").mkdir(parents=True)
@@ -108,6 +117,37 @@ def test_a_flight_without_motors_is_refused(log):
     less = changed(log, columns={k: v for k, v in log.columns.items() if k != "m3_pwm"})
     with pytest.raises(AirTouchError, match="has no m3_pwm: the app needs acceleration, rates and motors"):
         rows(less)
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (["flight.csv", "--fly"], "--fly flies the simulator's drone: leave out flight.csv"),
+    (["--height", "--only", "slope"], "no case begins with 'slope'; --only is the beginning of one of: platform 0.76"),
+    (["nowhere.csv"], "nowhere.csv: cannot be read: No such file"),
+])
+def test_what_cannot_be_run_is_refused_before_anything_is_built(monkeypatch, tmp_path, arguments, words):
+    monkeypatch.setattr(build, "tools", lambda: pytest.fail("it went on"))
+    with pytest.raises(AirTouchError) as found:
+        main([str(tmp_path), *arguments])
+    assert words in str(found.value) and "\n" not in str(found.value)
+
+
+def test_a_flight_is_looked_at_before_anything_is_built(monkeypatch, tmp_path, log):
+    monkeypatch.setattr(build, "tools", lambda: pytest.fail("it went on"))
+    write(changed(log, columns={k: v for k, v in log.columns.items() if k != "m3_pwm"}), tmp_path / "flight.csv")
+    with pytest.raises(AirTouchError, match="has no m3_pwm"):
+        main([str(tmp_path), str(tmp_path / "flight.csv")])
+    write(log, tmp_path / "short.csv")
+    with pytest.raises(AirTouchError, match=rf"has {len(log)} rows: --begin must be less"):
+        main([str(tmp_path), str(tmp_path / "short.csv"), "--begin", str(len(log))])
+
+
+def test_an_image_that_was_not_built_is_asked_for(monkeypatch, tmp_path):
+    monkeypatch.setattr(build, "BUILT", tmp_path)
+    with pytest.raises(AirTouchError, match="no image is built yet: leave out --built"):
+        build.link()
+    (tmp_path / "image").write_text("build/firmware/cf2.bin\n")
+    with pytest.raises(AirTouchError, match="without height_port.c: leave out --built"):
+        build.link(needs="height_port")
 
 
 def test_what_is_fed_is_what_the_core_gets(log):

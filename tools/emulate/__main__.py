@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,16 +19,16 @@ import numpy as np
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import read
+from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
 from tools.emulate import build, gap8, height
 from tools.emulate.board import PER_US
 from tools.emulate.compare import report
-from tools.emulate.replay import VEHICLES, Replay, replay
+from tools.emulate.replay import VEHICLES, Replay, replay, rows
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
-CLONE = "git clone --recursive --branch 2026.08 https://github.com/bitcraze/crazyflie-firmware ~/crazyflie-firmware"
 #: step -> parameters: three that are taken over, one out of range, the other detector and back
 CHANGES: dict[int, dict[str, float]] = {
     100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0},
@@ -45,7 +46,9 @@ def recorded(count: int) -> list[FlightLog]:
 
 
 def later(log: FlightLog, begin: int) -> FlightLog:
-    """The log from this row on."""
+    """The log from this row on. AirTouchError where it has none."""
+    if begin >= len(log):
+        raise AirTouchError(f"{log.meta.get('source', 'the flight')} has {len(log)} rows: --begin must be less")
     return FlightLog({name: values[begin:] for name, values in log.columns.items()}, log.meta)
 
 
@@ -62,54 +65,92 @@ def show(what: str, seconds: float, result: Replay) -> None:
         print(f"  first difference: {result.first}")
 
 
-def main(arguments: list[str]) -> int:
-    """Build, run, print. 1 where a step differs."""
-    parser = argparse.ArgumentParser(prog="python -m tools.emulate", description=__doc__.splitlines()[0])
-    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
-    parser.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
-    parser.add_argument("--steps", type=int, default=2400, help="of each flight (2400)")
-    parser.add_argument("--begin", type=int, default=0, help="first row of each flight (0)")
-    parser.add_argument("--built", action="store_true", help="take what `make firmware` built last")
-    parser.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
-    parser.add_argument("--height", action="store_true",
-                        help="closed loop over edges of every kind: the height kept or not")
-    parser.add_argument("--seeds", type=int, default=1, help="of --height: draws of the noise (1)")
-    parser.add_argument("--only", default="", help="of --height: cases whose names begin so")
-    parser.add_argument("--gap8", action="store_true",
-                        help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
-    parser.add_argument("--config", help="of firmware/app: app-config-tap and the like")
-    parser.add_argument("--platform", default="cf2", choices=VEHICLES, help="of the firmware (cf2)")
-    options = parser.parse_args(arguments)
-    build.tools()
-    if not options.built:
-        config = "app-config-height" if options.height else "app-config-gap8" if options.gap8 else "app-config"
-        build.compile_firmware(options.base.expanduser().resolve(), options.config or config, options.platform)
-    elf = build.link()
-    if options.fly:
-        return 0 if report(elf) else 1
+def positive(text: str) -> int:
+    """A whole number from 1 on, for argparse."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text} is less than 1")
+    return number
+
+
+def parser() -> argparse.ArgumentParser:
+    """What the command takes."""
+    found = argparse.ArgumentParser(prog="python -m tools.emulate", description=__doc__,
+                                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    found.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
+    found.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
+    found.add_argument("--steps", type=positive, default=2400, help="of each flight (2400)")
+    found.add_argument("--begin", type=int, default=0, help="first row of each flight (0)")
+    found.add_argument("--built", action="store_true", help="take what `make firmware` built last")
+    found.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
+    found.add_argument("--height", action="store_true",
+                       help="closed loop over edges of every kind: the height kept or not")
+    found.add_argument("--seeds", type=positive, default=1, help="of --fly and --height: draws of the noise (1)")
+    found.add_argument("--traces", type=Path, help="of --fly: CSV for the first flight and the simulator's own")
+    found.add_argument("--force", action="store_true", help="overwrite that")
+    found.add_argument("--only", default="", help="of --height: cases whose names begin so")
+    found.add_argument("--keep", type=Path, help="of --height: folder of its flights; those that are there are not "
+                                                 "flown again")
+    found.add_argument("--gap8", action="store_true",
+                       help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
+    found.add_argument("--config", help="of firmware/app: app-config-tap and the like")
+    found.add_argument("--platform", default="cf2", choices=VEHICLES, help="of the firmware (cf2)")
+    return found
+
+
+def given(options: argparse.Namespace) -> list[FlightLog]:
+    """The flights of the command line from --begin on. AirTouchError, before anything is built, for what cannot be
+    run."""
+    check_free(options.traces, options.force)
+    if options.flights and (options.fly or options.height):
+        raise AirTouchError(f"--{'fly' if options.fly else 'height'} flies the simulator's drone: leave out "
+                            f"{options.flights[0]}")
     if options.height:
-        return 0 if height.report(elf, options.seeds, options.only) else 1
-    if options.gap8:
-        log = read(options.flights[0]) if options.flights else recorded(1)[0]
-        return 0 if gap8.report(elf, later(log, options.begin), options.steps) else 1
-    logs = [read(path) for path in options.flights] or recorded(2)
+        height.cases(options.only)
+    logs = [later(read(path), options.begin) for path in options.flights]
+    for log in logs:
+        rows(log)
+    return logs
+
+
+def replayed(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
+    """Replay and print; parameters change in the last flight. Steps that differ."""
     different = 0
     for i, log in enumerate(logs):
         changes: dict[int, dict[str, float]] = CHANGES if i == len(logs) - 1 else {}
         begun = time.monotonic()
-        found = replay(elf, later(log, options.begin), options.steps, changes, VEHICLES[build.platform()])
+        found = replay(elf, log, steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
         show(name, time.monotonic() - begun, found)
         different += found.different
-    return 1 if different else 0
+    return different
+
+
+def main(arguments: list[str]) -> int:
+    """Build, run, print. 1 where a step differs."""
+    options = parser().parse_args(arguments)
+    logs = given(options)
+    build.tools()
+    if not options.built:
+        config = "app-config-height" if options.height else "app-config-gap8" if options.gap8 else "app-config"
+        build.compile_firmware(options.base.expanduser().resolve(), options.config or config, options.platform)
+    elf = build.link(needs="height_port" if options.height else "gap8_port" if options.gap8 else "")
+    if options.fly:
+        return 0 if report(elf, build.platform(), options.seeds, options.traces, options.force) else 1
+    if options.height:
+        return 0 if height.report(elf, build.platform(), options.seeds, options.only, options.keep) else 1
+    logs = logs or [later(log, options.begin) for log in recorded(1 if options.gap8 else 2)]
+    if options.gap8:
+        return 0 if gap8.report(elf, logs[0], options.steps) else 1
+    return 1 if replayed(elf, logs, options.steps) else 0
 
 
 if __name__ == "__main__":
     try:
         if len(sys.argv) < 2 or not sys.argv[1]:
             raise AirTouchError(f"say where the firmware's sources are: make emulate "
-                                f"CRAZYFLIE_BASE=~/crazyflie-firmware; {CLONE}")
+                                f"CRAZYFLIE_BASE=~/crazyflie-firmware; {build.CLONE}")
         sys.exit(main(sys.argv[1:]))
     except AirTouchError as error:
         sys.exit(f"make emulate: {error}")

@@ -1,4 +1,4 @@
-"""The emulated image: the objects that `make firmware` compiled, linked anew around a board of ours (board.c).
+"""The emulated image: the objects that `make firmware` compiled, linked anew around a board of ours (hardware/).
 
 Nothing of the firmware is compiled a second time. The linker puts the board's functions in place of those in WRAPPED,
 moves the CCM behind the RAM (QEMU's STM32F405 has none at its own place), and adds the two words that the
@@ -18,6 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILT = ROOT / "build" / "firmware"
 OUT = ROOT / "build" / "emulate"
 RELEASE = "2026.08"  #: the one that the board was written for
+CLONE = (f"git clone --recursive --branch {RELEASE} https://github.com/bitcraze/crazyflie-firmware "
+         "~/crazyflie-firmware")
 #: functions of drivers, whose place the board's take
 WRAPPED = (
     "SystemInit", "usecTimerInit", "usecTimestamp", "uartslkInit", "uartslkTest",
@@ -30,7 +32,7 @@ WRAPPED = (
     "pmw3901ReadMotion", "vl53l1xInit", "VL53L1_StopMeasurement", "VL53L1_StartMeasurement", "VL53L1_SetDistanceMode",
     "VL53L1_SetMeasurementTimingBudgetMicroSeconds", "VL53L1_GetMeasurementDataReady",
     "VL53L1_GetRangingMeasurementData", "consolePutchar", "assertFail", "storeAssertTextData",
-    "storeAssertHardfaultData", "EXTI_GetITStatus", "appMain", "vTaskDelayUntil", "xTaskIncrementTick")
+    "storeAssertHardfaultData", "EXTI_GetITStatus", "motorsGetRPM", "appMain", "vTaskDelayUntil", "xTaskIncrementTick")
 #: functions of hardware that is not there, which do nothing and return 0
 LEFT_OUT = ("i2cdevInit", "i2cdevRead", "i2cdevReadReg8", "i2cdevReadReg16", "i2cdevWrite", "i2cdevWriteReg8",
             "i2cdevWriteReg16", "usblinkInit", "adcInit", "buzzerInit", "watchdogInit")
@@ -57,8 +59,11 @@ def release(base: Path) -> str:
 
 def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf2") -> str:
     """`make firmware` of this checkout; what it printed. Another platform than cf2 gets FR-CFAR alone."""
+    checkout = (base / "tools/make/oot.mk").is_file()
     found = release(base) if (base / ".git").exists() else "unknown"
-    if (base / "tools/make/oot.mk").is_file() and found.split("-")[0] != RELEASE:
+    if checkout and found == "unknown":
+        raise AirTouchError(f"{base} does not say which release it is, and the board is written for {RELEASE}: {CLONE}")
+    if checkout and found.split("-")[0] != RELEASE:
         raise AirTouchError(f"{base} is {found}, the board is written for {RELEASE}: git -C {base} checkout {RELEASE}")
     networks = "" if platform == "cf2" else "no"
     run = subprocess.run(["make", "-C", ROOT, "--no-print-directory", "firmware", f"CRAZYFLIE_BASE={base}",
@@ -72,7 +77,10 @@ def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf
 
 def platform() -> str:
     """The platform of the last `make firmware`."""
-    return Path((BUILT / "image").read_text().strip()).stem.split("-")[0]
+    image = BUILT / "image"
+    if not image.is_file():
+        raise AirTouchError("no image is built yet: leave out --built")
+    return Path(image.read_text().strip()).stem.split("-")[0]
 
 
 def _flags() -> tuple[list[str], Path]:
@@ -99,23 +107,27 @@ def _objects() -> list[Path]:
     return parts(where / "firmware")
 
 
-def link() -> Path:
-    """The image, from the last `make firmware`."""
+def link(needs: str = "") -> Path:
+    """The image, from the last `make firmware`. AirTouchError where that lacks an object of the app that is needed."""
+    device = f'-DDEVICE="{DEVICES[platform()]}"'
+    if needs and not (BUILT / f"firmware/app/src/{needs}.o").is_file():
+        raise AirTouchError(f"the image that was built last is without {needs}.c: leave out --built")
     flags, base = _flags()
     OUT.mkdir(parents=True, exist_ok=True)
     here = Path(__file__).parent
     nothing = OUT / "left_out.c"
     nothing.write_text("".join(f"int __wrap_{name}(void) {{ return 0; }}\n" for name in LEFT_OUT))
-    device = f'-DDEVICE="{DEVICES[platform()]}"'
-    for source in (here / "board.c", nothing):
+    sources = [*sorted((here / "hardware").glob("*.c")), nothing]
+    own_objects = [OUT / f"{source.stem}.o" for source in sources]
+    for source, target in zip(sources, own_objects, strict=True):
         _run("arm-none-eabi-gcc", *flags, device, "-std=gnu11", "-O2", "-g", "-Wall", "-Werror", "-c", source,
-             "-o", OUT / f"{source.stem}.o")
+             "-o", target)
     elf = OUT / "board.elf"
     objects = _objects()
     own = ["estimatorEnqueue"] if any(path.name == "height_port.o" for path in objects) else []  # firmware/app/Makefile
     wraps = [f"-Wl,--wrap={name}" for name in (*WRAPPED, *LEFT_OUT, *own)]
     listed = OUT / "objects"
-    listed.write_text("\n".join(f'"{path}"' for path in [OUT / "board.o", OUT / "left_out.o", *objects]))
+    listed.write_text("\n".join(f'"{path}"' for path in [*own_objects, *objects]))
     _run("arm-none-eabi-gcc", *CORE, "--specs=nosys.specs", "--specs=nano.specs", "-nostdlib", "-z", "noexecstack",
          "-Wl,--gc-sections,--undefined=uxTopUsedPriority,--undefined=boot", f"-L{base}/tools/make/F405/linker",
          "-T", here / "board.ld", *wraps, f"@{listed}", "-lm", "-o", elf)

@@ -1,27 +1,31 @@
 """The same flight twice: in emulation with the app and without, and in the simulator's own loop."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from airtouch import vehicle as vehicles
-from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import scenario
-from airtouch.simulation.flight import fly as simulated
 from airtouch.simulation.flight_plan.world import top_at
 from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.vehicle import Vehicle
-from tools.emulate.flight import BOOT_S, Flown, fly
+from tools.emulate import side_by_side
+from tools.emulate.flight import BOOT_S, TRUE_X, Flown, T, fly
 from tools.emulate.plant import STEP_S
-from tools.emulate.replay import VEHICLE
+from tools.emulate.replay import VEHICLES
 
+DRAWS = 3  #: seeds of the own loop whose flights are held against each other
+AIRBORNE_S = 2.5  #: of there-and-back: the take-off has ended
+#: of there-and-back: end of the take-off's swing, seconds of the landing at the end
+SETTLED_S, LAND_S = 4.5, 3.5
 SCENARIO = Path(__file__).with_name("there-and-back.toml")
 
 
-def vehicle() -> Vehicle:
-    """The drone with the firmware as shipped: no range module."""
-    return replace(vehicles.load(VEHICLE), range_module="firmware")
+def vehicle(platform: str = "cf2") -> Vehicle:
+    """The drone of a platform with the firmware as shipped: no range module."""
+    return replace(vehicles.load(VEHICLES[platform]), range_module="firmware")
 
 
 def crossings(flown: Scenario, seed: int, flight: int, table: np.ndarray) -> list[tuple[float, str]]:
@@ -32,19 +36,27 @@ def crossings(flown: Scenario, seed: int, flight: int, table: np.ndarray) -> lis
     return [(float(table[i + 1, 0]), "entry" if over[i + 1] else "exit") for i in at]
 
 
-def apart(one: Flown, log: FlightLog, until_s: float) -> dict[str, float]:
-    """How far the emulated flight is from the simulator's own, at the same seconds in the air up to until_s: rms."""
-    table = one.table[(one.table[:, 0] >= 0.0) & (one.table[:, 0] < until_s)]
-    n = min(len(table), len(log))
-    flies = (table[:n, 3] > 0.3) & (log["z_m"][:n] > 0.3)
+def first_edge(flown: Scenario, seed: int, table: np.ndarray) -> float:
+    """Second at which the drone crossed its first edge in truth; infinite where it crossed none."""
+    edges = crossings(flown, seed, 0, table)
+    return edges[0][0] if edges else np.inf
 
-    def rms(emulated: np.ndarray, own: np.ndarray) -> float:
-        return float(np.sqrt(np.mean(np.square(emulated[:n][flies] - own[:n][flies]))))
 
-    return {"seconds": float(flies.sum() / 100.0), "height m": rms(table[:, 3], log["z_m"]),
-            "x m": rms(table[:, 1], log["x_m"]),
-            "y m": rms(table[:, 2], log["y_m"]),
-            "mean motor PWM": rms(table[:, 4:8].mean(axis=1), log.stack(PWM).mean(axis=1))}
+def cruise(one: Flown) -> np.ndarray:
+    """Rows between take-off and landing; to the end where it did not end well."""
+    t = one.table[:, T]
+    return one.table[(t >= SETTLED_S) & (t < (t[-1] - LAND_S if one.ending == "ok" else np.inf))]
+
+
+def kept(one: Flown) -> tuple[float, float]:
+    """Least and greatest true height over the floor between take-off and landing, m."""
+    heights = cruise(one)[:, TRUE_X + 2]
+    return (float(heights.min()), float(heights.max())) if len(heights) else (np.nan, np.nan)
+
+
+def words(edges: Sequence[tuple[float, str]]) -> str:
+    """Edges (s, kind) as text."""
+    return " ".join(f"{kind}@{t:.2f}" for t, kind in edges) or "none"
 
 
 def differing(one: Flown, other: Flown) -> tuple[int, int, int, int]:
@@ -55,29 +67,81 @@ def differing(one: Flown, other: Flown) -> tuple[int, int, int, int]:
     return len(at), n, int(at[0]) if len(at) else -1, int(gap[at[0]]) if len(at) else 0
 
 
-def report(elf: Path, seed: int = 1) -> bool:
-    """Fly, print; whether the app changed no motor command where the clock goes in whole milliseconds."""
-    flown = scenario.load(SCENARIO)
-    on, off = fly(elf, flown, vehicle(), seed), fly(elf, flown, vehicle(), seed, app=False)
-    other, n, first, by = differing(on, off)
-    print(f"there-and-back, seed {seed}: with the app {on.ending}, without {off.ending}")
+@dataclass(frozen=True)
+class Mission:
+    """There-and-back of one seed: with the app and without, then both with a clock of whole milliseconds."""
+
+    seed: int
+    on: Flown
+    off: Flown
+    coarse_on: Flown
+    coarse_off: Flown
+    own: np.ndarray  #: side_by_side.own_loop
+
+    def same(self) -> bool:
+        """Whether the app changed no motor command where the clock goes in whole milliseconds."""
+        return (differing(self.coarse_on, self.coarse_off)[0] == 0
+                and len(self.coarse_on.pwm) == len(self.coarse_off.pwm))
+
+
+def flown(elf: Path, drone: Vehicle, seed: int) -> Mission:
+    """Fly there and back."""
+    plan = scenario.load(SCENARIO)
+    on, off, coarse_on, coarse_off = (fly(elf, plan, drone, seed, app=app, whole_milliseconds=coarse)
+                                      for coarse in (False, True) for app in (True, False))
+    return Mission(seed, on, off, coarse_on, coarse_off, side_by_side.own_loop(plan, drone, seed))
+
+
+def show(one: Mission) -> None:
+    """Print what one mission shows."""
+    plan = scenario.load(SCENARIO)
+    other, n, first, by = differing(one.on, one.off)
+    print(f"there-and-back, seed {one.seed}: with the app {one.on.ending}, without {one.off.ending}")
     print(f"motors: {other} of {n} commands differ"
           + (f", the first at {first * STEP_S - BOOT_S:.2f} s by {by} of 65535" if other else ""))
-    coarse = [fly(elf, flown, vehicle(), seed, app=app, whole_milliseconds=True) for app in (True, False)]
-    same, n, _, _ = differing(*coarse)
+    same, n, _, _ = differing(one.coarse_on, one.coarse_off)
     print(f"with a clock of whole milliseconds: {same} of {n} commands differ")
-    print(f"stabilizer, sensor to motors: worst {on.latency_us} us with the app, {off.latency_us} us without, median "
-          f"{np.median(on.latencies_us):.0f} us; app: late {on.late}, longest step {on.load_us} us")
-    for what, one in (("with the app", on), ("the same, whole milliseconds", coarse[0])):
-        true = crossings(flown, seed, 0, one.table)
-        print(f"{what}: edges crossed " + (" ".join(f"{kind}@{t:.2f}" for t, kind in true) or "none") + ", felt "
-              + (" ".join(f"{kind}@{t:.2f}" for t, kind, _ in one.edges) or "none") + " (s)")
-    log = simulated(flown, vehicle(), seed)
-    if isinstance(log, FlightLog):
-        edge = crossings(flown, seed, 0, on.table)
-        for what, until in (("before the first edge", edge[0][0] if edge else np.inf), ("all", np.inf)):
-            print(f"beside the simulator's own loop, {what}, rms: "
-                  + ", ".join(f"{k} {v:.3g}" for k, v in apart(on, log, until).items()))
-    else:
-        print(f"the simulator's own loop: {log}")
-    return same == 0 and len(coarse[0].pwm) == len(coarse[1].pwm)
+    print(f"stabilizer, sensor to motors: worst {one.on.latency_us} us with the app, {one.off.latency_us} us without, "
+          f"median {np.median(one.on.latencies_us):.0f} us; app: late {one.on.late}, longest step {one.on.load_us} us")
+    for what, two in (("with the app", one.on), ("the same, whole milliseconds", one.coarse_on)):
+        low, high = kept(two)
+        true = crossings(plan, one.seed, 0, two.table)
+        print(f"{what}: {low:.2f} to {high:.2f} m over the floor; edges crossed {words(true)}, felt "
+              f"{words([(t, kind) for t, kind, _ in two.edges])} (s)", flush=True)
+
+
+def show_side_by_side(missions: Sequence[Mission], drone: Vehicle) -> None:
+    """Print how far the simulator's own loop is from the emulated firmware, before the first edge.
+
+    Beside it how far that loop's own flights are apart, of DRAWS seeds at least.
+    """
+    plan = scenario.load(SCENARIO)
+    pairs = [side_by_side.together(one.on, one.own, AIRBORNE_S,
+                                   min(first_edge(plan, one.seed, one.on.table),
+                                       first_edge(plan, one.seed, side_by_side.places(one.own)))) for one in missions]
+    seconds = sum(len(a) for a, _ in pairs) / side_by_side.ROWS_S
+    others = []
+    for seed in range(len(missions) + 1, DRAWS + 1):
+        own = side_by_side.own_loop(plan, drone, seed)
+        until_s = first_edge(plan, seed, side_by_side.places(own))
+        others.append(side_by_side.together(Flown(table=missions[0].on.table), own, AIRBORNE_S, until_s)[1])
+    print(f"beside the simulator's own loop, {seconds:.1f} s of {len(pairs)} flights from {AIRBORNE_S} s to the first "
+          f"edge, rms:\n  channel             between the loops, same noise"
+          "   own loop, other noise   scatter: emulated   own")
+    for row in side_by_side.apart(pairs, others):
+        print(f"  {row.channel:20}{row.loops:12.3g}{row.draws:36.3g}{row.emulated:20.3g}{row.own:12.3g}")
+
+
+def report(elf: Path, platform: str = "cf2", seeds: int = 1, traces: Path | None = None, force: bool = False) -> bool:
+    """Fly, print; whether the app changed no motor command where the clock goes in whole milliseconds.
+
+    traces: CSV that the first flight is written to, beside the simulator's own.
+    """
+    missions = []
+    for seed in range(1, seeds + 1):
+        missions.append(flown(elf, vehicle(platform), seed))
+        show(missions[-1])
+    show_side_by_side(missions, vehicle(platform))
+    if traces:
+        side_by_side.write_traces(traces, missions[0].on, missions[0].own, force)
+    return all(one.same() for one in missions)

@@ -5,7 +5,7 @@ voltage and parameters reach it as packets of its radio.
 """
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,22 +27,30 @@ REST = 0.2  #: the IMU's noise there over that in flight; the firmware takes no 
 GYRO_LSB, ACC_LSB = np.deg2rad(4000.0 / 65536.0), 48.0 / 65536.0 * 9.81  #: of the BMI088 as the firmware sets it
 NO_RANGE_MM = 8190  #: what a VL53L1 says where it sees nothing
 RADIO_RAW, BATTERY_STATE, COMMANDER, STOP, HOVER = 0x00, 0x13, 7, 0, 5  #: syslink and CRTP
+ARM = b"\x01\x01"  #: the supervisor's command that arms, which platforms with brushless motors wait for
+ARM_S = 1.0  #: before the mission begins
+SUPERVISOR, SUPERVISOR_COMMAND, ARMS_ITSELF = 9, 1, ("cf2", "")
 PARAM, BY_NAME, UINT8, FLOAT = 2, 3, 0x08, 0x06
 MOTORS = tuple(f"motor.m{i}" for i in range(1, 5))
 ESTIMATE = tuple(f"stateEstimate.{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw"))
+IMU = tuple(f"{sensor}.{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
+IMU_UNITS = np.repeat([9.81, np.deg2rad(1.0)], 3)  #: m/s^2 and rad/s in those of IMU
 WATCHED = (*MOTORS, *ESTIMATE, "range.zrange", "pm.vbat", "airtouch.steps", "airtouch.edges", "airtouch.edge",
-           "airtouch.late", "airtouch.loadMax", "airtouch.health", "supervisor.info")
+           "airtouch.late", "airtouch.loadMax", "airtouch.health", "supervisor.info", *IMU)
+#: first columns of Flown.table; those that begin with TRUE are the simulator's
+T, TRUE_X, MOTOR, X, DOWN, TOP, TRUE_VELOCITY, TRUE_ANGLES, ACC, GYRO, COLUMNS = 0, 1, 4, 8, 17, 18, 19, 22, 25, 28, 31
 
 
 @dataclass
 class Flown:
     """A flight in emulation: rows at 100 Hz and what happened.
 
-    table: t_s (mission), true x, y, z, four motors, the nine of ESTIMATE, down range m, height of what is below it.
+    table (rows, 31): t_s (mission), true x, y, z (m), four motors, the nine of ESTIMATE, down range (m), height of
+    what is below it (m), true velocity (m/s), true roll, pitch and yaw (rad), acc (m/s^2) and gyro (rad/s) as logged.
     pwm: (n, 4) motors every 2 ms, from the first tick on. edges: (s of the mission, kind, true x).
     """
 
-    table: np.ndarray = field(default_factory=lambda: np.zeros((0, 19)))
+    table: np.ndarray = field(default_factory=lambda: np.zeros((0, COLUMNS)))
     pwm: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint16))
     edges: list[tuple[float, str, float]] = field(default_factory=list)
     latency_us: int = 0
@@ -72,6 +80,17 @@ def set_point_packet(row: np.ndarray) -> bytes:
     c, s = np.cos(row[setpoint.YAW]), np.sin(row[setpoint.YAW])
     ahead, left = c * row[setpoint.VX] + s * row[setpoint.VY], c * row[setpoint.VY] - s * row[setpoint.VX]
     return crtp(COMMANDER, 0, struct.pack("<Bffff", HOVER, ahead, left, 0.0, row[setpoint.Z]))
+
+
+def radio_packets(setpoints: np.ndarray, volts: float, step: int, wait: int,
+                  parameters: Mapping[str, float]) -> Iterator[bytes]:
+    """What the radio's processor sends at a step of the log: the battery's voltage, half-way through the start the
+    parameters, and from `wait` on the mission's set-points."""
+    yield struct.pack("<BBBff", BATTERY_STATE, 9, 0, volts, 0.0)
+    if step == wait // 2:
+        yield from (set_parameter(name, value) for name, value in parameters.items())
+    if step >= wait:
+        yield set_point_packet(setpoints[(step - wait) // loop.LOG_STEPS])
 
 
 def sensor_block(readings: np.ndarray, rest: np.ndarray) -> bytes:
@@ -124,15 +143,13 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
             board.say("I", sensor_block(plant.readings, rest))
             now = (step - wait) * at.STEP_S
             if step % loop.LOG_STEPS == 0:
-                state = struct.pack("<BBBff", BATTERY_STATE, 9, 0, plant.readings[at.VOLTS], 0.0)
-                board.say("L", state)
-                if step == wait // 2:
-                    for name, value in (parameters or {}).items():
-                        board.say("L", set_parameter(name, value))
-                if step >= wait:
-                    board.say("L", set_point_packet(plan.setpoints[(step - wait) // loop.LOG_STEPS]))
+                if step == wait - int(ARM_S / at.STEP_S) and vehicle.platform not in ARMS_ITSELF:
+                    board.say("L", crtp(SUPERVISOR, SUPERVISOR_COMMAND, ARM))
+                for packet in radio_packets(plan.setpoints, plant.readings[at.VOLTS], step, wait, parameters or {}):
+                    board.say("L", packet)
                 rows.append([now, *plant.place, *motors, *(values[n] for n in ESTIMATE),
-                             values["range.zrange"] / 1000.0, plant.top])
+                             values["range.zrange"] / 1000.0, plant.top, *plant.velocity, *plant.angles,
+                             *(IMU_UNITS * [values[name] for name in IMU])])
             if values["airtouch.edges"] > edges:
                 edges = int(values["airtouch.edges"])
                 found.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))

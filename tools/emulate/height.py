@@ -1,18 +1,26 @@
 """Height over a platform, flown: the same missions by the firmware as it ships and with atHeight.enable."""
 
-from dataclasses import dataclass
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
+from airtouch.detector.evaluation.score import TOLERANCE_S, match
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.simulation import scenario
 from airtouch.simulation.scenario import Scenario
-from tools.emulate.compare import SCENARIO, crossings, vehicle
-from tools.emulate.flight import Flown, fly
+from tools.emulate.compare import SCENARIO, crossings, cruise, kept, vehicle, words
+from tools.emulate.flight import TRUE_X, X, fly
 
-#: of there-and-back: height, end of the take-off's swing, landing at the end
-CRUISE_M, SETTLED_S, LAND_S, LAND_AT_M = 0.8, 4.5, 3.5, 1.5
+#: of there-and-back: height; how far it flies to land on the platform
+CRUISE_M, LAND_AT_M = 0.8, 1.5
+SETTINGS = ("as it ships", "atHeight.enable 1")
+FELT_S = 2.5  #: a report further than this from every crossing of its kind is false
 _PLATFORM = """[[platform]]
 shape = "rectangle"
 size_m = [{size}, 4.0]
@@ -31,6 +39,7 @@ class Case:
     speed: float = 0.3
     blind_s: tuple[tuple[float, float], ...] = ()
     lands_there: bool = False  #: on the platform, instead of flying on and back
+    edges: bool = True  #: surfaces end in edges that can be felt
 
 
 def stairs(begin: float, end: float, top: float, count: int) -> tuple[tuple[float, float, float], ...]:
@@ -47,10 +56,20 @@ CASES = (
     Case("platform 0.30 m high", ((0.575, 1.325, 0.30),)),
     Case("soft edges, 2 cm wide", stairs(0.555, 0.575, 0.76, 2)),
     Case("twice as fast, tilted", PLATFORM, speed=0.6),
-    Case("ramp of 0.2 m over 0.4 m", stairs(0.4, 0.8, 0.2, 20)),
+    Case("ramp of 0.2 m over 0.4 m", stairs(0.4, 0.8, 0.2, 20), edges=False),
     Case("no down range for 0.3 s, over the platform", PLATFORM, blind_s=((7.5, 7.8),)),
     Case("landing on the platform", ((0.575, 3.575, 0.76),), lands_there=True),
+    Case("flat floor", (), edges=False),
 )
+
+
+def cases(only: str = "") -> list[Case]:
+    """Those whose names begin so. AirTouchError where none does."""
+    found = [case for case in CASES if case.name.startswith(only)]
+    if not found:
+        raise AirTouchError(f"no case begins with {only!r}; --only is the beginning of one of: "
+                            f"{'; '.join(case.name for case in CASES)}")
+    return found
 
 
 def mission(case: Case) -> Scenario:
@@ -66,27 +85,85 @@ def mission(case: Case) -> Scenario:
     return scenario.parse(head + platforms + "\n[mission]" + steps, case.name)
 
 
-def kept(one: Flown) -> tuple[float, float]:
-    """Least and greatest true height over the floor between take-off and landing, m."""
-    t = one.table[:, 0]
-    landing = t[-1] - LAND_S if one.ending == "ok" else np.inf
-    cruise = one.table[(t >= SETTLED_S) & (t < landing), 3]
-    return (float(cruise.min()), float(cruise.max())) if len(cruise) else (np.nan, np.nan)
+def felt(crossed: Sequence[tuple[float, str]], reported: Sequence[tuple[float, str]]) -> np.ndarray:
+    """Seconds by which reports follow the crossings (s, kind) they belong to: same kind, one to one, within FELT_S."""
+    late = []
+    for kind in ("entry", "exit"):
+        true, said = ([t for t, k in edges if k == kind] for edges in (crossed, reported))
+        late += [said[j] - true[i] for i, j in match(true, said, FELT_S)]
+    return np.array(late)
 
 
-def report(elf: Path, seeds: int = 1, only: str = "") -> bool:
-    """Fly each case whose name begins so, and print; whether every flight with it ended well."""
-    well = True
-    print(f"true height over the floor, m, of {CRUISE_M} ordered")
-    for case, seed in product([case for case in CASES if case.name.startswith(only)], range(1, seeds + 1)):
+@dataclass(frozen=True)
+class Leg:
+    """A flight of a case: how it ended, and what it shows.
+
+    low_m, high_m: of the height over the floor. crossed, reported: edges (s, kind) in truth and by the app. end_m,
+    own_end_m: x before the landing, in truth and by its own estimate; it began at 0.
+    """
+
+    ending: str
+    low_m: float
+    high_m: float
+    crossed: list[tuple[float, str]]
+    reported: list[tuple[float, str]]
+    end_m: float
+    own_end_m: float
+    latency_us: int
+
+
+def summary(legs: Sequence[Leg]) -> str:
+    """All flights of a case with one setting."""
+    late = [felt(leg.crossed, leg.reported) for leg in legs]
+    every, crossed = np.concatenate(late), sum(len(leg.crossed) for leg in legs)
+    false = sum(len(leg.reported) for leg in legs) - len(every)
+    text = (f"{sum(leg.ending == 'ok' for leg in legs)} of {len(legs)} ended well, "
+            f"{min(leg.low_m for leg in legs):.2f} to {max(leg.high_m for leg in legs):.2f} m; "
+            f"felt {len(every)} of {crossed}")
+    if len(every):
+        text += (f" ({np.sum(np.abs(every) <= TOLERANCE_S)} within {TOLERANCE_S} s), {every.min():.1f} to "
+                 f"{every.max():.1f} s late")
+    return f"{text}; {false} false"
+
+
+def _kept_at(folder: Path, elf: Path, case: Case, seed: int, on: int) -> Path:
+    """File of a flight; another image, board or mission has another."""
+    what = hashlib.sha256(elf.read_bytes() + repr((case, seed, on)).encode()).hexdigest()
+    return folder / f"{what[:16]}.json"
+
+
+def _leg(elf: Path, case: Case, seed: int, on: int, platform: str, folder: Path | None) -> Leg:
+    """Fly once, or take the flight from the folder, and print."""
+    path = _kept_at(folder, elf, case, seed, on) if folder else None
+    if path and path.exists():
+        leg = Leg(**json.loads(path.read_text()))
+    else:
         flown = mission(case)
-        for on in (0, 1):
-            one = fly(elf, flown, vehicle(), seed, parameters={"atHeight.enable": on}, blind_s=case.blind_s)
-            low, high = kept(one)
-            true = " ".join(f"{kind}@{t:.2f}" for t, kind in crossings(flown, seed, 0, one.table)) or "none"
-            felt = " ".join(f"{kind}@{t:.2f}" for t, kind, _ in one.edges) or "none"
-            print(f"{case.name}, seed {seed}, {'atHeight.enable 1' if on else 'as it ships'}: {low:.2f} to {high:.2f}, "
-                  f"{one.ending} at x {one.table[-1, 1]:.2f}; crossed {true}, felt {felt}; worst stabilizer "
-                  f"{one.latency_us} us", flush=True)
-            well = well and (on == 0 or one.ending == "ok")
-    return well
+        one = fly(elf, flown, vehicle(platform), seed, parameters={"atHeight.enable": on}, blind_s=case.blind_s)
+        low, high = kept(one)
+        last = cruise(one)[-1] if len(cruise(one)) else one.table[-1]
+        leg = Leg(one.ending, low, high, crossings(flown, seed, 0, one.table) if case.edges else [],
+                  [(t, kind) for t, kind, _ in one.edges], float(last[TRUE_X]), float(last[X]),
+                  one.latency_us)
+        if path:
+            write_bytes(json.dumps(asdict(leg)).encode(), path)
+    print(f"{case.name}, seed {seed}, {SETTINGS[on]}: {leg.low_m:.2f} to {leg.high_m:.2f}, {leg.ending} at x "
+          f"{leg.end_m:.2f}, its own {leg.own_end_m:.2f}; crossed {words(leg.crossed)}, felt "
+          f"{words(leg.reported)}; worst stabilizer {leg.latency_us} us", flush=True)
+    return leg
+
+
+def report(elf: Path, platform: str = "cf2", seeds: int = 1, only: str = "", folder: Path | None = None) -> bool:
+    """Fly each case whose name begins so, and print; whether every flight with it ended well.
+
+    folder: where flights are kept, so that a run that was stopped goes on.
+    """
+    if folder:
+        make_folder(folder)
+    print(f"true height over the floor, m, of {CRUISE_M} ordered")
+    legs: dict[tuple[str, int], list[Leg]] = {}
+    for case, seed, on in product(cases(only), range(1, seeds + 1), (0, 1)):
+        legs.setdefault((case.name, on), []).append(_leg(elf, case, seed, on, platform, folder))
+    for (name, on), flights in legs.items():
+        print(f"{name}, {SETTINGS[on]}: {summary(flights)}")
+    return all(leg.ending == "ok" for (_, on), flights in legs.items() if on for leg in flights)

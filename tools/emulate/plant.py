@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from airtouch.simulation import loop
 from airtouch.simulation.body import battery
+from airtouch.simulation.body.rotation import euler
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.simulation.sensors import imu, ranging
 from airtouch.simulation.stepper import Stepper
@@ -46,12 +47,22 @@ class Plant:
         return self.state["body"]["state"][:3] - [0.0, 0.0, float(self.stepper.plant[0]["range_below_rotors"])]
 
     @property
+    def velocity(self) -> np.ndarray:
+        """(3,) m/s, true."""
+        return self.state["body"]["state"][3:6]
+
+    @property
+    def angles(self) -> tuple[float, float, float]:
+        """True roll, pitch and yaw, rad."""
+        return euler(self.state["body"]["state"][6:10])
+
+    @property
     def top(self) -> float:
         """Height of the surface that the down range saw last, m."""
         return float(self.state["ranging"]["seen_top"])
 
 
-@njit(nogil=True)
+@jit(nogil=True)
 def _step(flight, out):
     """One physics step of a loop.Flight; readings (READINGS,) of its beginning into out. How it stands."""
     plant, state, streams = flight.plant[0], flight.state[0], flight.streams[0]
