@@ -29,7 +29,10 @@ CHANGES = {
     "more inertia": ("inertia", {"fraction": 0.25}),
     "slower motors": ("motor_lag", {"factor": 1.3}),
     "late commands": ("actuator_delay", {"delay": 0.003}),
+    "late sensors": ("sensor_latency", {"delay": 0.002}),
 }
+#: by which the share of torque may be off; of late sensors, whose share is least where it turns most, more
+CLOSE, LATE = 0.1, 0.17
 
 
 def flown(active, numbers, vehicle=None):
@@ -74,7 +77,7 @@ def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, hi
     judged = (f > low) & (f < high)
     count = judged.sum() // 6 * 6
     told, seen = (x[judged][:count].reshape(-1, 6).mean(axis=1) for x in (told, seen))
-    np.testing.assert_allclose(told, seen, atol=0.15)
+    np.testing.assert_allclose(told, seen, atol=LATE if name == "late sensors" else CLOSE)
 
 
 def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():

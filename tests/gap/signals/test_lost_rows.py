@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from airtouch.gap.answer.named_effects import chosen_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
 from airtouch.gap.signals.lost_rows import bridging_power
@@ -45,5 +46,8 @@ def test_what_lost_rows_add_is_what_the_same_flights_with_every_row_lack(pairs, 
 def test_lost_rows_alone_are_named_alone(pairs, study):
     """Bursts of lost rows used to look like a wake or like noise of the motors beside them."""
     for flight in pairs[0][:3]:
-        steps = select(Data(study, [flight]), every()).steps
-        assert [s.name for s in steps if s.named] == ["packet_loss"]
+        data = Data(study, [flight])
+        selection = select(data, every())
+        assert [s.name for s in selection.steps if s.named] == ["packet_loss"]
+        share = chosen_effects(data, selection)[0].parameters["share"]
+        assert share.high > 1.2 * share.value, "48 rows in 12 bursts say the share to a quarter at best"

@@ -5,6 +5,7 @@ import numpy as np
 from airtouch import vehicle as vehicles
 from airtouch.gap import measure
 from airtouch.gap.loop import controller, loop_model, turning
+from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.response import FIRST_BIN, response_of
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
@@ -14,6 +15,7 @@ from airtouch.simulation.effects import Active, get
 from airtouch.simulation.flight import prepare
 
 BINS = len(frequencies(AIR))
+NO_LOOP = Disturbed(np.zeros((BINS, 3)), np.zeros((BINS, 3)))
 
 
 def noise(rng, size, rms=1.0):
@@ -30,7 +32,7 @@ def flights(rng, true, alias, count=12, blocks=12):
 def test_share_is_that_of_errors_in_variables():
     rng = np.random.default_rng(1)
     felt, logged = flights(rng, 1.0, 1.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
     np.testing.assert_allclose(response.steady.told.real, 1.0 / (1.0 + 1.0), atol=0.1)
     np.testing.assert_allclose(response.steady.told.imag, 0.0, atol=0.1)
 
@@ -38,7 +40,7 @@ def test_share_is_that_of_errors_in_variables():
 def test_a_share_no_surer_than_noise_is_not_believed():
     rng = np.random.default_rng(5)
     felt, logged = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
     assert np.median(np.abs(response.steady.told)) == 0.0
 
 
@@ -46,7 +48,7 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
     """With q = 1 half the response halves what folded noise leaves; with q as measured it adds to it."""
     rng = np.random.default_rng(2)
     felt, logged = flights(rng, 1.0, 2.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
     y, w = (x[0] for x in flights(rng, 1.0, 2.0, 1))
     def table(torque):
         return np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
@@ -65,7 +67,7 @@ def test_means_stay_as_they_are():
     rng = np.random.default_rng(3)
     felt, logged = flights(rng, 1.0, 2.0)
     left = [f - w for f, w in zip(felt, logged, strict=True)]
-    response = response_of(felt, left, np.zeros((BINS, 3)))
+    response = response_of(felt, left, NO_LOOP)
     every = np.zeros((12, BINS, COUNT), complex)
     every[:, :, TORQUE] = left[0]
     out = response.applied(response.quiet(logged[0]), felt[0], every, every, every, every)
@@ -79,7 +81,7 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
         kick = noise(rng, (5, BINS, 3), 30.0)
         w[::4] += kick
         f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
-    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], np.zeros((BINS, 3)))
+    response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
     np.testing.assert_array_equal(response.quiet(logged[0])[:, 0], np.arange(20) % 4 != 0)
     np.testing.assert_allclose(np.abs(response.stepped.told), 1.0 / 3.0, atol=0.05)
     left = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: what errors in variables leave; the kick's own scatter
@@ -106,7 +108,7 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
     axes = {}
     for name, active in (("usual", ()), ("heavy", (heavy,))):
         row = prepare(vehicle, active)[0][0]
-        axes[name] = np.abs(loop_model.sensitivity([controller.firmware(row, a) for a in controller.AXES], row, f))
+        axes[name] = np.abs(disturbed(controller.firmware_of(row), row, f).turned)
     low = (f > 0.5) & (f < 3.0)
     assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
     assert np.all(axes["usual"][f > 40.0] > 0.9)

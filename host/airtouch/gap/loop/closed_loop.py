@@ -24,6 +24,7 @@ from airtouch.gap.loop.command_spectra import (
     through_window,
 )
 from airtouch.gap.loop.controller import AXES, Controller, firmware, firmware_of
+from airtouch.gap.loop.disturbed import logged_over_flown
 from airtouch.gap.loop.edge_response import EdgeFloor
 from airtouch.gap.loop.loop_model import excess_phase, of_loop, torque_per_command
 from airtouch.gap.loop.noise_spectra import spectra
@@ -49,12 +50,14 @@ class Change(NamedTuple):
 
     torque that turns the vehicle, (2, bins, 3), which the loop model had at `before`: level, and stepped.
     cut (bins, 3): size of that part of the change of stepped blocks which the limits of the command make.
+    logged (bins, 1): `disturbed.logged_over_flown`.
     """
 
     motors: np.ndarray
     share: np.ndarray
     before: np.ndarray
     cut: np.ndarray
+    logged: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,8 @@ class ClosedLoop:
         share = after / before if self.by_firmware else np.ones_like(before)
         motors = self._torque(row, AXES[1], f) / self._torque(first, AXES[1], f)
         share /= np.maximum(np.abs(share) / MOST_CHANGE, 1.0)
-        return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]))
+        logged = logged_over_flown(firmware(first, AXES[1]), f)
+        return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]), logged[:, None])
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""

@@ -3,7 +3,6 @@
 The controllers are those of `gap.loop.controller`. Commands are in newtons per motor.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -11,7 +10,6 @@ import numpy as np
 
 from airtouch.gap.loop.controller import AXES, Controller, firmware
 
-YAW_HZ = 1.0  #: usual bandwidth of a yaw loop, which AXES leave out
 OUTER_S = 0.01  #: period of the firmware's position loop and of its estimator's predictions
 IMU_S = 0.001  #: between samples of the IMU
 CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1
@@ -30,10 +28,10 @@ def of_loop(row: Any, axis: str) -> tuple[float, ...]:
     if axis == "thrust":
         return (*lags, *gains)
     i = AXES.index(axis) - 1
-    return (*lags, *gains[:-1], _arm(row, i), float(row["inertia"][i]))
+    return (*lags, *gains[:-1], arm_of(row, i), float(row["inertia"][i]))
 
 
-def _arm(row: Any, i: int) -> float:
+def arm_of(row: Any, i: int) -> float:
     """Mean distance of the rotors from the axis of roll (0) or pitch (1), m."""
     return mean_of_rotors(np.abs(row["rotor_y" if i == 0 else "rotor_x"]))
 
@@ -53,24 +51,13 @@ def excess_phase(c: Controller, row: Any, axis: str) -> float:
     return float(-np.pi - turned[last[-1]]) if len(last) else -np.pi
 
 
-def sensitivity(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> np.ndarray:
-    """Share (bins, 3) of an outside roll, pitch, yaw torque that turns the vehicle in spite of the loop.
-
-    controllers: of AXES. f: Hz (bins,).
-    """
-    f = np.maximum(f, 0.05)
-    s = 2j * np.pi * f
-    out = [1.0 / (1.0 + _open_loop(c, row, axis, f)) for c, axis in zip(controllers[1:], AXES[1:], strict=True)]
-    return np.stack([*out, s / (s + 2.0 * np.pi * YAW_HZ)], axis=1)
-
-
 def torque_per_command(row: Any, axis: str, f: np.ndarray, c: Controller | None = None) -> np.ndarray:
     """Angular acceleration (bins,) that the motors make of a command, rad/s^2 per N. c: the firmware's by default."""
     f = np.maximum(f, 0.05)
-    return 2j * np.pi * f * _plant(firmware(row, axis) if c is None else c, row, axis, f)
+    return 2j * np.pi * f * plant_of(firmware(row, axis) if c is None else c, row, axis, f)
 
 
-def _plant(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+def plant_of(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Command to measured rate (climb), complex (bins,)."""
     fixed = fixed_of(c, f)
     s = fixed.s
@@ -80,7 +67,7 @@ def _plant(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     if axis == "thrust":
         return lift / float(row["mass"]) * motor / s
     i = AXES.index(axis) - 1
-    return lift * _arm(row, i) / float(row["inertia"][i]) * motor / s
+    return lift * arm_of(row, i) / float(row["inertia"][i]) * motor / s
 
 
 def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> Parts:
@@ -92,8 +79,8 @@ def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> Parts:
     """
     fixed = fixed_of(c, f)
     s = fixed.s
-    plant = _plant(c, row, axis, f)
-    late = _delayed(float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
+    plant = plant_of(c, row, axis, f)
+    late = sensed_late(c, row, f)
     renewed = fixed.renewed
     if axis == "thrust":
         k = float(row["height_gain"])
@@ -109,6 +96,11 @@ def loop_parts(c: Controller, row: Any, axis: str, f: np.ndarray) -> Parts:
     velocity = angle * c.velocity * float(row["position_gain"]) * fixed.velocity_integral
     angle, velocity = angle * filtered * renewed / s, velocity * renewed * float(row["gravity"]) / fixed.s2 * late
     return plant, rate, angle, velocity, rate + angle + velocity
+
+
+def sensed_late(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
+    """The sensors' delay, complex (bins,)."""
+    return _delayed(float(row["sensor_delay"]), IMU_S if c.lowpass_hz or c.acc_hz else 0.0, f.shape, f.tobytes())
 
 
 class Fixed(NamedTuple):

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.loop.closed_loop import Change
+from airtouch.gap.loop.disturbed import Disturbed
 from airtouch.gap.signals.channels import TORQUE
 from airtouch.gap.signals.spectra import squared
 
@@ -29,31 +30,39 @@ FEWEST = 8  #: blocks of nominal flights
 SMOOTH = 1.5  #: bins
 #: what the model may be wrong by, of that change of the share which the command's limits make: so far off are pairs of
 CUT_DOUBT = 0.3  #: simulated flights with attitude gains of 0.5, 1.4 and 2 (ten flights each)
+#: of the commands that answer a torque, by which the loop model is wrong: so far off are eight pairs of simulated
+ANSWER_DOUBT = 0.2  #: flights with thrust noise and without, where turning and answer all but cancel (yaw, 1 to 4 Hz)
 NOISE = 0.2  #: coherence up to which it is the noise of the gyro that both have, not believed
 
 
 @dataclass(frozen=True)
 class Law:
-    """For torque channels, complex (bins, 3): told, measured over modelled; changed, the same for what a hypothesis
+    """For torque channels, complex (bins, 3): seen, measured over modelled; told, the same as far as it is no noise of
 
-    changes of the model, never above 1 in size; outside, for a torque that no command makes. weight (bins, 3):
-    floor of quiet blocks over that of these, rms; power (bins, 3): of the modelled torque.
+    the gyro; changed, that for what a hypothesis changes of the model, never above 1 in size; outside, what is left of
+    a torque that no command makes. shaken (bins, 3): power that is left of a random one; weight (bins, 3): floor of
+    quiet blocks over that of these, rms; power (bins, 3): of the modelled torque.
     """
 
+    seen: np.ndarray
     told: np.ndarray
     changed: np.ndarray
     outside: np.ndarray
+    shaken: np.ndarray
     weight: np.ndarray
     power: np.ndarray
 
     def ratio(self, change: Change, which: int) -> np.ndarray:
         """By what effects that change the loop multiply `told`, (bins, 3).
 
-        The share changes as in the loop model, as far as nominal flights have less than all of
-        the torque turn the vehicle; in yaw, mostly noise of the gyro, motors count where it is none.
+        Of the commands a share follows the loop model, the rest turn the vehicle as they say; the share is the one that
+        makes `seen` of both. In yaw, mostly noise of the gyro, motors count where it is none.
         """
-        beyond = np.abs(1.0 - self.told) / np.maximum(np.abs(1.0 - change.before[which]), 1e-3)
-        out = change.motors * np.exp(np.minimum(beyond, 1.0) * np.log(change.share[which]))
+        before, after = change.before[which], change.motors * change.share[which] * change.before[which]
+        away = before - 1.0
+        modelled = ((self.seen * change.logged - 1.0) * away.conj()).real / np.maximum(np.abs(away) ** 2, 1e-6)
+        modelled = np.clip(modelled, 0.0, 1.0)
+        out = (modelled * after + (1.0 - modelled) * change.motors) / (modelled * before + 1.0 - modelled)
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.told[:, 2]), 1.0) ** 2
         return out
 
@@ -98,6 +107,11 @@ class Response:
         out[:, FIRST_BIN:, TORQUE] = rest[:, FIRST_BIN:]
         return out
 
+    def weighted(self, quiet: np.ndarray, torque: np.ndarray) -> np.ndarray:
+        """Torque (blocks, bins, 3) weighted as what is left of it is in quiet and in other blocks (blocks, 3)."""
+        other = np.nan if self.stepped is None else self.stepped.weight
+        return torque * np.where(quiet[:, None], self.steady.weight, other)
+
     def doubt(self, quiet: np.ndarray, modelled: np.ndarray, change: Change) -> np.ndarray:
         """Power (blocks, bins, 3) that the gap may have as steps differ in size, and so in what the command's limits
 
@@ -110,12 +124,12 @@ class Response:
         return np.where(quiet[:, None], 0.0, np.nan_to_num(doubt) * squared(modelled))
 
     def added(self, quiet: np.ndarray, sensed: bool) -> np.ndarray:
-        """Power (blocks, bins, 3) that a random torque of unit power adds; 1 in the means.
+        """Power (blocks, bins, 3) that is left of a random torque of unit power; 1 in the means.
 
         sensed: on the gyro alone.
         """
         made = [np.ones(self.usual.shape) if law is None else
-                law.weight ** 2 * (1.0 if sensed else np.abs(law.outside) ** 2) for law in (self.steady, self.stepped)]
+                law.weight ** 2 * (1.0 if sensed else law.shaken) for law in (self.steady, self.stepped)]
         out = np.nan_to_num(np.where(quiet[:, None], *made), nan=1.0)  # no law: such blocks do not count
         out[:, :FIRST_BIN] = 1.0
         return out
@@ -134,10 +148,10 @@ def _rest(law: Law, change: Change | None, which: int, measured: np.ndarray, fir
     return law.weight * rest
 
 
-def response_of(measured: Sequence[np.ndarray], left: Sequence[np.ndarray], loop: np.ndarray) -> Response | None:
+def response_of(measured: Sequence[np.ndarray], left: Sequence[np.ndarray], loop: Disturbed) -> Response | None:
     """From spectra (blocks, bins, 3) of nominal flights: measured, and measured minus modelled.
 
-    loop (bins, 3): the closed loop's sensitivity to an outside torque. None for too few blocks.
+    loop: what it makes of a torque from outside. None for too few blocks.
     """
     y = np.concatenate(measured)
     w = y - np.concatenate(left)
@@ -154,19 +168,22 @@ def response_of(measured: Sequence[np.ndarray], left: Sequence[np.ndarray], loop
     return Response(_smooth(usual), calm, steady, stepped)
 
 
-def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: np.ndarray, floor: np.ndarray | None,
+def _law(y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
          ) -> tuple[Law, np.ndarray]:
     """Law of the chosen blocks (blocks, 3), weighted to have a floor (bins, 3), their own by default; their floor."""
     mask, count = chosen[:, None], np.maximum(chosen.sum(axis=0), 1)
     power = (np.abs(w) ** 2 * mask).sum(axis=0) / count
     share = (y * w.conj() * mask).sum(axis=0) / count / np.maximum(power, 1e-30)
     follows = _smooth(np.abs(share) ** 2 * power / np.maximum((np.abs(y) ** 2 * mask).sum(axis=0) / count, 1e-30))
-    told = (_smooth(share.real) + 1j * _smooth(share.imag)) * np.clip((follows - NOISE) / NOISE, 0.0, 1.0)
+    seen = _smooth(share.real) + 1j * _smooth(share.imag)
+    told = seen * np.clip((follows - NOISE) / NOISE, 0.0, 1.0)
     rest = np.exp(_smooth(np.log(np.maximum((np.abs(y - told * w) ** 2 * mask).sum(axis=0) / count, 1e-30))))
     known = chosen.sum(axis=0) >= FEWEST
     weight = np.ones(rest.shape) if floor is None else np.where(known, np.sqrt(floor / rest), np.nan)
-    changed = told / np.maximum(np.abs(told), 1.0)
-    return Law(told, changed, loop + changed * (1.0 - loop), weight, _smooth(power)), rest
+    answered = told * loop.commanded
+    outside = loop.turned - answered
+    shaken = np.abs(outside) ** 2 + np.abs(ANSWER_DOUBT * answered) ** 2
+    return Law(seen, told, told / np.maximum(np.abs(told), 1.0), outside, shaken, weight, _smooth(power)), rest
 
 
 def _quiet(modelled: np.ndarray, usual: np.ndarray, calm: np.ndarray) -> np.ndarray:

@@ -1,0 +1,88 @@
+"""What a torque from outside leaves in a log: how the vehicle turns, and what the loop commands against it.
+
+The loop answers within milliseconds, and its answer is in the log as well: held over a sample of the log, and with the
+kicks of steps that fall onto the logged sample. A model that replays the log takes that for what turned the vehicle.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.loop.controller import AXES, DEGREES, Controller, newtons_per_command
+from airtouch.gap.loop.loop_model import arm_of, fixed_of, loop_parts, plant_of, sensed_late
+from airtouch.gap.loop.noise_spectra import kick_of
+from airtouch.simulation.firmware import settings
+
+
+class Disturbed(NamedTuple):
+    """Roll, pitch and yaw, complex (bins, 3) each, for an outside angular acceleration of 1.
+
+    turned: the one that is measured; commanded: the one that a model makes of the logged commands.
+    """
+
+    turned: np.ndarray
+    commanded: np.ndarray
+
+
+def disturbed(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> Disturbed:
+    """At frequencies f (bins,), Hz. controllers: of AXES; row: plant row of `simulation.flight.prepare`.
+
+    The yaw loop is the firmware's, at the pace of the roll loop.
+    """
+    f = np.maximum(f, 0.05)
+    roll, pitch = (_loop(c, row, axis, f) for c, axis in zip(controllers[1:], AXES[1:], strict=True))
+    axes = [_answer(c, f, *loop) for c, loop in zip((controllers[1], controllers[2], controllers[1]),
+                                                   (roll, pitch, _yaw(controllers[1], row, f)), strict=True)]
+    return Disturbed(*(np.stack(x, axis=1) for x in zip(*axes, strict=True)))
+
+
+def _answer(c: Controller, f: np.ndarray, plant: np.ndarray, whole: np.ndarray, logged: np.ndarray,
+            ) -> tuple[np.ndarray, np.ndarray]:
+    """`Disturbed` of one axis (bins,). plant: command to rate; whole: measured rate to command; logged: to that of the
+
+    log, which the model holds over a sample of the log.
+    """
+    turned = 1.0 / (1.0 + plant * whole)
+    return turned, -plant * logged_over_flown(c, f) * logged * turned
+
+
+def logged_over_flown(c: Controller, f: np.ndarray) -> np.ndarray:
+    """What a model makes of a logged command over what the vehicle's motors make of the same, complex (bins,).
+
+    The model holds it over a sample of the log, the vehicle over a run of its controller c; and of the torque a mean of
+    two samples is compared with a difference of the measured rate.
+    """
+    f = np.maximum(f, 0.05)
+    held = np.sinc(f * PERIOD_S) * np.exp(-1j * np.pi * f * PERIOD_S) / fixed_of(c, f).hold
+    return held * np.cos(np.pi * f * PERIOD_S) / np.sinc(f * PERIOD_S)
+
+
+def _loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `_answer` takes of roll or pitch."""
+    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
+    return plant, whole, rate + kick_of(c, fixed_of(c, f)) * (angle + velocity)
+
+
+def _yaw(c: Controller, row: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same of the firmware's yaw: rate within angle, whose derivative steps when the estimator renews the angle.
+
+    c: of the roll loop, whose filters and periods it shares. A rotor's torque on yaw is its drag and what speeds it up.
+    """
+    fixed = fixed_of(c, f)
+    s, loops = fixed.s, row["firmware"]["loops"]
+    of_rate, of_angle = loops[settings.RATE_YAW], loops[settings.YAW]
+    gain = float(of_rate["p"]) * DEGREES * float(row["rate_scale"]) * float(row["rate_gain"]) * newtons_per_command(row)
+    filtered = sensed_late(c, row, f) / fixed.lowpass / fixed.chip
+    rate = gain * (1.0 + float(of_rate["i"]) / float(of_rate["p"]) / s) * filtered
+
+    def angle(differences: np.ndarray) -> np.ndarray:
+        steered = float(of_angle["p"]) + float(of_angle["i"]) / s + float(of_angle["d"]) * differences
+        return rate * steered * fixed.renewed / s
+
+    speed = np.sqrt(float(row["mass"]) * float(row["gravity"]) / (4.0 * float(row["thrust_per_speed2"])))
+    lever = float(row["yaw_torque_over_thrust"]) + s * float(row["rotor_inertia"]) / (
+        2.0 * float(row["thrust_per_speed2"]) * speed)
+    plant = plant_of(c, row, "roll", f) * lever / arm_of(row, 0) * float(row["inertia"][0]) / float(row["inertia"][2])
+    return plant, rate + angle((1.0 - np.exp(-s * c.period_s)) / c.period_s), rate + angle(fixed.outer)
