@@ -5,6 +5,7 @@
 Writes all.html, close.html and wind.html (with .json) to OUT, out/gap-authors by default.
 """
 
+import argparse
 import csv
 import os
 import subprocess
@@ -37,6 +38,9 @@ def main(folder: Path, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    flights = Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch"
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else flights,
-         Path(sys.argv[2]) if len(sys.argv) > 2 else Path("out/gap-authors"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
+    parser.add_argument("out", nargs="?", type=Path, default=Path("out/gap-authors"), help="(out/gap-authors)")
+    options = parser.parse_args()
+    main(options.folder, options.out)

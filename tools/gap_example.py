@@ -3,7 +3,7 @@
     python tools/gap_example.py [FOLDER]
 """
 
-import sys
+import argparse
 from pathlib import Path
 
 import tomli_w
@@ -33,4 +33,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else example.FOLDER)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, default=example.FOLDER, help="of the package's example")
+    main(parser.parse_args().folder)

@@ -6,8 +6,8 @@ For each flight: mean roll and yaw torque of the commands, and how many blocks o
 more than FAR times the floor's power of roll or yaw torque between 0.6 and 12 Hz.
 """
 
+import argparse
 import os
-import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -52,5 +52,7 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    flights = Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch"
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else flights)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
+    main(parser.parse_args().folder)

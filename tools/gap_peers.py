@@ -6,9 +6,9 @@ Each case is held against the two `cal` flights of its vehicle; the diagnosis ne
 Names of one thing (`candidates.ALIKE`) count as one.
 """
 
+import argparse
 import csv
 import os
-import sys
 import time
 from pathlib import Path
 
@@ -60,5 +60,10 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else
-         Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "peers")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="with a manifest.csv (FLIGHTS/peers)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "peers")
+    peers = parser.parse_args().folder
+    if not (peers / "manifest.csv").is_file():
+        parser.error(f"{peers} has no manifest.csv: give the folder of the peers' flights, or set AIRTOUCH_FLIGHTS")
+    main(peers)

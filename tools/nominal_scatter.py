@@ -96,7 +96,7 @@ def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
     i, others = task
     *_, flown, files = _EVERY[i]
     made = held_out(files, flown, _rest(_EVERY, i) if others else None)
-    return i, others, [{"file": _name(name, others), "rate": one.rate, "passing_rates": one.passing_rates,
+    return i, others, [{"file": _name(name, others), "rate": one.rate, "passing": dict(one.passing),
                         "strengths": {k: v.tolist() for k, v in one.strengths.items()},
                         "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in made]
 
@@ -126,8 +126,8 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
     for name, s in classes.items():
         lines += [f'["{name}"]  # {counts[name]}', *([f'vehicle = "{s.vehicle}"'] if s.vehicle else []),
                   f"freedom = {s.freedom:g}", f"root_rate = [{s.rate[0]:.3f}, {s.rate[1]:.3f}]",
-                  f'["{name}".root_passing_rates]']
-        lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing_rates.items()]
+                  f'["{name}".passing]']
+        lines += [f"{k} = [{mean:.3f}, {spread:.3f}]" for k, (mean, spread) in s.passing.items()]
         lines.append(f'["{name}".rms]')
         lines += [f"{k} = [{', '.join(f'{x:.4g}' for x in v)}]" for k, v in s.rms.items()]
         lines.append(f'["{name}".middle]')
@@ -166,7 +166,7 @@ def main() -> None:
         for others in (False, True):
             for row in (done[key] for name, _ in files if (key := _name(name, others)) in done):
                 strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
-                cases[of].append(Apparent(strengths, errors, row["rate"], row["passing_rates"]))
+                cases[of].append(Apparent(strengths, errors, row["rate"], row["passing"]))
                 if not others:
                     alike[of].append(cases[of][-1])
     classes = {of: replace(measured(flights, alike[of]), vehicle=flown_by[of]) for of, flights in cases.items()}

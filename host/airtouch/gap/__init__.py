@@ -9,8 +9,8 @@ Where each decision is made; a folder imports only those above it:
 - `signatures`, what is known of each effect: `candidates` says how it is fitted, `nominal_scatter` how strong it seems
   where there is none.
 - `loop`, the closed loop: `controller`, its transfer functions `loop_model`, what noise and set-points make of the
-  commands, `noise_spectra` and `turning`; `command_spectra` of flights, from which `identify` finds a `closed_loop`; at
-  edges: `edge_response`.
+  commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
+  from which `identify` finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, `problem`, `fit` with `least_squares`,
   `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show,

@@ -33,6 +33,7 @@ from airtouch.vehicle import Vehicle
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; more adds time, not certainty
 NO_BASELINE = ("no baseline flights: the vehicle is taken as declared, and torque is judged in the mean alone, as "
                "nobody knows how much of the commanded torque is aliases of a faster loop")
+STANDS_OUT = 1.1  #: gap from which what comes and goes must close it; the halves seldom share its seconds
 WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bias")
 
 
@@ -122,15 +123,24 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
     """What is chosen among the candidates, and the cells in which the gap is measured.
 
     In recorded flights an effect of the loop must take away as much of the gap as the loop model may be wrong by: the
-    gains of two days differ a little, and that is not what a gap comes from.
+    gains of two days differ a little, and that is not what a gap comes from. So must one that comes and goes, where a
+    gap stands out that it could take away: nominal flights meet gusts, which is not what their gap comes from either.
     """
     selection = select(data, candidates.every(without), say, without)
     cells = cells_of(data, selection.parts, selection.chosen)
-    if data.study.recorded and _of_the_loop(data, selection) \
-            and shrink_of(data, selection.parts, selection.chosen, cells).share.value < LOOP_SHARE:
-        selection = replace(selection, steps=(), free_after=selection.free_before, assumed=False)
-        cells = cells_of(data, selection.parts, None)
+    of_loop, passing = _of_the_loop(data, selection), _comes_and_goes(selection)
+    if data.study.recorded and (of_loop or passing):
+        gap = shrink_of(data, selection.parts, selection.chosen, cells)
+        if gap.share.value < LOOP_SHARE and (of_loop or gap.before > STANDS_OUT):
+            selection = replace(selection, steps=(), free_after=selection.free_before, assumed=False)
+            cells = cells_of(data, selection.parts, None)
     return selection, cells
+
+
+def _comes_and_goes(selection: Selection) -> bool:
+    """Whether one effect is named, and it comes and goes."""
+    chosen = selection.chosen
+    return chosen is not None and len(selection.named) == 1 and all(t.gate for t in chosen.terms)
 
 
 def _of_the_loop(data: Data, selection: Selection) -> bool:

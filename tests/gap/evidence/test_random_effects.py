@@ -107,11 +107,9 @@ def test_power_of_noise_is_that_of_simulated_flights(study):
     edges = (4.0, 10.0, 20.0, 35.0, 50.0)
     error = decibels(bands(after, f, edges) - bands(before, f, edges), bands(more, f, edges))
     assert np.abs(error[:, [0, 1]]).max() < 0.6  # forces, which the loop hardly moves
-    # yaw: the heading's derivative kicks once in five commands, which the log then takes for all five
-    assert np.abs(error[:, 5]).max() < 1.7
-    # roll and pitch, with what noise in the commands does; above 20 Hz kicks by noise of flow and gyro look alike,
-    # and the loop model gives flow a part of the gyro's
-    assert np.nanmax(np.abs(error[:2, 3:5])) < 1.5 and np.nanmax(np.abs(error[2:, 3:5])) < 4.5
+    assert np.abs(error[:, 5]).max() < 1.0
+    # roll and pitch: in the lowest band the loop shakes, four flights hold few such swings
+    assert np.nanmax(np.abs(error[0, 3:5])) < 2.0 and np.nanmax(np.abs(error[1:, 3:5])) < 1.2
     rest = [np.concatenate([np.abs(b[REST]) ** 2 for b in d.base]).mean(axis=(0, 1)) for d in (calm, noisy)]
     ground = np.concatenate([e[REST] for e in expected]).mean(axis=(0, 1))
     assert np.abs(decibels(rest[1] - rest[0], ground))[:3].max() < 1.2  # some seconds only

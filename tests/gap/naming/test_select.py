@@ -141,7 +141,7 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     assert [s.name for s in selection.named] == ["downwash"]
     ((name, since, until),) = selection.steps[0].terms[0].gate
     assert name == "pushed" and since == pytest.approx(9.0, abs=1.3) and until == pytest.approx(15.0, abs=1.3)
-    assert selection.steps[0].evidence > 100.0 and "downwash" in selection.singles
+    assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
     assert selection.least["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = found(pushed, ("mass",), study, without)

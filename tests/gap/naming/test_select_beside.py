@@ -180,13 +180,13 @@ def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
     assert sure.variance[2] < 0.01 * doubted.variance[2]
 
     (mass,) = found(alike, ("mass",))[0].steps
-    usual = scattered(mass=[abs(mass.strength[0]) / 20.0])
+    usual = scattered(mass=[abs(mass.strength[0]) / 8.0])
     (named,), (deviation,) = (found(f, ("mass",), usual)[0].steps for f in (alike, apart))
-    # Student's density of 8 degrees of freedom, 20 deviations out; the other counts from the near end of its interval
-    assert named.evidence == pytest.approx(4.5 * np.log1p(20.0 ** 2 / 8.0), rel=0.05) and named.named
-    strong, weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (1.0, 0.4, 0.7))  # shares of the mass
-    near = 20.0 * (0.5 * (strong + weak) - 1.645 * 0.5 * (strong - weak)) / between
-    assert deviation.evidence == pytest.approx(4.5 * np.log1p(near ** 2 / 8.0), rel=0.1) and not deviation.named
+    # Student's density of 8 degrees of freedom, 8 deviations out; the other counts as far as both halves have it
+    assert named.evidence == pytest.approx(4.5 * np.log1p(8.0 ** 2 / 8.0), rel=0.05) and named.named
+    weak, between = (a / (4.0 * LIFT_N / VEHICLE.mass_kg - a) for a in (0.4, 0.7))  # shares of the mass
+    assert deviation.evidence == pytest.approx(4.5 * np.log1p((8.0 * weak / between) ** 2 / 8.0), rel=0.1)
+    assert not deviation.named
     assert deviation.gain > judging.LEAST_GAIN
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.stats import chi2
 
 from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.errors import AirTouchError
-from airtouch.gap.sealed import blind, blind_run, blind_score
+from airtouch.gap.sealed import blind, blind_run, blind_score, blind_severity
 from airtouch.gap.sealed.blind_draw import KINDS
 from airtouch.gap.sealed.blind_severity import severities
 
@@ -155,7 +156,7 @@ def answer(name, verdict, ranking, effects=(), without=(), before=2.0, after=1.1
 
 def test_scores_in_closed_form():
     def one(name, value, level=0):
-        return {"effects": [{"name": name, "kind": name, "level": level, "values": value}]}
+        return {"effects": [{"name": name, "kind": name, "level": level, "values": value}], "nats": 3.0 + 6.0 * level}
 
     key = {"answers": {
         "a": one("mass", {"fraction": 0.1}), "b": one("inertia", {"fraction": 0.5}, 1), "c": {"effects": []},
@@ -172,6 +173,8 @@ def test_scores_in_closed_form():
     assert (found["false_alarms"]["hits"], found["false_alarms"]["n"]) == (1, 2)
     assert found["pairs_exact"]["hits"] == 0 and found["pairs_one_right"]["hits"] == 1
     assert found["parameters"]["error"]["value"] == pytest.approx(0.2) and found["parameters"]["coverage"]["hits"] == 1
+    ideal = {level: (part["ideal"]["hits"], part["ideal"]["n"]) for level, part in found["by_severity"].items()}
+    assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 26th of 2 % of the flights
     assert found["shrink"]["right"]["value"] == pytest.approx(0.9) and found["shrink"]["wrong"]["value"] == 0.0
     assert found["unknown"]["all"]["auroc"] == 1.0 and found["unknown"]["all"]["wrong_name"]["hits"] == 0
     assert found["confusion"]["none"] == {"none": 1, "unknown": 1}
@@ -186,6 +189,18 @@ def test_answers_that_are_none(tmp_path):
     (tmp_path / "x.json").write_text("no")
     with pytest.raises(AirTouchError, match="not the JSON"):
         blind_score.read_answers(tmp_path)
+
+
+def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():
+    """Two normal variables whose log ratios have means 2 x APART apart: the test has its false alarms and its power."""
+    apart = np.sqrt(2.0 * blind_severity.APART)
+    none, there = (apart * np.random.default_rng(k).normal(m, 1.0, 400_000) - 0.5 * apart ** 2
+                   for k, m in enumerate((0.0, apart)))
+    assert 0.5 * (there.mean() - none.mean()) == pytest.approx(blind_severity.APART, rel=0.01)
+    alarm = none.mean() + blind_severity.FALSE_ALARM * none.std()
+    assert np.mean(none > alarm) == pytest.approx(0.02 / len(KINDS), rel=0.15)
+    assert np.mean(there > alarm) == pytest.approx(0.95, abs=0.002)
+    assert blind_severity.SEEN == pytest.approx(0.5 * chi2.isf(2.0 * 0.02 / len(KINDS), 1))  # one-sided
 
 
 def test_severities_and_strengths():

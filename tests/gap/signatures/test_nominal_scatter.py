@@ -10,10 +10,12 @@ from airtouch.gap.signatures.candidates import ALIKE
 from airtouch.gap.signatures.nominal_scatter import (
     LEAST,
     LEAST_RECORDED,
+    ODD,
     Apparent,
     Scatter,
     measured,
     scatter_of,
+    size_of,
     table,
 )
 from airtouch.simulation.effects import EFFECTS
@@ -140,17 +142,29 @@ def test_flights_that_say_nothing_of_an_effect_leave_it_to_its_gain():
 def test_what_comes_and_goes_in_a_nominal_flight_is_no_news_in_the_next():
     """One flight in twelve meets a gust. Were the largest tenth cut off, one in twelve would be called one."""
     rng = np.random.default_rng(10)
-    seconds, least = 20.0, 12.0
 
-    def root() -> float:
+    def size() -> float:
         return rng.uniform(1.0, 3.0) if rng.uniform() < 1.0 / 12.0 else abs(rng.normal()) * 0.2
 
     beyond = []
     for _ in range(50):
-        known = [Apparent({}, {}, 0.0, {"gust": root() ** 2}) for _ in range(40)]
-        limit = measured(known).passing("gust", seconds, least)
-        beyond += [seconds * root() ** 2 > limit for _ in range(40)]
-    assert np.mean(beyond) < 0.03
+        known = measured([Apparent({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
+        beyond += [known.unusual("gust", size()) > 0.0 for _ in range(40)]
+    assert np.mean(beyond) < 0.06
+
+
+def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
+    rng = np.random.default_rng(11)
+    sizes = np.maximum(1.0 + 0.2 * rng.normal(size=100_000), 0.0)
+    known = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
+    assert np.mean([known.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(ODD, rel=0.3)
+
+
+def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():
+    known = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in (0.0, 0.2, 0.1, 0.3, 0.2, 0.1)])
+    assert known.unusual("downwash", size_of(30.0, np.array([0.01]))) < 0.0
+    assert known.unusual("downwash", size_of(0.1, np.array([0.2]))) < 0.0
+    assert known.unusual("downwash", size_of(30.0, np.array([0.2]))) > 0.0
 
 
 def test_what_is_measured_is_the_middle_of_the_inverse_chi_square():
@@ -190,13 +204,40 @@ def test_a_random_effect_is_judged_by_how_far_it_is_above_its_usual_strength():
     assert got.evidence("vibration", np.array([0.2])) == 0.0
 
 
+def test_a_strength_counts_from_the_likeliest_compromise_of_chance_and_nominal_scatter():
+    """Against a search of the compromise on a grid, and where one of the two is nothing, against its closed form."""
+    scatter = Scatter({"imu_bias": np.full(2, 0.01)}, 8.0, (0.0, 0.5))
+
+    def student_of(x):
+        return 0.5 * 9.0 * np.log1p(np.maximum(np.sum((x / 0.01) ** 2, axis=0) - 1.0, 0.0) / 8.0)
+
+    for strength, covariance in (([0.0, 0.05], np.diag([1e-4, 4e-4])), ([0.03, -0.02], np.diag([1e-4, 1e-4])),
+                                 ([0.08, -0.06], 1e-3 * np.array([[1.0, -0.9], [-0.9, 1.0]]))):
+        x = np.stack(np.meshgrid(*2 * [np.linspace(-0.1, 0.1, 801)]))
+        off = x - np.reshape(strength, (2, 1, 1))
+        chance = 0.5 * np.einsum("iab,ij,jab->ab", off, np.linalg.inv(covariance), off)
+        found = scatter.evidence("imu_bias", np.array(strength), covariance)
+        assert found == pytest.approx(float((chance + student_of(x)).min()), rel=0.05, abs=0.15)
+    sure = np.array([0.0, 0.05])
+    assert scatter.evidence("imu_bias", sure, 1e-14 * np.eye(2)) == pytest.approx(student_of(sure), rel=1e-3)
+    alone = Scatter({"mass": np.array([1e-3])}, 8.0, (0.0, 0.5))
+    assert alone.evidence("mass", np.array([1.0]), np.array([[0.04]])) == pytest.approx(0.5 * 5.0 ** 2, rel=0.02)
+
+
 def test_a_parameter_that_the_data_leave_open_is_no_evidence():
     scatter = Scatter({"imu_bias": np.full(2, 0.01)}, 8.0, (0.0, 0.5))
-    known, open_ = np.array([0.0, 1.0]), np.array([1e-3, 1.0])
-    assert scatter.evidence("imu_bias", known, open_) == 0.0
-    low = 1.0 - 1.645 * 0.1
-    assert scatter.evidence("imu_bias", known, np.array([1e-3, 0.1])) == pytest.approx(
-        scatter.evidence("imu_bias", np.array([0.0, low])))
+    known = np.array([0.0, 1.0])
+    assert scatter.evidence("imu_bias", known, np.diag([1e-6, 1.0])) <= 0.5
+    assert scatter.evidence("imu_bias", known, np.diag([1e-6, np.inf])) == 0.0
+
+
+def test_parameters_that_make_up_for_one_another_count_together():
+    """A battery's strength and its charge trade against each other; what they do together may be sure."""
+    scatter = Scatter({"battery_sag": np.full(2, 1e-3)}, 8.0, (0.0, 0.5))
+    strength, along, across = np.array([1.0, 1.0]), np.array([1.0, -1.0]), np.array([1.0, 1.0])
+    covariance = 4.0 * np.outer(along, along) + 0.01 * np.outer(across, across)
+    together, alone = (scatter.evidence("battery_sag", strength, c) for c in (covariance, np.diag(np.diag(covariance))))
+    assert alone < 1.0 and together > 8.0
 
 
 def test_the_best_of_several_trials_does_not_widen_the_scatter():

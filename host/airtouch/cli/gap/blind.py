@@ -8,6 +8,7 @@ import click
 from airtouch.cli import Suggesting
 from airtouch.cli.gap.options import check_free, runner, written
 from airtouch.cli.shared import scores
+from airtouch.logs.files import make_folder
 
 
 @click.group("blind", cls=Suggesting)
@@ -28,6 +29,7 @@ def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool
     from airtouch.cli.gap import show
     from airtouch.gap.sealed import blind as sealed
 
+    make_folder(out)
     with show.Bar() as bar:
         written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
     click.echo(f"{flights} flights in {out}; the key in {written}")
@@ -74,6 +76,7 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
 
     need("plots", "scoring a sealed set")
     spread = runner(dask, ()) if dask else None
+    make_folder(out)
     with show.Bar() as bar:
         figures = check.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
     _scored(figures, json_path or out / "figures.json", out / "figures.png", True)

@@ -11,7 +11,7 @@ from airtouch.gap.evidence.problem import Part, whole_of
 from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.naming.selection import Judged, Selection
 from airtouch.gap.result import Found
-from airtouch.gap.signatures.candidates import CLOCK, MEAN, SPECTRUM, Term
+from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term
 
 SHAPE_PRICE = 1.0  #: log likelihood that another shape of an effect must gain on all the data
 ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
@@ -42,9 +42,7 @@ def chosen_effects(data: Data, selection: Selection) -> list[Found]:
         spread = _spread(data.study.controller, judged, t, known)
         out.append(Found(t.name, t.quantities(x, spread), t.gate))
     for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
-        x = t.scaled(t.values)
-        n = sum(len(f) for f in data.flights)
-        out.append(Found(t.name, t.quantities(x, np.diag(x ** 2 / max(2.0 * n / 10.0, 1.0)))))
+        out.append(Found(t.name, t.quantities(t.scaled(t.values), _of_clock(t, sum(len(f) for f in data.flights)))))
     order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
     return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
 
@@ -84,6 +82,15 @@ def _middle(chosen: Judged) -> np.ndarray | None:
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
 
 
+def _of_clock(term: Term, samples: int) -> np.ndarray:
+    """Variance (1, 1) of the strength of what the log did to its times, from so many samples."""
+    many = 2.0 * samples / 10.0
+    if term.name in COUNTED:
+        share, burst = (term.values[p] for p in COUNTED[term.name])
+        many = share * samples / (2.0 * burst - 1.0)
+    return np.diag(term.scaled(term.values) ** 2 / max(many, 1.0))
+
+
 def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.ndarray) -> np.ndarray:
     """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement and the model's doubt."""
     pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
@@ -92,5 +99,5 @@ def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.n
     if len(pairs) == 2:
         apart = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
     assumed = term.kind == SPECTRUM or (law is not None and law.changes_loop((term.active(),)))
-    doubt = np.diag((ASSUMED * term.scaled(term.values)) ** 2) if assumed else 0.0
-    return covariance + apart + doubt
+    doubt = max(ASSUMED if assumed else 0.0, OWN_SCATTER.get(term.name, 0.0))
+    return covariance + apart + np.diag((doubt * term.scaled(term.values)) ** 2)

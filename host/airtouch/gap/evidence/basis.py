@@ -12,9 +12,10 @@ from airtouch.vehicle import Vehicle
 LAG_S = 0.05  #: unit of the derivatives of thrust
 TIME_S = 20.0  #: unit of time
 HEIGHT_M = 0.05  #: of a rotor, at which its ground effect is one unit
+LOW_M = 0.2  #: above the floor, at which a force that fades slowly has half its strength
 BASIS = ("one", "in_air", "thrust", "roll", "pitch", "yaw", "d_thrust", "d_roll", "d_pitch", "d_yaw", "vx", "vy",
          "vz", "speed", "world_x", "world_y", "tilt", "time", "time_thrust", "height",
-         "height_roll", "height_pitch")
+         "height_roll", "height_pitch", "low", "high")
 
 
 def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
@@ -29,8 +30,10 @@ def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     time = np.arange(len(flight)) * PERIOD_S / TIME_S
     near = (HEIGHT_M / np.maximum(flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4], HEIGHT_M)) ** 2
     height = near @ MIX[:3].T
+    above = flight.signals[:, at.HEIGHT]
+    low = 1.0 / (1.0 + (above / LOW_M) ** 2)
     made = np.column_stack([np.ones(len(flight)), air, thrust, changing, speed, np.hypot(*speed[:, :2].T),
-                            np.zeros((len(flight), 3)), time, time * thrust[:, 0], height])
+                            np.zeros((len(flight), 3)), time, time * thrust[:, 0], height, low, above])
     made[:, 1:] *= air[:, None]
     out = np.repeat(made[:, :, None], 3, axis=2)
     place = BASIS.index("world_x")

@@ -65,8 +65,7 @@ class Data:
         self.turning = [blocks(angular_acceleration(f), b[AIR], AIR)
                         for f, b in zip(self.flights, self.first, strict=True)]
         if self.study.response is not None:
-            self.quiet = [self.study.response.quiet(t - b[AIR][:, :, TORQUE])
-                          for t, b in zip(self.turning, _replayed(self, ()), strict=True)]
+            self.quiet = [self.study.response.quiet(w) for w in commanded(self)]
         study = self.study
         quiet: list[np.ndarray | None] = [*self.quiet] if self.quiet else [None for _ in self.flights]
         self.bridging = [bridging_power(f, study.vehicle, study.calibration, b[AIR], q, study.response)
@@ -102,6 +101,11 @@ def _applied(data: Data, response: Response, active: Sequence[Active], replayed:
             for f, q, m, n, d, o, e in sets]
 
 
+def commanded(data: Data) -> list[np.ndarray]:
+    """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands, by flight."""
+    return [turned - left[AIR][:, :, TORQUE] for turned, left in zip(data.turning, _replayed(data, ()), strict=True)]
+
+
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
     """Power that the gap may have by flight and regime, as `spectra`, where effects change what is cut of a step.
 
@@ -112,10 +116,10 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
     if response is None or change is None or not change.cut.any():
         return None
     out = []
-    for f, q, turned, nominal in zip(data.flights, data.quiet, data.turning, _replayed(data, ()), strict=True):
-        power = {r: np.zeros(x.shape) for r, x in nominal.items()}
+    for f, q, torque, base in zip(data.flights, data.quiet, commanded(data), data.base, strict=True):
+        power = {r: np.zeros(x.shape) for r, x in base.items()}
         if f.rates is not None:
-            doubt = response.doubt(q, turned - nominal[AIR][:, :, TORQUE], change)
+            doubt = response.doubt(q, torque, change)
             power[AIR][:, FIRST_BIN:, TORQUE] = doubt[:, FIRST_BIN:]
         out.append(power)
     return out

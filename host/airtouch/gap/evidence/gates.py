@@ -14,12 +14,13 @@ from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import Fit, fit, judge, left_over
-from airtouch.gap.evidence.problem import Part, problem_of, whole_of
+from airtouch.gap.evidence.problem import Part, Problem, problem_of, whole_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import SPECTRUM, Term
+from airtouch.logs.segments import KINDS
 
 MOST_STRETCHES = 4  #: of one flight
 WORST = 0.25  #: share of the blocks that are explained worst
@@ -29,6 +30,8 @@ STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
 PIECE_S = 0.16  #: of the force along the thrust, in which bursts are looked for
 LIVELY_HZ = 1.0  #: above which they are
 LIVELY, DEGREES = 6.0, 3.0  #: power of a burst over the flight's median; independent values in a piece
+#: phases in which the floor's own air acts, and no two flights are alike: nothing is told to come and go there
+ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
 WHOLE = 0.9  #: of a flight's blocks: what acts there does not come and go
 Gate = tuple[tuple[str, float, float], ...]
 
@@ -41,6 +44,11 @@ class Gated:
     fitted: Fit
     gain: float
     cost: float
+
+    @property
+    def strength(self) -> np.ndarray:
+        """Scaled parameters (k,) of all its terms."""
+        return np.concatenate([t.scaled(t.values) for t in self.fitted.terms])
 
 
 def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
@@ -83,7 +91,7 @@ def _by_blocks(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term]) 
     on[np.argsort(off / count)[:max(int(WORST * blocks), 2)]] = True
     for _ in range(ROUNDS):
         fitted = fit(data, _part(whole, on), terms)
-        gain = _each(data, whole, fitted.terms) - off
+        gain = np.where(_at_the_ends(data, problem), -np.inf, _each(data, whole, fitted.terms) - off)
         stretches = _stretches(gain, problem.piece, 2.0 * np.log(blocks))
         chosen = np.zeros(blocks, bool)
         for first, last in stretches:
@@ -106,7 +114,7 @@ def _bursts(data: Data) -> tuple[Gate, float]:
     gate, price = [], 0.0
     for flight in data.flights:
         force = np.nan_to_num(residual(flight, data.study.vehicle, data.study.calibration)[:, 2])
-        force[flight.on_ground | flight.bridged] = 0.0
+        force[flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS)] = 0.0
         size = int(PIECE_S / PERIOD_S)
         pieces = _highpassed(force)[:len(force) // size * size].reshape(-1, size)
         power = (pieces ** 2).mean(axis=1)
@@ -127,6 +135,13 @@ def _bursts(data: Data) -> tuple[Gate, float]:
 def _highpassed(values: np.ndarray) -> np.ndarray:
     """Values (n,) freed of what is slower than LIVELY_HZ."""
     return sosfiltfilt(butter(2, LIVELY_HZ * 2.0 * PERIOD_S, "highpass", output="sos"), values)
+
+
+def _at_the_ends(data: Data, problem: Problem) -> np.ndarray:
+    """Blocks (b,) in the air most of which are take-off or landing."""
+    ends = [np.isin(data.flights[i].phase[first:first + LENGTH[AIR]], ENDS).mean() > 0.5
+            for i, first in zip(problem.piece, problem.begin, strict=True)]
+    return np.array(ends, bool)
 
 
 def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:

@@ -3,6 +3,8 @@
 Two parts, both found on one half of the data and judged on the other. The first is a
 regression of every force, torque and rate on the flight's own signals: thrust and how
 it changes, roll, pitch and yaw commands, velocity, tilt, height over what is below, time.
+In flights of this project's simulator, whose loop is modelled, roll and pitch torque is regressed on that of the logged
+commands as well, band by band, in time with them and a quarter turn later: how else they turn the vehicle.
 The second is a free power in every view, channel and band. Only columns and bands that
 gain more than chance among so many does are used. What nominal flights have of a column
 or a band is no evidence: as far as they scatter, the coefficient is taken away at no gain.
@@ -10,29 +12,45 @@ or a band is no evidence: as far as they scatter, the coefficient is taken away 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from airtouch.gap.evidence.basis import BASIS, basis
-from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import GROUPS, Part, Problem, problem_of, whole_of
-from airtouch.gap.signals.spectra import OVERLAP_WEIGHT, blocks, squared
+from airtouch.gap.evidence.data import Data, commanded
+from airtouch.gap.evidence.problem import BANDS_HZ, GROUPS, Part, Problem, problem_of, whole_of
+from airtouch.gap.signals.channels import COUNT, TORQUE
+from airtouch.gap.signals.response import FIRST_BIN
+from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, blocks, frequencies, squared
 from airtouch.gap.signatures.candidates import Term
 
 CHANNELS = 9  #: that are regressed: force, torque, rate
+ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
+TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
+LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
+LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
+WIDEST = len(BASIS) + LOOP
+LIFT, OF_HEIGHT = 2, ("height", "low", "high")  #: channel of the force along the thrust; columns of the height
 NOTHING = 1e-9  #: variance of a coefficient that has no scatter
 ROUNDS = 3
 MOST_COLUMNS = 4  #: of one channel
 SURE = 3.0  #: standard deviations by which coefficients must scatter more than chance has them do
-SCATTER = 0.15  #: of the logarithm of power between nominal flights, believed like
-BELIEF = 2.0  #: that many of them
+BELIEF = 2.0  #: nominal flights that the scatter of power in all channels together counts as, for each band of one
+#: of the logarithm of power between flights, at least: no effect's spectrum is modelled any better, and in recorded
+LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1  #: ones no air is
 CHANCE = 4.0  #: gain on the half that it is found on by which a column or a band is used: about one by chance
+#: for each group the first of its view and sensor: force, torque, rate; commands, one axis each
+SENSOR = np.arange(GROUPS) // 1000 * 1000 + np.arange(GROUPS) % 1000 % COUNT // 3 * 3
+ABOVE_MEANS = np.arange(GROUPS) % 1000 >= COUNT  #: groups above the lowest band
 LOOSE = (np.zeros(GROUPS), np.full(GROUPS, 1e3))  #: mean and scatter of powers of which nothing is believed
+
+
+Powers = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  #: see `HalfResiduals.powers`
 
 
 @dataclass(frozen=True)
 class Usual:
-    """Nominal flights: rms of coefficients (CHANNELS, columns), log power's mean and rms (2, GROUPS)."""
+    """Nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, GROUPS)."""
 
     columns: np.ndarray
     power: np.ndarray
@@ -50,26 +68,55 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
     return kept
 
 
+def _loop_columns(data: Data) -> list[np.ndarray]:
+    """Spectra (blocks, bins, 2, LOOP) in the air of the torque that the model makes of the commands, by flight: each
+
+    band's alone, weighted as what is left of the torque is; made once.
+    """
+    kept = data.__dict__.get("_loop")
+    if kept is None:
+        f, response = frequencies(AIR), data.study.response
+        bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
+        bands[:FIRST_BIN] = False
+        shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP)
+        kept = []
+        for i, torque in enumerate(commanded(data)):
+            weighted = torque if response is None else response.weighted(data.quiet[i], torque)
+            kept.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
+        data.__dict__["_loop"] = kept
+    return kept
+
+
 def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
-    """The basis (elements, columns) at the elements of one channel, in their order."""
-    every = _columns(data)
-    made = [every[i][channel % 3][r][chosen][:, problem.keep[r][:, channel]].reshape(-1, len(BASIS))
-            for i, r, chosen in part.pieces]
+    """The columns (elements, columns) at the elements of one channel, in their order."""
+    every, made = _columns(data), []
+    axis, turns = channel % 3, channel in ROLL_PITCH
+    for i, r, chosen in part.pieces:
+        columns = every[i][axis][r][chosen]
+        if turns:
+            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP))
+            columns = np.concatenate([columns, loop], axis=2)
+        made.append(columns[:, problem.keep[r][:, channel]].reshape(-1, columns.shape[2]))
     return np.concatenate(made) if made else np.zeros((0, len(BASIS)), complex)
 
 
 @dataclass(frozen=True)
 class _Cell:
-    """One channel of one flight: elements own, columns (elements, basis and offsets), spread of the offsets."""
+    """One channel of one flight: elements own, columns (elements, free and offsets), spread of the offsets."""
 
     channel: int
     own: np.ndarray
     columns: np.ndarray
     offsets: np.ndarray
 
+    @property
+    def free(self) -> int:
+        """Columns whose coefficient may be anything."""
+        return self.columns.shape[1] - len(self.offsets)
+
     def precision(self, usual: Usual) -> np.ndarray:
         """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
-        nominal = np.maximum(usual.columns[self.channel] ** 2, NOTHING)
+        nominal = np.maximum(usual.columns[self.channel, :self.free] ** 2, NOTHING)
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 
 
@@ -98,7 +145,7 @@ class HalfResiduals:
 
     def without(self, cell: _Cell, given: np.ndarray, usual: Usual) -> tuple[np.ndarray, float]:
         """A cell without given coefficients and without what nominal flights may have, and its likelihood."""
-        values = self.values[cell.own] - cell.columns[:, :len(BASIS)] @ given
+        values = self.values[cell.own] - cell.columns[:, :cell.free] @ given[:cell.free]
         left, precision = values, cell.precision(usual)
         for _ in range(2):
             normal, right = self.system(cell, values, left)
@@ -108,7 +155,7 @@ class HalfResiduals:
         tails = (nu + 1.0) * np.log1p(squared(left) / self.power[cell.own] / tail)
         return left, -float(OVERLAP_WEIGHT * tails.sum() + 0.5 * (precision * x ** 2).sum())
 
-    def powers(self, left: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def powers(self, left: np.ndarray) -> Powers:
         """Power of what is left over what it should be, freedom, tail and group of the values that are known."""
         known = self.problem.known
         over = squared(left[known]) / self.power[known]
@@ -130,10 +177,17 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:
     return out
 
 
-def coefficients(half: HalfResiduals, channel: int, usual: Usual) -> np.ndarray:
-    """Coefficients (columns,) that a channel asks for, one column after another; zero for the others."""
+def coefficients(half: HalfResiduals, channel: int, usual: Usual, among: Sequence[str] = ()) -> np.ndarray:
+    """Coefficients (WIDEST,) that a channel asks for, one column after another; zero for the others.
+
+    among: of the basis, the columns that may be asked for; all columns by default.
+    """
     cells = [c for c in half.cells if c.channel == channel]
-    n, found = len(BASIS), np.zeros(len(BASIS))
+    found = np.zeros(WIDEST)
+    if not cells:
+        return found
+    n = cells[0].free
+    every = [BASIS.index(name) for name in among] or list(range(n))
     left = [half.values[c.own] for c in cells]
     for _ in range(ROUNDS):  # of weights
         told, right = np.zeros((n, n)), np.zeros(n)
@@ -147,12 +201,12 @@ def coefficients(half: HalfResiduals, channel: int, usual: Usual) -> np.ndarray:
         free: list[int] = []
         gain = 0.0
         while len(free) < MOST_COLUMNS:
-            tried = [(_gain(told, right, [*free, k]), k) for k in range(n) if k not in free]
-            if max(tried)[0] - gain < CHANCE:
+            tried = [(_gain(told, right, [*free, k]), k) for k in every if k not in free]
+            if not tried or max(tried)[0] - gain < CHANCE:
                 break
             gain, k = max(tried)
             free.append(k)
-        found = np.zeros(n)
+        found = np.zeros(WIDEST)
         found[free] = np.linalg.solve(told[np.ix_(free, free)], right[free])
         left = [half.without(c, found, usual)[0] for c in cells]
     return found
@@ -183,33 +237,70 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     """Held-out log likelihood that columns, and powers on top of them, add to a hypothesis.
 
     terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated
-    flights alone: a recorded one had calm air.
+    flights alone: a recorded one had calm air; and not in the band of the means, of which offsets take what they may.
     """
     usual = data.study.usual or nothing_usual()
-    nothing = np.zeros(len(BASIS))
     linear = power = 0.0
     for train, test in ((0, 1), (1, 0)):
         a, b = (HalfResiduals(data, parts[k], terms[train]) for k in (train, test))
         left = [h.values.copy() for h in (a, b)]
         for channel in range(CHANNELS):
-            found = coefficients(a, channel, usual)
-            gained = 0.0
+            found = coefficients(a, channel, usual, () if data.study.simulated else BASIS)
             for k, h in enumerate((a, b)):
                 for cell in (c for c in h.cells if c.channel == channel):
-                    left[k][cell.own], level = h.without(cell, found, usual)
-                    if h is b and found.any():
-                        gained += level - h.without(cell, nothing, usual)[1]
-            linear += float(gain_at_even_odds(gained)) if found.any() else 0.0
+                    left[k][cell.own], _ = h.without(cell, found, usual)
+            linear += _linear_gain(b, channel, found, usual)
         one, two = (h.powers(x) for x, h in zip(left, (a, b), strict=True))
-        middle, spread = usual.power
-        _, usually = power_factors(*one, middle, spread)
-        found, freely = power_factors(*one, middle, LOOSE[1])
-        used = freely - usually > CHANCE
-        if not data.study.simulated:
-            used &= found > middle
-        gained = power_factors(*two, found, spread)[1] - power_factors(*two, middle, spread)[1]
-        power += float(gain_at_even_odds(gained[used]).sum())
+        power += _power_gain(one, two, usual, data.study.simulated)
     return linear, power
+
+
+def height_gain(data: Data, parts: Sequence[Part]) -> float:
+    """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
+    usual = data.study.usual or nothing_usual()
+    halves = [HalfResiduals(data, part, ()) for part in parts]
+    return sum(_linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, usual, OF_HEIGHT), usual)
+               for train, test in ((0, 1), (1, 0)))
+
+
+def _linear_gain(half: HalfResiduals, channel: int, found: np.ndarray, usual: Usual) -> float:
+    """Log likelihood that the coefficients (WIDEST,) of a channel, found elsewhere, gain on a half."""
+    if not found.any():
+        return 0.0
+    nothing = np.zeros(WIDEST)
+    return float(gain_at_even_odds(sum(half.without(c, found, usual)[1] - half.without(c, nothing, usual)[1]
+                                       for c in half.cells if c.channel == channel)))
+
+
+def _power_gain(one: Powers, two: Powers, usual: Usual, simulated: bool) -> float:
+    """What free powers, found on one half, gain on the other: of every cell, or of all the bands of a sensor together,
+
+    as noise that is a little stronger shows nowhere alone.
+    """
+    middle, spread = usual.power
+    spread = spread if simulated else np.maximum(spread, RECORDED_SCATTER)
+    judged = ABOVE_MEANS if simulated else np.zeros(GROUPS, bool)  # with less power than usual as well
+    usually, before = (power_factors(*half, middle, spread)[1] for half in (one, two))
+    pools = [(power_factors(*one, middle, LOOSE[1])[0], np.arange(GROUPS))]
+    if simulated:  # recorded flights' noise differs from day to day
+        pools.append((_of_sensors(one, middle), SENSOR))
+    gains = []
+    for found, pool in pools:
+        free = spread if pool is SENSOR else LOOSE[1]
+        trained, gained = (np.bincount(pool, x, GROUPS) for x in (
+            power_factors(*one, found, free)[1] - usually, power_factors(*two, found, spread)[1] - before))
+        used = (trained > CHANCE) & (np.bincount(pool, (found > middle) | judged, GROUPS) > 0)
+        gains.append(float(gain_at_even_odds(gained[used]).sum()))
+    return max(gains)
+
+
+def _of_sensors(powers: Powers, middle: np.ndarray) -> np.ndarray:
+    """Logarithm (GROUPS,) of the powers' factors where all bands of a sensor but that of the means share one."""
+    e, nu, tail, groups = powers
+    there = ABOVE_MEANS[groups]
+    over = (e * np.exp(-middle[groups]))[there]
+    shared, _ = power_factors(over, nu[there], tail[there], SENSOR[groups][there], *LOOSE)
+    return middle + np.where(ABOVE_MEANS, shared[SENSOR], 0.0)
 
 
 def gain_at_even_odds(gain: np.ndarray | float) -> np.ndarray:
@@ -223,12 +314,12 @@ def usual_of(data: Data) -> Usual:
     n = len(halves)
     if n < 2:
         return nothing_usual()
-    columns, surprise = np.zeros((2, CHANNELS, len(BASIS)))
+    columns, surprise = np.zeros((2, CHANNELS, WIDEST))
     for h in halves:
         for cell in h.cells:
             found, variance = _one_by_one(h, cell)
-            columns[cell.channel] += (found ** 2 - variance) / (n - 1)
-            surprise[cell.channel] += found ** 2 / variance / n
+            columns[cell.channel, :cell.free] += (found ** 2 - variance) / (n - 1)
+            surprise[cell.channel, :cell.free] += found ** 2 / variance / n
     columns[surprise < 1.0 + SURE * np.sqrt(2.0 / n)] = 0.0
     few = (n + 1) / (n - 1)  # another flight may lie farther off than those that are known
     usual = Usual(np.sqrt(np.maximum(few * columns, 0.0)), nothing_usual().power)
@@ -236,7 +327,7 @@ def usual_of(data: Data) -> Usual:
     for i, h in enumerate(halves):
         left = h.values.copy()
         for cell in h.cells:
-            left[cell.own] = h.without(cell, np.zeros(len(BASIS)), usual)[0]
+            left[cell.own] = h.without(cell, np.zeros(WIDEST), usual)[0]
         e, nu, tail, groups = h.powers(left)
         log_power[i] = power_factors(e, nu, tail, groups, *LOOSE)[0]
         count = np.bincount(groups, OVERLAP_WEIGHT * nu / (nu + 3.0), GROUPS)
@@ -245,13 +336,21 @@ def usual_of(data: Data) -> Usual:
     count = np.maximum(there.sum(axis=0), 1)
     middle = np.where(there, log_power, 0.0).sum(axis=0) / count
     squares = np.where(there, (log_power - middle) ** 2 - chance, 0.0).sum(axis=0)
-    own = (np.maximum(squares, 0.0) + BELIEF * SCATTER ** 2) / (count - 1 + BELIEF)
+    pooled = np.maximum(_of_band(squares) / np.maximum(_of_band(count - 1.0), 1.0), LEAST_SCATTER ** 2)
+    own = (np.maximum(squares, 0.0) + BELIEF * pooled) / (count - 1 + BELIEF)
     return Usual(usual.columns, np.stack([middle, np.sqrt(own * (1.0 + 1.0 / count))]))
+
+
+def _of_band(values: np.ndarray) -> np.ndarray:
+    """For each group the sum of values (GROUPS,) over the channels of its view and band."""
+    cell = np.arange(GROUPS)
+    band = cell - cell % 1000 % COUNT
+    return np.bincount(band, values, GROUPS)[band]
 
 
 def _one_by_one(half: HalfResiduals, cell: _Cell) -> tuple[np.ndarray, np.ndarray]:
     """Coefficient and variance (columns,) of every column of a cell, each beside the offsets alone."""
-    n = len(BASIS)
+    n = cell.free
     left = half.without(cell, np.zeros(n), nothing_usual())[0]
     normal, right = half.system(cell, half.values[cell.own], left)
     found, variance = np.zeros(n), np.zeros(n)
@@ -265,4 +364,4 @@ def _one_by_one(half: HalfResiduals, cell: _Cell) -> tuple[np.ndarray, np.ndarra
 
 def nothing_usual() -> Usual:
     """Where no nominal flight is known: columns and bands as the floor has them."""
-    return Usual(np.zeros((CHANNELS, len(BASIS))), np.zeros((2, GROUPS)))
+    return Usual(np.zeros((CHANNELS, WIDEST)), np.zeros((2, GROUPS)))

@@ -84,8 +84,9 @@ def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarra
             made[:, TORQUE] = _difference(r)[:, None] * gyro
             made[:, RATE] = gyro
             if r == AIR and r in data.study.floor.power:
-                beyond = np.nan_to_num(data.study.floor.power[r][:, TORQUE]) - made[:, TORQUE]
-                made[:, TORQUE] += _gyro_share(data.study) * np.maximum(beyond, 0.0)
+                floor = np.nan_to_num(data.study.floor.power[r][:, TORQUE])
+                beyond = _gyro_share(data.study) * np.maximum(floor - made[:, TORQUE], 0.0)
+                made[:, TORQUE] = np.minimum(made[:, TORQUE], floor) + beyond  # part of it the commands foretell
         out[r] = np.broadcast_to(extra * made, shape[r]).copy()
     return out
 

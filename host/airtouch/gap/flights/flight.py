@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights import motion
-from airtouch.logs.checks.clock import lost_samples, true_period
+from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, true_period
 from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, RANGES, FlightLog
@@ -38,8 +38,8 @@ class Flight:
     signals (n, COUNT) for effects; acceleration (n, 3) m/s^2: specific force, body axes;
     rates (n, 3) rad/s or None; pwm (n, 4); turn (n, 3, 3) body to world; phase (n,) places
     in `segments.KINDS`; usable (n,): neither lost nor close to touching the ground;
-    clock_s (m,): logged times of the m rows that arrived minus the regular ones; lost (n,): rows that did not;
-    touching (n,): in flight, so low that the legs may touch.
+    clock_s (m,): logged times of the rows that arrived minus the regular ones, as far as those are sure;
+    lost (n,): rows that did not arrive; touching (n,): in flight, so low that the legs may touch.
     """
 
     name: str
@@ -178,7 +178,8 @@ def _regular(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np.ndarr
         place[gap.sample:] += gap.lost
     if place[-1] > 3 * n + 1000:
         raise AirTouchError(f"{name}: {place[-1] - n} of {place[-1]} samples are missing; check the clock column")
-    clock = time - np.polyval(np.polyfit(place, time, 1), place) if n > 2 else np.zeros(n)
+    known = n - _unsure(time, period)
+    clock = (time - np.polyval(np.polyfit(place[:known], time[:known], 1), place))[:known] if known > 2 else np.zeros(n)
     lost = np.ones(place[-1] + 1, bool)
     lost[place] = False
     columns = {}
@@ -188,6 +189,12 @@ def _regular(log: FlightLog, name: str) -> tuple[FlightLog, np.ndarray, np.ndarr
     columns["t_s"] = np.arange(len(lost)) * PERIOD_S
     meta = {**log.meta, "sample_period_s": PERIOD_S}
     return FlightLog(columns, meta), clock, lost
+
+
+def _unsure(time: np.ndarray, period: float) -> int:
+    """Rows at the end after which too few follow to say whether rows before them were lost or these came late."""
+    steps = np.flatnonzero(np.diff(time[-LEAST_AFTER - 1:]) > 1.5 * period)
+    return min(len(time), LEAST_AFTER) - int(steps[0]) if len(steps) else 0
 
 
 def _knocks(force: np.ndarray, rest: np.ndarray) -> np.ndarray:

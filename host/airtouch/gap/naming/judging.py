@@ -95,8 +95,9 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
         on_clock, clock_nats = clock_gain(on.data, t)
         fitted.append(on_clock)
         gain += clock_nats if t in timed else 0.0
-    strength, variance = strength_of(telling(terms), fitted, fits)
-    return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, variance=variance)
+    strength, covariance, apart = strength_of(telling(terms), fitted, fits)
+    return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, covariance=covariance,
+                  apart=apart)
 
 
 def gain_of(on: Trial, half: int, terms: Sequence[Term]) -> float:
@@ -104,11 +105,11 @@ def gain_of(on: Trial, half: int, terms: Sequence[Term]) -> float:
     return judge(on.data, on.parts[half], terms) - on.base[any(t.kind == SPECTRUM for t in terms)][half]
 
 
-def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray]:
-    """Scaled parameters (k,) of a term as fitted, the mean of both halves, and variances (k,), 0 but for mean effects.
+def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Scaled parameters (k,) of a term as fitted, the mean of both halves; covariance (k, k), 0 but for mean effects;
 
-    k: of all parameters that the effect may have free; those that this variant leaves alone are 0, and nobody knows
-    how far they lie from it.
+    half of what the halves differ by (k,). k: of all parameters that the effect may have free; those that this variant
+    leaves alone are 0, and nobody knows how far they lie from it.
     """
     hypotheses = [fitted] if term.kind == CLOCK or not fits else [f.terms for f in fits]
     same = [next(t for t in terms if _kind_of(t) == _kind_of(term)) for terms in hypotheses]
@@ -116,26 +117,26 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tupl
     each = np.array([t.scaled(t.values)[:k] for t in same])
     strength = term.among_all(each.mean(axis=0))
     if term.kind != MEAN:
-        return strength, np.zeros(len(strength))
-    variances = []
+        return strength, np.zeros((len(strength), len(strength))), np.zeros(len(strength))
+    covariance = np.zeros((k, k))
     for f, t in zip(fits, same, strict=True):
         place = sum(len(x.free) for x in f.terms[:f.terms.index(t)] if x.kind == MEAN)
-        variances.append(np.diag(f.covariance)[place:place + k])
-    return strength, term.among_all(of_mean(each, np.array(variances)), np.inf)
+        covariance += f.covariance[place:place + k, place:place + k] / len(fits) ** 2
+    return strength, covariance_among_all(term, covariance), term.among_all(0.5 * (each[0] - each[-1]))
+
+
+def covariance_among_all(term: Term, covariance: np.ndarray) -> np.ndarray:
+    """Covariance of all parameters that an effect may have free, from that of a term's own; infinite for the others."""
+    place = term.among_all(np.arange(len(term.free)), -1).astype(int)
+    own = np.flatnonzero(place >= 0)
+    out = np.diag(np.full(len(place), np.inf))
+    out[np.ix_(own, own)] = covariance[np.ix_(place[own], place[own])]
+    return out
 
 
 def _kind_of(term: Term) -> tuple:
     """What tells a term from others of a hypothesis."""
     return term.name, term.kind, term.values.get("rotor")
-
-
-def of_mean(values: np.ndarray, variances: np.ndarray) -> np.ndarray:
-    """Variance (k,) of the mean of independent values (n, k), no less than what they differ by says.
-
-    Where the likelihood has two peaks, its curvature at one of them knows nothing of the other.
-    """
-    apart = values.var(axis=0, ddof=1) / len(values) if len(values) > 1 else 0.0
-    return np.maximum(variances.sum(axis=0) / len(variances) ** 2, apart)
 
 
 def _refined(data: Data, part: Part, found: Fit) -> Fit:

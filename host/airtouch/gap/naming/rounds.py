@@ -10,7 +10,7 @@ import numpy as np
 
 from airtouch.gap.evidence.fit import left_over
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY
-from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, crossed, of_mean, price_of
+from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, covariance_among_all, crossed, price_of
 from airtouch.gap.naming.screen import first_order, random_look
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, SPECTRUM, Term, names_alike, telling
@@ -53,7 +53,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
                 each = np.array(fitted)[:, :k]
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
                                      strength=own.among_all(each.mean(axis=0)),
-                                     variance=own.among_all(of_mean(each, np.array(variances)[:, :k]), np.inf)))
+                                     covariance=covariance_among_all(own, np.diag(_of_mean(each, variances, k)))))
             elif any(t.kind == SPECTRUM for t in terms):
                 with_random.append((name, terms, choice))
             else:
@@ -69,6 +69,11 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
     if thorough:
         best = {n: _one_by_one(j, [k for k in sure if k.name == n]) for n, j in best.items()}
     return _with_evidence(on.data.study.scatter, best, before)
+
+
+def _of_mean(each: np.ndarray, variances: Sequence[np.ndarray], k: int) -> np.ndarray:
+    """Variance (k,) of the mean of two values (2, k), of variances (2, k or more), and no less than they differ by."""
+    return np.maximum(np.sum(variances, axis=0)[:k] / 4.0, np.square(0.5 * np.ptp(each, axis=0)))
 
 
 def _residuals(on: Trial, chosen: Judged | None) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -106,7 +111,7 @@ def _one_by_one(best: Judged, variants: Sequence[Judged]) -> Judged:
     if len(alone) < max(len(best.strength), 2):
         return best
     return replace(together, strength=np.array([alone[i].strength[i] for i in range(len(alone))]),
-                   variance=np.array([alone[i].variance[i] for i in range(len(alone))]))
+                   covariance=np.diag([alone[i].variance[i] for i in range(len(alone))]), apart=0.0)
 
 
 def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: Sequence[np.ndarray],
@@ -155,7 +160,7 @@ def _same(one: Term, other: Term) -> bool:
 
 
 def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: float) -> dict[str, Judged]:
-    """Every candidate with its evidence: what it gains, and no more than its strength alone says.
+    """Every candidate with its evidence: what it gains, and no more than its strength says.
 
     None where the strength is the largest that can be: there the effect stands in for another.
     """
@@ -164,8 +169,7 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: 
         mine = [t for t in j.terms if t.name == n]
         own = telling(mine[-2:]) if mine[-1].companion else mine[-1]
         stretched = own.kind == MEAN and at_bound(own, j.strength).any()
-        error = np.sqrt(j.variance) if len(j.variance) else 0.0
-        news = scatter.evidence(n, j.strength, error) if scatter else np.inf
+        news = scatter.evidence(n, j.strength, j.covariance, j.apart) if scatter else np.inf
         out[n] = replace(j, evidence=min(j.gain - before, 0.0 if stretched else news))
     return out
 

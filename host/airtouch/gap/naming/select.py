@@ -14,7 +14,7 @@ from airtouch.gap.evidence.clock import clock_gain, clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, fit
 from airtouch.gap.evidence.gates import gated
-from airtouch.gap.evidence.generic import generic_gain
+from airtouch.gap.evidence.generic import generic_gain, height_gain
 from airtouch.gap.evidence.problem import GROUPS, cell_words
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import (
@@ -24,13 +24,13 @@ from airtouch.gap.naming.judging import (
     Trial,
     gain_of,
     price_of,
-    strength_of,
     trial_of,
 )
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, is_random
+from airtouch.gap.signatures.nominal_scatter import size_of
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1  #: and in others: no model of air is exact
@@ -55,7 +55,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     need = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
     passing = _passing(on, alone, need, without)
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
-    if passing is not None and any(s.named and s.name == passing.name and s.share < least[s.name] for s in steps):
+    if passing is not None and any(s.named and s.name == passing.name
+                                   and _news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
         singles, least, steps = _steps(on, candidates, alone, need, None, progress)
     before = nameless(on, None)
     after = nameless(on, steps[-1]) if steps else before
@@ -76,7 +77,7 @@ def _steps(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], singles: M
     steps: list[Judged] = []
     tried, need = singles, least
     if passing is not None:
-        steps, least = [passing], {**least, passing.name: _nominal(on.data, passing.name)}
+        steps, least = [passing], {**least, passing.name: LEAST_GAIN}
         singles = {**singles, passing.name: passing}
         tried, need = _beside(on, candidates, steps, singles, progress)
     while sum(s.named for s in steps) < MOST_EFFECTS:
@@ -133,26 +134,29 @@ def _passing(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float
              ) -> Judged | None:
     """An effect that comes and goes, where it explains more than one that always acts and more than it does in
 
-    nominal flights; None where none does.
+    nominal flights; None where none does. What follows the flight's own height needs no other vehicle.
     """
     if on.data.study.scatter is None:
         return None
-    steady = max((j.gain for n, j in singles.items() if j.evidence >= least[n]), default=0.0)
+    steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
     passing = [g for g in gated(on.data, without).values()
-               if g.gain >= max(_nominal(on.data, g.name), steady + LEAST_GAIN)]
+               if g.gain >= steady + LEAST_GAIN and _news(on.data, g.name, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
     best = max(passing, key=lambda g: g.gain)
     terms = best.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - best.cost
-    return Judged(best.name, terms, gain, (best.fitted, best.fitted), choice=best.cost,
-                  strength=strength_of(terms[0], terms, (best.fitted,))[0], evidence=best.gain)
+    return Judged(best.name, terms, gain, (best.fitted, best.fitted), choice=best.cost, strength=best.strength,
+                  evidence=_news(on.data, best.name, best.gain, best.strength))
 
 
-def _nominal(data: Data, name: str) -> float:
-    """Log likelihood that an effect that comes and goes gains in nominal flights as long as these."""
+def _news(data: Data, name: str, gain: float, strength: np.ndarray) -> float:
+    """Evidence for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights may have as much.
+
+    strength (k,): of its parameters, in natural steps.
+    """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
-    return data.study.scatter.passing(name, seconds(data), LEAST_GAIN)
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(name, size_of(gain / seconds(data), strength)))
 
 
 def _beside(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], steps: Sequence[Judged],

@@ -24,10 +24,10 @@ Hypothesis = tuple[Term, ...]
 class Judged:
     """A hypothesis with its gain in held-out log likelihood over no effect, and its fits of both halves.
 
-    strength: scaled parameters (k,) of its newest effect, the mean of both halves; variance: (k,) of those of a mean
-    effect, by chance. evidence: what that effect gains over the hypothesis before, and no more than its strength says
-    beyond the scatter of nominal flights. named: whether that is enough; if not, it is a deviation that nominal flights
-    have as well, and stands beside the effects that are named.
+    strength: scaled parameters (k,) of its newest effect, the mean of both halves; covariance: (k, k) of those of a
+    mean effect, by chance; apart: half of what the halves differ by (k,). evidence: what that effect gains over the
+    hypothesis before, and no more than its strength says beyond the scatter of nominal flights. named: whether that is
+    enough; if not, it is a deviation that nominal flights have as well, and stands beside the effects that are named.
     """
 
     name: str
@@ -37,10 +37,19 @@ class Judged:
     full: bool = True  #: fitted in full, not to first order only
     choice: float = 0.0  #: of the gain, what the choice of the effects' variants has cost
     strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    variance: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    apart: np.ndarray | float = 0.0
     evidence: float = 0.0
     named: bool = True
     share: float = np.inf  #: where several effects are named: gain over the hypothesis of the others alone
+
+    @property
+    def variance(self) -> np.ndarray:
+        """Variance (k,) of `strength`, no less than what the halves differ by says.
+
+        Where the likelihood has two peaks, its curvature at one of them knows nothing of the other.
+        """
+        return np.maximum(np.diag(self.covariance), np.square(self.apart))
 
     @property
     def of_the_log(self) -> bool:

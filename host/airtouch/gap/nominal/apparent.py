@@ -13,7 +13,7 @@ from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless, seconds
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, every, telling
-from airtouch.gap.signatures.nominal_scatter import Apparent
+from airtouch.gap.signatures.nominal_scatter import Apparent, size_of
 
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
@@ -27,7 +27,8 @@ def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
                     nameless(on, None) / seconds(data),
-                    {n: max(passing[n].gain, 0.0) / seconds(data) if n in passing else 0.0 for n in GATED})
+                    {n: size_of(passing[n].gain / seconds(data), passing[n].strength) if n in passing else 0.0
+                     for n in GATED})
 
 
 def _error(data: Data, judged: Judged) -> np.ndarray:

@@ -18,7 +18,7 @@ from airtouch.gap.evidence.generic import usual_of
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
-from airtouch.gap.loop.loop_model import sensitivity
+from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.nominal.apparent import apparent
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
@@ -137,7 +137,7 @@ def _response(vehicle: Vehicle, calibration: tuple[Active, ...], law: closed_loo
     nothing = [None] * len(flights)
     if law is None or any(f.rates is None for f in flights):
         return None, nothing
-    loop = sensitivity(law.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
+    loop = disturbed(law.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
     turning = [blocks(angular_acceleration(f), s[AIR], AIR) for f, s in zip(flights, first, strict=True)]
     answer = response_of(turning, [m[AIR][:, :, TORQUE] for m in made], loop)
     if answer is None:

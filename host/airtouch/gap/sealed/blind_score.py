@@ -10,6 +10,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.sealed.blind import alike
+from airtouch.gap.sealed.blind_severity import SEEN
 from airtouch.gap.signatures.candidates import terms
 
 Case = Mapping[str, Any]
@@ -58,7 +59,8 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
         "top_1": share(first.values()), "top_3": share(three.values()),
         "exact": share(_same(_named(plain.get(n)), [e["name"]]) for n, e in single.items()),
         "by_severity": {LEVELS[i]: {"top_1": share(first[n] for n in group), "top_3": share(three[n] for n in group),
-                                    "none": share(_verdict(plain.get(n)) == "none" for n in group)}
+                                    "none": share(_verdict(plain.get(n)) == "none" for n in group),
+                                    "ideal": ideal(key, group)}
                         for i in range(3) if (group := [n for n, e in single.items() if e["level"] == i])},
         "by_effect": {k: {"top_1": share(first[n] for n in group), "top_3": share(three[n] for n in group),
                           "strengths": key.get("severities", {}).get(k)}
@@ -74,6 +76,11 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
                     "answer": [r["name"] for r in plain[n]["ranking"][:3]] if n in plain else []}
                    for n, e in single.items() if not first[n]],
     }
+
+
+def ideal(key: Mapping[str, Any], flights: Sequence[str]) -> dict[str, float | None]:
+    """How many flights a test could tell from nominal ones that is told effect and strength; n: of those known."""
+    return share(nats > SEEN for n in flights if (nats := key["answers"][n].get("nats")) is not None)
 
 
 def share(values: Any) -> dict[str, float | None]:

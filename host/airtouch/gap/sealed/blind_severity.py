@@ -5,7 +5,8 @@ Neyman and Pearson: among tests with a given rate of false alarms, the likelihoo
 find out. Its ratio is taken here on flights with and without the effect, each a normal
 variable with the mean and deviation seen; the strength is found by halving. A diagnosis
 that may raise 2 % false alarms asks about every effect at once, so that each test gets its
-share of them only.
+share of them only. Deviations of so few flights come out too small by chance, and halving
+finds where they do; so the means alone must be as far apart as such normal variables are.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,6 +29,9 @@ from airtouch.simulation.effects import Active
 
 FALSE_ALARMS, MISSES = 0.02, 0.05  #: of all tests of a flight together, and of the one that should answer
 FALSE_ALARM, POWER = float(norm.isf(FALSE_ALARMS / len(KINDS))), float(norm.isf(MISSES))  #: deviations
+#: nats, half of what the means of two log ratios differ by whose deviations are these, as those of normal variables are
+APART = 0.5 * (FALSE_ALARM + POWER) ** 2
+SEEN = 0.5 * FALSE_ALARM ** 2  #: log ratio that chance exceeds in so many flights (Wilks 1938)
 TRIES = 8  #: flights with and without the effect
 HALVINGS = 6
 FACTORS = (1.0, 2.0, 4.0)  #: severities, times the weakest; the last at most the highest plausible
@@ -72,7 +76,8 @@ def _seen(kind: Kind, strength: float, study: Study, scenario: str, without: Seq
         return True  # so strong that it cannot fly
     yes, no = np.array(ratio[True]), np.array(ratio[False])
     alarm = no.mean() + FALSE_ALARM * no.std(ddof=1)
-    return bool(yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm)  # strong ones scatter widely
+    told = yes.mean() - POWER * yes.std(ddof=1) > alarm or yes.min() > alarm  # strong ones scatter widely
+    return bool(told and 0.5 * (yes.mean() - no.mean()) > APART)
 
 
 def log_ratio(data: Data, active: Active) -> float:

@@ -26,10 +26,13 @@ MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
 LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
 LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
 WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own
-SURELY = 1.645  #: deviations from its middle to the ends of a 90 % interval
+CERTAIN = 1e-9  #: variance of a strength, in nominal scatter, that counts as exact
+STEPS = 12  #: of the compromise between nominal scatter and chance
 POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them
-NEVER_BELOW = 0.05  #: scatter that a class is credited with when it is told from others: none is that exact
+NEVER_BELOW = 0.05  #: scatter of strengths by which classes are told apart, and of sizes, at least: none is that exact
 RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
+CUT = 0.9  #: quantile of the square roots of rates to which those above it are cut (winsorised)
+ODD = 0.01  #: share of nominal flights in which one of the effects that come and go may be named
 RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
 SIMULATED = "simulated"  #: the class of flights of this project's simulator
 SAYS = 1.0  #: sure estimates that must be there, of a scatter of a natural step, for any scatter to be told from them
@@ -41,40 +44,52 @@ class Apparent:
     """One nominal flight held against others.
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
-    chance; rate: nats a second that a model without names gains; passing_rates: that each effect does that comes and
-    goes.
+    chance; rate: nats a second that a model without names gains; passing: size (`size_of`) of each effect that comes
+    and goes.
     """
 
     strengths: Mapping[str, np.ndarray]
     errors: Mapping[str, np.ndarray]
     rate: float
-    passing_rates: Mapping[str, float] = field(default_factory=dict)
+    passing: Mapping[str, float] = field(default_factory=dict)
+
+
+def size_of(rate: float, strength: np.ndarray) -> float:
+    """How much there is of an effect that comes and goes: the geometric mean of the root of the nats a second that it
+
+    gains and of its strength (k,) in natural steps. What nominal flights seem to have gains much in calm ones with
+    hardly any strength, and has strength in hard ones but gains little: only what does both is out of the ordinary.
+    """
+    return math.sqrt(math.sqrt(max(rate, 0.0)) * float(np.linalg.norm(strength)))
 
 
 @dataclass(frozen=True)
 class Scatter:
     """Standard deviation of apparent strengths (k,) by effect, beyond chance, with its degrees of freedom.
 
-    rate, passing_rates by effect: mean and standard deviation of the square root of each. vehicle: whose flights a
-    class of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
+    rate: mean and standard deviation of its square root; passing by effect: of its size. vehicle: whose flights a class
+    of the table was measured on. middle: mean (k,) of the strengths of a random effect, which are never
     negative; the others' is 0. exact: whether the flights come from the models that effects are fitted with.
     """
 
     rms: Mapping[str, np.ndarray]
     freedom: float
     rate: tuple[float, float]
-    passing_rates: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    passing: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     vehicle: str = ""
     middle: Mapping[str, np.ndarray] = field(default_factory=dict)
     exact: bool = False
 
-    def evidence(self, name: str, strength: np.ndarray, error: np.ndarray | float = 0.0) -> float:
-        """Log likelihood that a strength (k,) beyond the nominal scatter has over one within it.
+    def evidence(self, name: str, strength: np.ndarray, covariance: np.ndarray | None = None,
+                 apart: np.ndarray | float = 0.0) -> float:
+        """Log likelihood that a strength (k,) has over the likeliest one that nominal flights scatter to.
 
-        Student's density with `freedom`, of what remains after each further parameter has paid for itself. error (k,):
-        standard deviation by chance; a strength counts with the end of its 90 % interval that is closer to none, as a
-        parameter that the data leave open says nothing. A parameter that the table does not know yet scatters as the
-        widest of its effect's others.
+        That one is a compromise: Student's density with `freedom` says how rare it is in nominal flights, after each
+        further parameter has paid for itself, the normal density of `covariance` (k, k) how far by chance the strength
+        was found from it; parameters that make up for one another thus count together, and one that the data leave
+        open says nothing. None: the strength is exact. apart (k,): half of what two halves of the flights differ by; of
+        all strengths between theirs the one of least evidence counts. A parameter that the table does not know yet
+        scatters as the widest of its effect's others.
         """
         rms = self.rms.get(name)
         if rms is None or not len(strength):
@@ -82,24 +97,50 @@ class Scatter:
         rms = np.append(rms, np.full(max(len(strength) - len(rms), 0), rms.max()))[:len(strength)]
         if name in self.middle:  # a random effect weaker than usual is no news
             strength = np.maximum(strength - self.middle[name], 0.0)
-        strength = np.maximum(np.abs(strength) - SURELY * error, 0.0)
-        far = float(np.sum((strength / rms) ** 2)) - max(int(np.count_nonzero(strength)) - 1, 0)
-        return 0.5 * (self.freedom + 1.0) * math.log1p(max(far, 0.0) / self.freedom)
+        if covariance is None or not covariance.any():
+            return self._rare(strength / rms, max(int(np.count_nonzero(strength)) - 1, 0))
+        known = np.flatnonzero(np.isfinite(np.diag(covariance)))
+        own, further = strength[known] / rms[known], max(len(known) - 1, 0)
+        chance = covariance[np.ix_(known, known)] / np.outer(rms[known], rms[known]) + CERTAIN * np.eye(len(known))
+        apart = np.broadcast_to(apart, strength.shape)[known] / rms[known]
+        toward = np.linalg.solve(chance + np.eye(len(known)), apart)
+        if toward @ apart > 0.0:
+            own = own - np.clip(toward @ own / (toward @ apart), -1.0, 1.0) * apart
+        precision = np.linalg.inv(chance)
+        return min(self._compromise(own, precision, further, start) for start in (own, np.zeros(len(own))))
+
+    def _rare(self, far: np.ndarray, further: int) -> float:
+        """Log of Student's density at 0 over that at `far` (k,), where `further` parameters pay for themselves."""
+        over = max(float(far @ far) - further, 0.0)
+        return 0.5 * (self.freedom + 1.0) * math.log1p(over / self.freedom)
+
+    def _compromise(self, found: np.ndarray, precision: np.ndarray, further: int, usual: np.ndarray) -> float:
+        """Least sum of how rare a strength `usual` is and how far off by chance the one found is; it is looked for from
+
+        the given one on, by weighted least squares (of Student's density, Lange et al. 1989).
+        """
+        for _ in range(STEPS):
+            weight = (self.freedom + 1.0) / (self.freedom + float(usual @ usual))
+            usual = np.linalg.solve(precision + weight * np.eye(len(found)), precision @ found)
+        return self._rare(usual, further) + 0.5 * float((found - usual) @ precision @ (found - usual))
 
     def allowed(self, seconds: float, least: float) -> float:
         """Log likelihood that a model without names may gain in a nominal flight of so many seconds.
 
         least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
         """
-        return self._usual(self.rate, seconds, least)
-
-    def passing(self, name: str, seconds: float, least: float) -> float:
-        """The same of an effect that comes and goes."""
-        return self._usual(self.passing_rates.get(name, (0.0, 0.0)), seconds, least)
-
-    def _usual(self, rate: tuple[float, float], seconds: float, least: float) -> float:
+        middle, spread = self.rate
         sure = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
-        return least + seconds * (rate[0] + min(sure, MOST_SURE) * rate[1]) ** 2
+        return least + seconds * (middle + min(sure, MOST_SURE) * spread) ** 2
+
+    def unusual(self, name: str, size: float) -> float:
+        """Log likelihood (Student) by which the size of an effect that comes and goes lies beyond the one that a share
+        ODD of nominal flights exceeds; negative where it does not.
+        """
+        middle, spread = self.passing.get(name, (0.0, 0.0))
+        far, limit = max(size - middle, 0.0) / max(spread, NEVER_BELOW), float(student.ppf(1.0 - ODD, self.freedom))
+        said, allowed = (math.log1p(x ** 2 / self.freedom) for x in (far, limit))
+        return 0.5 * (self.freedom + 1.0) * (said - allowed)
 
 
 def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
@@ -140,9 +181,9 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
         same = [rms[n] for n in group if n in rms]
         if len({len(x) for x in same}) == 1:
             rms |= {n: np.max(same, axis=0) for n in group if n in rms}
-    passing = {n: _rate(r, [f.passing_rates.get(n, 0.0) for f in known], worth) for n, r in own.passing_rates.items()}
-    return Scatter(rms, worth + len(known), _rate(own.rate, [f.rate for f in known], worth), passing, middle=middle,
-                   exact=simulated)
+    passing = {n: _updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
+    rate = _updated(own.rate, np.sqrt([f.rate for f in known]), worth)
+    return Scatter(rms, worth + len(known), rate, passing, middle=middle, exact=simulated)
 
 
 def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
@@ -166,13 +207,18 @@ def _median(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> flo
     return float(GRID[int(np.searchsorted(below, 0.5 * below[-1]))])
 
 
-def _rate(own: tuple[float, float], rates: Sequence[float], worth: float) -> tuple[float, float]:
-    """Mean and standard deviation of square roots of rates, from those of a class and those of the baseline (n,)."""
+def _updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, worth: float, least: float = 0.0,
+             ) -> tuple[float, float]:
+    """Mean and standard deviation, from those of a class and from the values (n,) of the baseline.
+
+    least: standard deviation at least; a few flights without a gust do not make gusts rarer.
+    """
     middle, spread = own
-    roots = np.minimum(np.sqrt(rates), middle + MOST_SURE * spread)
-    total = worth + len(roots)
-    mean = (worth * middle + roots.sum()) / total
-    return float(max(mean, middle)), float(np.sqrt((worth * spread ** 2 + ((roots - mean) ** 2).sum()) / total))
+    values = np.minimum(values, middle + MOST_SURE * spread)
+    total = worth + len(values)
+    mean = (worth * middle + values.sum()) / total
+    spread = float(np.sqrt((worth * spread ** 2 + ((values - mean) ** 2).sum()) / total))
+    return float(max(mean, middle)), max(spread, least)
 
 
 def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
@@ -186,9 +232,11 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
                 strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
                 far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
-        passing = [(flight.passing_rates.get(n, 0.0), r) for n, r in own.passing_rates.items()]
-        for rate, (middle, spread) in ((flight.rate, own.rate), *passing):
-            total += float(student.logpdf(np.sqrt(rate), RATE_FREEDOM, middle, max(spread, RATE_NEVER_BELOW)))
+        middle, spread = own.rate
+        total += float(student.logpdf(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, RATE_NEVER_BELOW)))
+        for name, (middle, spread) in own.passing.items():
+            size = flight.passing.get(name, 0.0)
+            total += float(student.logpdf(size, RATE_FREEDOM, middle, max(spread, NEVER_BELOW)))
     return total
 
 
@@ -201,8 +249,8 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     def highest(rates: Iterable[tuple[float, float]]) -> tuple[float, float]:
         return max(rates, key=lambda r: r[0] + r[1])
 
-    passing = {n: highest(c.passing_rates[n] for c in classes if n in c.passing_rates)
-               for n in sorted({n for c in classes for n in c.passing_rates})}
+    passing = {n: highest(c.passing[n] for c in classes if n in c.passing)
+               for n in sorted({n for c in classes for n in c.passing})}
     return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
 
 
@@ -211,7 +259,7 @@ def table() -> dict[str, Scatter]:
     """The shipped classes of vehicles by name."""
     text = (resources.files("airtouch") / "gap" / "signatures" / "nominal_scatter.toml").read_text(encoding="utf-8")
     return {name: Scatter({k: np.maximum(v, LEAST) for k, v in entry["rms"].items()}, float(entry["freedom"]),
-                          tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["root_passing_rates"].items()},
+                          tuple(entry["root_rate"]), {k: tuple(v) for k, v in entry["passing"].items()},
                           entry.get("vehicle", ""), {k: np.array(v) for k, v in entry.get("middle", {}).items()})
             for name, entry in tomllib.loads(text).items()}
 
@@ -236,13 +284,12 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
         pooled = _median(each, errors, 0.0, 0.0)
         rms[name] = np.array([_median(x, e, pooled, POOLED) for x, e in columns] if size > 1 else [pooled])
     # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
-    passing = {n: _roots([f.passing_rates.get(n, 0.0) for f in alike], 1.0)
-               for n in sorted({n for f in alike for n in f.passing_rates})}
-    return Scatter(rms, float(len(alike)), _roots([f.rate for f in alike], 0.9), passing, middle=middle)
+    names = sorted({n for f in alike for n in f.passing})
+    passing = {n: _moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
+    roots = np.sqrt([f.rate for f in alike])
+    return Scatter(rms, float(len(alike)), _moments(np.minimum(roots, np.quantile(roots, CUT))), passing, middle=middle)
 
 
-def _roots(rates: Sequence[float], most: float) -> tuple[float, float]:
-    """Mean and standard deviation of square roots, those above the quantile `most` cut to it (winsorised)."""
-    roots = np.sqrt(rates)
-    roots = np.minimum(roots, np.quantile(roots, most))
-    return float(roots.mean()), float(roots.std(ddof=1))
+def _moments(values: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    """Mean and standard deviation."""
+    return float(np.mean(values)), float(np.std(values, ddof=1))
