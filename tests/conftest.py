@@ -27,8 +27,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "reproducible"))
 def pytest_configure(config):
     """The simulator is compiled once, before several workers would each do so."""
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
-        for name in ("batch", "replay"):
-            importlib.import_module(f"airtouch.simulation.{name}")
+        importlib.import_module("airtouch.simulation.compiled").compile_all()
 
 
 def pytest_collection_finish():

@@ -1,6 +1,10 @@
 """`airtouch demo` from the outside, on few simulated flights and one epoch."""
 
+import contextlib
+import os
 import re
+import subprocess
+import sys
 
 import pytest
 from click.testing import CliRunner
@@ -33,6 +37,23 @@ def test_the_whole_of_it_without_recorded_flights(tmp_path, monkeypatch):
     assert (out / "model" / "airtouch_model.c").exists() and (out / "model" / "paper.npz").exists()
     again = run("--out", out)
     assert isinstance(again.exception, AirTouchError) and "--force" in str(again.exception)
+
+
+def test_the_seconds_run_on_a_terminal_while_nothing_is_told():
+    """On a pseudo-terminal: the elapsed time appears again and again, without a call."""
+    code = ("import time\nfrom airtouch.cli.shared.progress import Bar\n"
+            "with Bar('  flights '):\n    time.sleep(2.5)\n")
+    master, slave = os.openpty()
+    process = subprocess.Popen([sys.executable, "-c", code], stderr=slave, env={**os.environ, "TERM": "xterm"})
+    os.close(slave)
+    shown = b""
+    with contextlib.suppress(OSError):  # Linux ends a pseudo-terminal so
+        while part := os.read(master, 4096):
+            shown += part
+    os.close(master)
+    assert process.wait() == 0
+    assert {b"0:00:00", b"0:00:01", b"0:00:02"} <= set(re.findall(rb"\d:\d\d:\d\d", shown))
+    assert b"1/1" in shown
 
 
 def test_few_flights_are_too_few(generated, tmp_path):

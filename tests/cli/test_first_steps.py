@@ -4,16 +4,20 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from airtouch import logs
+from airtouch import logs, vehicle
 from airtouch.cli import airtouch, demo
 from airtouch.cli.gap.files import files_of
 from airtouch.crazyflie import manifest, mission
 from airtouch.crazyflie.view import board
+from airtouch.detector import registry
+from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
+from airtouch.logs.flight_log import FlightLog
 from airtouch.report import figures
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import refuse_off
+from airtouch.sitl import faults
 
 
 def run(*arguments):
@@ -31,6 +35,19 @@ def test_a_mistyped_command_gets_the_nearest(typed, meant):
 def test_a_mistyped_mission_gets_the_nearest():
     with pytest.raises(AirTouchError, match="no mission 'swep'; did you mean sweep"):
         mission.scene_of("swep")
+
+
+@pytest.mark.parametrize(("call", "typed", "said"), [
+    (scenario.load, "zig-zag", "no scenario 'zig-zag'; did you mean zigzag?"),
+    (vehicle.load, "crazyflie-21", "no vehicle 'crazyflie-21'; did you mean crazyflie-2.1"),
+    (registry.get, "papr", "no detector 'papr'; did you mean paper"),
+    (faults.parse, "los=0.3", "no fault 'los'; did you mean loss"),
+    (lambda name: sensors.without(FlightLog({"t_s": np.zeros(3)}, {}), (name,)), "motor",
+     "no sensor 'motor'; did you mean motors")])
+def test_a_mistyped_name_gets_the_nearest(call, typed, said):
+    with pytest.raises(AirTouchError) as error:
+        call(typed)
+    assert str(error.value).startswith(said) and "\n" not in str(error.value)
 
 
 def test_every_ready_mission_is_a_world_of_the_virtual_drone_with_an_edge_on_its_way():
@@ -113,6 +130,21 @@ def test_best_comes_first_and_each_detector_keeps_its_colour():
     assert sorted(("baseline", "paper", "best"), key=demo.order) == ["best", "paper", "baseline"]
     colours = [figures.colour_of(n) for n in ("best", "paper", "baseline", "paper-stream")]
     assert len(set(colours)) == 4 and figures.TRUE not in colours  # green is the truth's
+
+
+@pytest.mark.parametrize("command", [
+    ("twin", "FLIGHTS", "--out"), ("crossval", "FLIGHTS", "--out"), ("paper", "--quick", "--out"), ("demo", "--out"),
+    ("gap", "blind", "make"), ("gap", "blind", "run"), ("simulate", "hover", "--out"),
+    ("dataset", "fetch", "--from", ".", "--out"), ("logs", "convert", "FLIGHT", "--out"), ("gap", "demo", "--out")])
+def test_a_folder_that_cannot_be_made_is_told_in_one_line(command, generated, tmp_path):
+    """A file stands where the folder should be: refused before the work, with its name."""
+    (tmp_path / "taken").write_text("a file")
+    flight = next(iter(sorted(generated.glob("*.csv.gz"))))
+    words = {"FLIGHTS": generated, "FLIGHT": flight}
+    result = run(*[words.get(word, word) for word in command], tmp_path / "taken/out")
+    assert isinstance(result.exception, AirTouchError), result.output
+    assert str(tmp_path / "taken/out") in str(result.exception) and "\n" not in str(result.exception)
+    assert "cannot be made" in str(result.exception)
 
 
 def test_check_free_makes_the_folder(tmp_path):

@@ -46,6 +46,15 @@ def test_a_zigzag_gives_the_platform_and_a_picture(tmp_path):
     assert again.exit_code != 0 and "--force" in str(again.exception)
 
 
+def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path):
+    """Both have a file: written to one name, the picture would replace the GeoJSON without a word."""
+    logs.write(zigzag_log(), tmp_path / "zigzag.csv")
+    result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "plane.png")
+    assert result.exit_code == 0, result.output
+    assert json.loads((tmp_path / "plane.geojson").read_text())["features"]
+    assert (tmp_path / "plane.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_without_position_the_edges_lie_along_the_track(tmp_path):
     logs.write(zigzag_log(with_position=False), tmp_path / "zigzag.csv")
     result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "map.geojson")
@@ -78,3 +87,16 @@ def test_the_picture_is_a_map_platform_scale_start_and_end():
     shown = ax.transAxes.inverted().transform(ax.transData.transform(bar))
     assert (shown > 0.0).all() and (shown[:, 1] < 0.2).all() and shown[1, 0] < 0.5  # at the lower left
     assert [t.get_text() for t in ax.texts if t.get_text()] == [f"{bar[1, 0] - bar[0, 0]:g} m"]
+
+
+def test_the_scale_bar_covers_nothing_of_a_flight_that_begins_at_the_lower_left():
+    from airtouch.detector.evaluation.edge_map import EdgeMap
+    from airtouch.report import map_figure
+
+    for turn in (0.0, 0.5, 1.0):
+        along = np.linspace(0.0, 3.0, 500)
+        xy = np.column_stack([along * np.cos(turn), along * np.sin(turn)])
+        (ax,) = map_figure.drawn(EdgeMap(xy, [], [], "logged", 0.0, 0.1), "a flight").axes
+        (text,) = [t for t in ax.texts if t.get_text()]
+        top = ax.transData.inverted().transform(text.get_window_extent())[1, 1]
+        assert max(top, ax.lines[-1].get_ydata().max()) < xy[:, 1].min()

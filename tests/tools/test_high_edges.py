@@ -36,6 +36,34 @@ def test_only_the_channel_that_is_read_matters_when_muted(name):
     np.testing.assert_array_equal(np.delete(changes, channel), 0.0)
 
 
+def test_air_is_replaced_by_the_flights_own_hover_there_and_nowhere_else():
+    log = made_flight(0)
+    flown = course(log, 0.3)
+    values = np.arange(len(log))[:, None] * np.ones(3)
+    hover, middle = flown.phases()["hover"], flown.entry - high_edges.AHEAD
+    for before, platform in ((True, False), (False, True), (True, True)):
+        out = high_edges.hovering(values, flown, before, platform)
+        changed = np.zeros(len(values), bool)
+        changed[hover.start:middle] = before
+        changed[middle:flown.exit] = platform
+        np.testing.assert_array_equal(out[~changed], values[~changed])
+        moved = values[middle - 100:middle].mean() - values[hover].mean()
+        assert hover.start <= (out[changed] - moved).min() <= (out[changed] - moved).max() <= hover.stop - 1
+        if before:
+            np.testing.assert_allclose(out[middle - 200:middle] - moved, values[hover][-200:])
+        assert np.abs(np.diff(out[changed][:, 0])).max() <= 1.0, "the hover jumps"
+
+
+def test_a_network_that_forgets_the_approach_does_not_feel_it():
+    log = made_flight(0)
+    flown = course(log, 0.3)
+    channel = high_edges.CHANNELS.index("gyro y")
+    whole, hovered = high_edges.approach(log, flown, one_channel(channel))[:2]
+    reach = SMALL.receptive_samples
+    assert flown.exit - flown.entry > 2 * (reach + high_edges.AHEAD), "the flight is too short for this test"
+    assert whole == pytest.approx(hovered, abs=0.2 * abs(whole))
+
+
 def test_shaking_over_a_platform_is_counted_above_3_hz_only():
     rng, t = np.random.default_rng(1), np.arange(1200) / 100.0
     values = rng.normal(0.0, 1.0, (1200, 10)) + 5.0 * np.sin(2 * np.pi * 0.5 * t)[:, None]

@@ -9,16 +9,19 @@ import click
 
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.progress import Bar
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import demo_flights
 from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
+from airtouch.logs.files import make_folder
 
 EPOCHS, STEPS = 8, 800  #: epochs of `paper`, training steps of `best`: two minutes on two cores
 SCORED = ("best", "paper", "baseline")  #: detectors
 SHOWN = 4  #: flights plotted in the report
+COMPILES = "the first time compiles the simulator, which takes a minute"
 
 
 @click.command(name="demo")
@@ -43,12 +46,14 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     report = out / "report.html"
     if report.exists() and not force:
         raise AirTouchError(f"{report}: exists already; use --force to replace it")
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     steps = Steps(started)
 
     steps.say("Flights")
-    chosen = demo_flights.choose(flights or find_flights(), out / "flights", speed,
-                                 lambda line: click.echo(f"airtouch: {line}", err=True))
+    with Bar("  flights ") as bar:
+        chosen = demo_flights.choose(flights or find_flights(), out / "flights", speed,
+                                     lambda line: click.echo(f"airtouch: {line}", err=True),
+                                     lambda done, total: bar(done, total, "" if done else COMPILES))
     test, where = chosen.test, chosen.where
     click.echo(f"  {where}: {len(chosen.train)} to train on, {len(test)} held out, split by flight")
     training, left_out = demo_flights.readable(chosen.train)
@@ -100,14 +105,12 @@ class Steps:
 
 def fit(name: str, training: Sequence[Any], options: dict[str, Any]) -> Any:
     """A detector's model, with a bar for its longest stage."""
-    with click.progressbar(length=1000, label=f"  {name:8}", show_percent=True) as bar:
+    with Bar(f"  {name:8}") as bar:
         def progress(stage: str, done: int, total: int, note: str) -> None:
             if stage != "features":
-                bar.update(1000 * done // total - bar.pos)
+                bar(done, total)
 
-        model = registry.get(name).fit(training, progress=progress, **options)
-        bar.update(1000 - bar.pos)
-        return model
+        return registry.get(name).fit(training, progress=progress, **options)
 
 
 def order(name: str) -> int:

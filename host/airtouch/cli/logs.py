@@ -100,7 +100,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
       airtouch logs convert log00 log01 --out converted --rate 100
     """
     from airtouch.extras import need
-    from airtouch.logs.files import write_bytes
+    from airtouch.logs.files import make_folder, write_bytes
     from airtouch.logs.formats import canonical, mapped, rerun_file
 
     if plain and ending != "csv":
@@ -110,10 +110,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     if mapping:
         mapped.load(mapping)
     folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise AirTouchError(f"{folder}: cannot be made: {error.strerror}") from None
+    make_folder(folder)
     written: set[Path] = set()
 
     def one(path: Path) -> Path:

@@ -38,6 +38,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     from airtouch.detector.evaluation import edge_map
 
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
+    out = out.with_suffix(".geojson") if out.suffix == ".png" else out
     picture = out.with_suffix(".png")
     for path in (out, picture):
         check_free(path, force)

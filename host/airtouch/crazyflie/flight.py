@@ -78,33 +78,18 @@ class Flight:
     landed: bool = False
     _volts: deque = field(default_factory=lambda: deque(maxlen=BATTERY_SAMPLES))
     _silent_since: float | None = None
+    _began: float = 0.0
+    _last_ping: float = 0.0
+    _landing_since: float | None = None
 
     def run(self) -> str:
         """Fly to the end. Returns "as planned", or the reason of an early landing."""
-        began, last_ping, landing_since = self.clock(), 0.0, None
+        self._began = self.clock()
         try:
             while self.pilot.phase != "done":
-                wall = self.clock()
-                if not self._receive():
-                    return self._over("the drone restarted in flight")
-                silence = self._silence(wall, began)
-                for kind, code in drain(self.craft.answers):
-                    self.pilot.answer(kind, code)
-                reason = self._reason(silence)
-                if reason and self.pilot.phase == "mission":
-                    self._tell(f"{reason}: landing")
-                    self.pilot.land(reason)
-                    landing_since = wall
-                if self.craft.lost.is_set():
-                    self._reconnect()
-                elif silence > FORGOTTEN_S:
-                    self.craft.revive()
-                self.craft.send(self.pilot.step(self._now(silence), wall, silence))
-                if wall - last_ping > PING_S:
-                    self.craft.ping()
-                    last_ping = wall
-                if landing_since and self.pilot.waiting and wall - landing_since > GIVE_UP_S:
-                    return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
+                ended = self._turn(self.clock())
+                if ended:
+                    return ended
                 with contextlib.suppress(OSError):  # the terminal may be gone
                     self.show(self)
                 self.sleep(TURN_S)
@@ -113,6 +98,45 @@ class Flight:
         except BaseException:
             self._bring_down()
             raise
+
+    def _turn(self, wall: float) -> str | None:
+        """One turn of the loop at `wall` (s): packets in, link, commands out. Returns how the flight ended, if it did.
+
+        The order matters: a reason to land is found before the autopilot's step, so that the landing is in it, and
+        the link is repaired before anything is sent.
+        """
+        if not self._receive():
+            return self._over("the drone restarted in flight")
+        silence = self._silence(wall)
+        for kind, code in drain(self.craft.answers):
+            self.pilot.answer(kind, code)
+        self._land_early(wall, silence)
+        self._repair_link(silence)
+        self.craft.send(self.pilot.step(self._now(silence), wall, silence))
+        self._ping(wall)
+        if self._landing_since is not None and self.pilot.waiting and wall - self._landing_since > GIVE_UP_S:
+            return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
+        return None
+
+    def _land_early(self, wall: float, silence: float) -> None:
+        """Turn the mission into a landing where there is a reason to land."""
+        reason = self._reason(silence)
+        if reason and self.pilot.phase == "mission":
+            self._tell(f"{reason}: landing")
+            self.pilot.land(reason)
+            self._landing_since = wall
+
+    def _repair_link(self, silence: float) -> None:
+        """Connect again to a lost drone; request the log blocks again that a silent one has deleted."""
+        if self.craft.lost.is_set():
+            self._reconnect()
+        elif silence > FORGOTTEN_S:
+            self.craft.revive()
+
+    def _ping(self, wall: float) -> None:
+        if wall - self._last_ping > PING_S:
+            self.craft.ping()
+            self._last_ping = wall
 
     def _tell(self, text: str) -> None:
         """Print a line. A closed terminal must not end the flight."""
@@ -134,9 +158,10 @@ class Flight:
             self._volts.extend(columns["vbat_V"])
         return True
 
-    def _silence(self, wall: float, began: float) -> float:
+    def _silence(self, wall: float) -> float:
+        """Seconds since the last packet, or since the flight began; notes each silence of over half a second."""
         heard = self.intake.last_arrival_s
-        silence = wall - (began if heard is None else max(heard, began))
+        silence = wall - (self._began if heard is None else max(heard, self._began))
         if silence > 0.5 and self._silent_since is None:
             self._silent_since = wall - silence
         elif silence < 0.5 and self._silent_since is not None:
@@ -166,6 +191,7 @@ class Flight:
         return None
 
     def _reconnect(self) -> None:
+        """Connect again. Raises AirTouchError after GIVE_UP_S without contact."""
         self._tell("the link broke; connecting anew")
         try:
             self.craft.reopen(GIVE_UP_S)

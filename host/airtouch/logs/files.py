@@ -71,12 +71,12 @@ def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
     write_bytes(data, Path(path), force)
 
 
-def make_folder(path: Path) -> None:
-    """Make the folder of a file. Raises AirTouchError where that fails."""
+def make_folder(folder: Path) -> None:
+    """Make a folder, with those above it, if it is not there. Raises AirTouchError where that fails."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise AirTouchError(f"{path.parent}: cannot be made: {error.strerror}") from None
+        raise AirTouchError(f"{folder}: cannot be made: {error.strerror}; choose another") from None
 
 
 def check_free(path: Path | None, force: bool) -> None:
@@ -90,7 +90,7 @@ def check_free(path: Path | None, force: bool) -> None:
         raise AirTouchError(f"{path}: is a folder; give the name of a file")
     if path.exists() and not force:
         raise AirTouchError(f"{path}: exists already; use --force to replace it")
-    make_folder(path)
+    make_folder(path.parent)
     if not os.access(path.parent, os.W_OK):
         raise AirTouchError(f"{path.parent}: cannot be written to")
 

@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import load_bytes
+from airtouch.logs.files import load_bytes, make_folder
 
 REPOSITORY = "ChenyuZhaoTHU/crazyflie_filter_constant"
 COMMIT = "b4c403e620fbce96d1539665b2fb342955ccf9ee"
@@ -38,7 +38,7 @@ def fetch(
     if source is not None and not source.is_dir():
         raise AirTouchError(f"{source}: no such folder; --from takes the folder that holds the CSV files")
     read = from_folder(source) if source is not None else _from_network(base_url)
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     states: dict[str, list[str]] = {"present": [], "new": [], "failed": []}
     for row in registry():
         target = out / row["file"]

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, GYRO, FlightLog
 
-PERIOD_S = 0.01
+PERIOD_S = 0.01  #: s, sample time of the resulting log
 HELD_S = 0.25  #: s for which a value is held; after that the sample is NaN
 Stream = tuple[np.ndarray, np.ndarray]  #: times (n,) in s and values (n,)
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from airtouch import __version__
 from airtouch.errors import AirTouchError, nearest
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.paper_figures import claims, page, pictures
 from airtouch.paper_figures.figure import Figure, Job, Missing, table_csv
 
@@ -61,7 +61,7 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     stale = [name for name, entry in old.items() if entry and entry["key"] != key and "missing" not in entry]
     if stale and not force:
         raise AirTouchError(f"{out / stale[0]}.csv was made with other settings; use --force, or another --out")
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     done = [name for name, entry in old.items()
             if entry and entry["key"] == key and "missing" not in entry and not force]
     for name in done:

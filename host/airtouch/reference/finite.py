@@ -1,10 +1,10 @@
-"""What every kernel does with samples that are not numbers."""
+"""How every kernel treats samples that are not finite: it holds the last finite one."""
 
 import numpy as np
 
 #: Samples are clamped to this magnitude, so that no square or product of powers overflows float32.
 SAMPLE_LIMIT = float(np.float32(1e15))
-#: Where the unit is known, to what a sensor can say: a longer number would be remembered for half a minute.
+#: Channels of known unit are clamped to the sensor's full scale: the filters would remember a larger spike for 30 s.
 ACC_LIMIT = 240.0  #: m/s^2, full scale of the IMU: 24 g
 RATE_LIMIT = 40.0  #: rad/s, full scale of the IMU: 2000 degrees/s
 PWM_MAX = 65535.0
@@ -14,7 +14,7 @@ FLOAT32_MAX = float(np.finfo(np.float32).max)  #: samples beyond it are infinite
 
 def hold_finite(x: np.ndarray, initial: float | np.ndarray = 0.0,
                 limit: float = SAMPLE_LIMIT) -> tuple[np.ndarray, int]:
-    """Samples with the gaps filled causally, and how many were filled.
+    """Samples with gaps filled by the last finite value, and the number of filled samples.
 
     x: (n,) or (n, c), any unit, as float32 would hold it. A NaN or infinite sample becomes the last finite
     one of its column (`initial` before any); magnitudes are clamped to `limit`.

@@ -45,7 +45,7 @@ def fr_cfar(
 
 
 def hold_power(power: np.ndarray) -> np.ndarray:
-    """Cells with gaps held (0 before any), clamped to 0..POWER_LIMIT."""
+    """Cells (n,) with gaps filled by the last finite cell (0 before the first), clamped to 0..POWER_LIMIT."""
     power = np.asarray(power, dtype=np.float64)
     finite = np.abs(power) <= FLOAT32_MAX
     if finite.all():
@@ -55,7 +55,7 @@ def hold_power(power: np.ndarray) -> np.ndarray:
 
 
 def check_settings(guard_cells: int, leading_window: int, p_fa: float) -> None:
-    """AirTouchError for settings that no detector can have."""
+    """Raise AirTouchError for a leading window, guard cells or P_FA out of range."""
     if int(leading_window) != leading_window or leading_window < 1:
         raise AirTouchError(f"FR-CFAR: the leading window must be at least 1 cell, not {leading_window}")
     if int(guard_cells) != guard_cells or guard_cells < 0:

@@ -54,6 +54,7 @@ def drawn(plane: EdgeMap, title: str) -> Figure:
             if at:
                 ax.scatter([p.x_m for p in at], [p.y_m for p in at], s=14, color=colour, zorder=3,
                            label=f"{kind} ({len(at)})")
+        _room_below(ax, xy)
         ax.set(xlabel="x, m", ylabel="y, m", title=title, aspect="equal", adjustable="datalim")
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
@@ -87,6 +88,15 @@ def _ends(ax: Axes, xy: np.ndarray) -> None:
         if step.any():
             ax.annotate("", known[i] + 0.02 * step, known[i] - 0.02 * step, zorder=4,
                         arrowprops={"arrowstyle": "-|>", "color": "#4b5563", "lw": 1.2})
+
+
+def _room_below(ax: Axes, xy: np.ndarray) -> None:
+    """Extend the axes below the track (n, 2), so that the scale bar covers none of it."""
+    known = xy[np.isfinite(xy).all(axis=1)]
+    if len(known):
+        corner = known.min(axis=0)
+        ax.update_datalim([(corner[0], corner[1] - 0.1 * max(np.ptp(known, axis=0)))])
+        ax.autoscale_view()
 
 
 def _scale_bar(ax: Axes) -> None:

@@ -6,6 +6,7 @@ which ends a flight as "not finite".
 """
 
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 from numba import njit
@@ -13,3 +14,12 @@ from numba import njit
 jit: Any = partial(njit, cache=True, error_model="numpy", _nrt=False)
 #: for parts of a stage that are called in one place and take records of many arrays, which a call would copy
 inlined: Any = partial(njit, error_model="numpy", _nrt=False, inline="always")
+
+
+def compile_all() -> None:
+    """Compile what every flight and every replay needs: half a minute the first time.
+
+    Numba keeps it beside the sources, so that other processes only read it.
+    """
+    for name in ("batch", "replay"):
+        import_module(f"airtouch.simulation.{name}")

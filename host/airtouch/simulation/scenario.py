@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, nearest
 from airtouch.simulation import effects
 from airtouch.simulation.firmware.settings import DEFAULT
 from airtouch.simulation.flight_plan import mission, world
@@ -70,8 +70,8 @@ def load(name_or_path: str | Path) -> Scenario:
         folder = resources.files("airtouch") / "simulation" / "scenarios"
         text = (folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
     else:
-        raise AirTouchError(f"no scenario {str(name_or_path)!r}; known: {', '.join(names())}, "
-                            "or a .toml file")
+        raise AirTouchError(f"no scenario {str(name_or_path)!r}{nearest(str(name_or_path), names())}; "
+                            f"known: {', '.join(names())}, or a .toml file")
     return parse(text, str(name_or_path))
 
 

@@ -16,8 +16,8 @@ from airtouch.sitl.planner import Planner
 PERIOD_S = 0.01  #: of a set-point, s
 LEVEL_OUT_S, SHUT_DOWN_S = 0.5, 2.0  #: s without a new set-point until the drone levels out, and until its motors stop
 MOST_CLIMB_M = 0.5  #: m, largest distance of the integrated height set-point from the drone
-MOST_TILT_DEG = 30.0
-LEAST_THRUST, MOST_THRUST = 1000, 60000
+MOST_TILT_DEG = 30.0  #: degrees, largest roll and pitch of a packet
+LEAST_THRUST, MOST_THRUST = 1000, 60000  #: PWM, limits of a packet (crtp_commander_rpyt.c)
 (STOP, OLD_VELOCITY, OLD_Z_DISTANCE, CPPM, ALT_HOLD, OLD_HOVER, FULL_STATE, POSITION, VELOCITY, Z_DISTANCE,
  HOVER, MANUAL) = range(12)
 FOUR = struct.Struct("<ffff")

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, nearest
 from airtouch.sitl.services import packet as crtp
 from airtouch.sitl.services.packet import Packet, Peer
 
@@ -47,7 +47,7 @@ def parse(text: str) -> Fault:
     """The fault in a text as on the command line. Raises AirTouchError with the right form."""
     kind, _, value = text.partition("=")
     if kind not in KINDS:
-        raise AirTouchError(f"no fault {kind!r}; known: {', '.join(KINDS)}")
+        raise AirTouchError(f"no fault {kind!r}{nearest(kind, KINDS)}; known: {', '.join(KINDS)}")
     parts = value.split(",")
     try:
         if kind == "loss":

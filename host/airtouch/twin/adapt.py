@@ -25,7 +25,7 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.shared.training_set import flight_hash
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.scenario import Scenario
 from airtouch.twin import edge_strength, overlay
@@ -94,7 +94,7 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     benefit of unlabelled ones. A sensor that all flights lack is removed from the simulated ones too. Raises
     AirTouchError if no flight crosses an edge.
     """
-    work.mkdir(parents=True, exist_ok=True)
+    make_folder(work)
     absent = lacking(flights)
     start = start.serving(absent) if start else None
     key = _key(flights, scene, vehicle, start, seed)

@@ -15,18 +15,18 @@ from airtouch.vision import lines
 from airtouch.vision.camera import Camera
 from airtouch.vision.crossings import Film, Sight, detections, frames, sight
 
-THRESHOLDS = 30  #: tried, quantiles of the strengths of the frames trained on
-TOGETHER_S = 0.6  #: a crossing of the camera and one of AirTouch within this are of one edge
+THRESHOLDS = 30  #: candidates for the threshold: quantiles of the strengths in the training frames
+TOGETHER_S = 0.6  #: s, largest time between crossings of camera and AirTouch at one edge
 ROUNDING = 1.0 / 12.0  #: variance of rounding to a sample, samples squared
 Sights = Sequence[Sequence[Sight]]  #: one sequence a film
 
 
 @dataclass(frozen=True)
 class Fusion:
-    """How crossings are joined at one light.
+    """Rule that joins the crossings of camera and AirTouch at one illuminance.
 
-    share: the camera's, in the time of an edge that both find. camera_alone, airtouch_alone: whether an edge that one
-    of them finds alone counts.
+    share: weight (0 to 1) of the camera in the time of an edge that both detect. camera_alone, airtouch_alone: True if
+    an edge that only this sense detects counts.
     """
 
     share: float
@@ -36,7 +36,7 @@ class Fusion:
 
 def filmed(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper], seed: int,
            tell: Callable[[str], None] = lambda _: None) -> dict[str, list[list[Sight]]]:
-    """What each way to an edge map sees in each film at one light; every frame is rendered once."""
+    """Mapper's name -> sights in each film at one illuminance. Every frame is rendered once for all mappers."""
     camera = Camera()
     sights: dict[str, list[list[Sight]]] = {name: [] for name in mappers}
     for number, shot in enumerate(films, start=1):
@@ -52,7 +52,7 @@ def filmed(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper
 
 
 def threshold(films: Sequence[Film], sights: Sights) -> float:
-    """The strength from which a line counts, for the best timed F1 over films to train on."""
+    """The least strength of a line that counts: that of the best timed F1 over the training films."""
     strengths = np.array([s.strength for some in sights for s in some])
     candidates = np.unique(np.quantile(strengths, np.linspace(0.3, 0.99, THRESHOLDS)))
     chosen, _, _ = tuning.choose([float(c) for c in candidates], [f.edges for f in films],
@@ -66,18 +66,20 @@ def crossings(films: Sequence[Film], sights: Sights, least: float) -> list[list[
 
 
 def lag(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
-    """The median lag of crossings, samples. The down range that tells the truth is itself some hundredths of a second
-    late, the camera is not, so that it comes out negative."""
+    """The median lag of crossings behind the true edges, in samples.
+
+    It is negative: the down range, from which the true edges come, is some hundredths of a second late.
+    """
     return tuning.lag((shot.edges, some) for shot, some in zip(films, by_film, strict=True)) / SAMPLE_PERIOD_S
 
 
 def without_lag(by_film: Sequence[Sequence[Detection]], samples: float) -> list[list[Detection]]:
-    """Crossings with a constant lag taken off, as that of every detector is."""
+    """Crossings less a constant lag, as for every detector."""
     return [[replace(d, sample=round(d.sample - samples)) for d in some] for some in by_film]
 
 
 def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
-    """AirTouch's crossings of each film by a shipped detector, its lag taken off, within what was filmed."""
+    """Crossings of each film by the shipped model of a detector, less its lag, within the film."""
     detector = registry.get(name)
     model = detector.load(None)
     late = detector.lag_s(model) / SAMPLE_PERIOD_S
@@ -89,7 +91,7 @@ def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
 
 
 def scored(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> list[FlightScore]:
-    """One score a film: its edges, and the crossings that are none a minute of film."""
+    """One score for each film: errors and misses at its edges, and false crossings a minute."""
     scores = []
     for shot, some in zip(films, by_film, strict=True):
         filming = np.zeros(len(shot.log), bool)
@@ -101,7 +103,7 @@ def scored(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> lis
 
 
 def fused(by_camera: Sequence[Detection], by_airtouch: Sequence[Detection], fusion: Fusion) -> list[Detection]:
-    """Crossings of both: pairs at a weighted time, single ones where the fusion takes them."""
+    """Crossings by a fusion rule: pairs at their weighted mean time, and the single ones that the rule accepts."""
     pairs = match([d.sample for d in by_camera], [d.sample for d in by_airtouch], TOGETHER_S / SAMPLE_PERIOD_S)
     joined = [Detection(round(fusion.share * by_camera[i].sample + (1.0 - fusion.share) * by_airtouch[j].sample),
                         by_airtouch[j].kind) for i, j in pairs]
@@ -114,10 +116,10 @@ def fused(by_camera: Sequence[Detection], by_airtouch: Sequence[Detection], fusi
 
 def choose_fusion(films: Sequence[Film], by_camera: Sequence[Sequence[Detection]],
                   by_airtouch: Sequence[Sequence[Detection]]) -> Fusion:
-    """The fusion by the films to train on: the inverse squared errors as weights, and the best timed F1.
+    """The fusion rule for training films: weights by inverse squared error, single crossings by the best timed F1.
 
-    An edge that both find is always joined; whether single edges of either count is chosen by the timed F1. With few
-    films a weight chosen by the timed F1, too, follows single edges.
+    An edge that both detect is always joined. The timed F1 does not choose the weight, because with few films single
+    edges would decide it.
     """
     camera, airtouch = (_squared_error(films, some) for some in (by_camera, by_airtouch))
     choices = [Fusion(airtouch / (camera + airtouch), camera_alone, airtouch_alone)

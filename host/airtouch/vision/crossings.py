@@ -15,13 +15,13 @@ from airtouch.vision import scene as scenes
 from airtouch.vision.camera import Camera, expose, exposure_s
 from airtouch.vision.lines import Line
 
-MARGIN_S = 0.8  #: filmed before the first edge and after the last
-GROUP_S = 0.6  #: frames further apart than this are of different edges
+MARGIN_S = 0.8  #: s of film before the first edge and after the last
+GROUP_S = 0.6  #: s, longest time between two frames of one edge
 
 
 @dataclass(frozen=True)
 class Sight:
-    """What one frame says: time of mid-exposure, strength of its line, distance of the line ahead of the drone, m."""
+    """The measurement of one frame: time of mid-exposure, strength of its line, distance of the line ahead, m."""
 
     time_s: float
     strength: float
@@ -30,7 +30,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class Film:
-    """A flight and what lies below it. clearance_m, speed_mps: as commanded. first_s, last_s: filmed between them."""
+    """A flight and the surfaces below it. clearance_m, speed_mps: commanded. first_s, last_s: of the film."""
 
     log: FlightLog
     edges: tuple[Edge, ...]
@@ -54,7 +54,7 @@ def film(log: FlightLog, seed: int) -> Film:
 
 
 def draw_texture(rng: np.random.Generator) -> np.ndarray:
-    """A texture of any brightness, contrast and coarseness."""
+    """A texture of random brightness (albedo 0.15 to 0.85), contrast (rms 3 to 30 %) and coarseness."""
     return scenes.texture(rng, rng.uniform(0.15, 0.85), rng.uniform(0.03, 0.3), rng.uniform(0.7, 1.6))
 
 

@@ -15,9 +15,9 @@ from airtouch.vision.camera import Camera
 
 TILTS = np.tan(np.radians(np.arange(-24.0, 25.0, 3.0)))  #: of the lines against the image's columns
 SIGMA_PX = 2.0  #: blur before the derivative, binned pixels
-BORDER_PX = 4  #: columns at each side where no line is looked for
+BORDER_PX = 4  #: columns at each side that the search leaves out
 
-Mapper = Callable[[np.ndarray], np.ndarray]  #: binned image -> strength of an edge at each pixel, about 0 where none is
+Mapper = Callable[[np.ndarray], np.ndarray]  #: binned image -> strength of an edge at each pixel, about 0 without one
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def strongest(strength: np.ndarray, camera: Camera) -> Line:
 
 
 def _peak(profile: np.ndarray, place: int) -> float:
-    """How far, in pixels, the top of a parabola through three values lies from the middle one."""
+    """Distance, in pixels, of the vertex of a parabola through three values from the middle one."""
     if not 0 < place < len(profile) - 1:
         return 0.0
     left, middle, right = profile[place - 1:place + 2]

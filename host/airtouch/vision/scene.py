@@ -84,7 +84,7 @@ def view(camera: Camera, pose: Pose, scene: Scene) -> np.ndarray:
 
 
 def over(scene: Scene, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether points lie within the platform's outline; NaN does not."""
+    """True for points within the platform's outline; False for NaN."""
     ahead = np.roll(scene.corners_m, -1, axis=0) - scene.corners_m
     inside = np.ones(np.shape(x), bool)
     for (cx, cy), (dx, dy) in zip(scene.corners_m, ahead, strict=True):
@@ -113,7 +113,7 @@ def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> 
 
 
 def _sampled(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:
-    """The texture at places, bilinear, repeated; the mean where a ray meets nothing."""
+    """The repeated texture at x, y (m), interpolated bilinearly; its mean for NaN."""
     u, v = (_wrapped(np.where(np.isfinite(a), a, 0.0) * np.float32(1.0 / m_per_px)) for a in (x, y))
     grey = cv2.remap(tile, u.astype(np.float32), v.astype(np.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
     return grey if np.isfinite(x).all() else np.where(np.isfinite(x), grey, tile.mean())

@@ -35,7 +35,7 @@ def layers(widths: tuple[int, int, int] = WIDTHS, colours: int = 1) -> dict[str,
 
 
 def outputs(name: str, shape: tuple[int, ...]) -> int:
-    """Channels that a layer gives."""
+    """Number of output channels of a layer."""
     if name.startswith("up"):
         return shape[2]
     return shape[2] * shape[3] if name.startswith("fuse") else shape[3]

@@ -20,9 +20,11 @@ from airtouch.vision.crossings import draw_texture
 from airtouch.vision.lines import binned
 from airtouch.vision.weights import SIZES
 
-IMAGES, STEPS, BATCH, CROP_PX, PEAK_RATE = 500, 600, 8, 96, 2e-3
-EDGES_WEIGH = 6.0  #: an edge pixel in the loss against another; about one in thirty is one
+IMAGES, STEPS, BATCH, CROP_PX = 500, 600, 8, 96  #: rendered images, training steps, crops a step, pixels of a crop
+PEAK_RATE = 2e-3  #: largest learning rate of the cycle
+EDGES_WEIGH = 6.0  #: weight of an edge pixel in the loss; about one pixel in thirty is an edge
 SEED = 5
+#: m, corners of the rendered platform; its edge lies at x = 0
 CORNERS_M = np.array([[0.0, -3.0], [3.0, -3.0], [3.0, 3.0], [0.0, 3.0]])
 
 

@@ -3,7 +3,8 @@
 import shlex
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -63,12 +64,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     early and to choose its thresholds. `best` trains on all flights; its state is stored beside --out, in a folder
     that ends in .training, and the same command continues after a stop.
     """
-    if simulated and flights:
-        raise click.UsageError("either FLIGHTS or --simulated, not both")
-    if not simulated and (scenario or without):
-        raise click.UsageError("--scenario and --without need --simulated N")
-    if detector != "best" and (start or labelled or free_air or silence):
-        raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
+    _check_combination(flights, detector, simulated, scenario, without, (start, labelled, free_air, silence))
     need("train", "training")
     check_free(out, force)
     module = registry.get(detector)
@@ -85,15 +81,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     began = time.monotonic()
     if not simulated:
         chosen, failures = _read(flights, evaluate.spare_of(module))
-    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-                  TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
-        tasks: dict[str, TaskID] = {}
-
-        def progress(stage: str, done: int, total: int, note: str) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=total, note="")
-            bar.update(tasks[stage], completed=done, note=note)
-
+    with _progress_bars() as progress:
         if simulated:
             chosen, what = _simulate(simulated, scenario, without, seed, progress)
             failures = 0
@@ -112,6 +100,32 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     if failures:
         click.echo(f"airtouch: {len(chosen)} flights used, {failures} left out (see above)", err=True)
         sys.exit(2)
+
+
+def _check_combination(flights: tuple[Path, ...], detector: str, simulated: int | None, scenario: str | None,
+                       without: tuple[str, ...], of_best: tuple) -> None:
+    """Raises click.UsageError for options that exclude each other; of_best: values of options for `best` alone."""
+    if simulated and flights:
+        raise click.UsageError("either FLIGHTS or --simulated, not both")
+    if not simulated and (scenario or without):
+        raise click.UsageError("--scenario and --without need --simulated N")
+    if detector != "best" and any(of_best):
+        raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
+
+
+@contextmanager
+def _progress_bars() -> Iterator[Callable[[str, int, int, str], None]]:
+    """A bar a stage, on standard error: yields what a training calls with stage, steps done, their total and a note."""
+    with Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                  TextColumn("{task.fields[note]}"), console=_stderr()) as bar:
+        tasks: dict[str, TaskID] = {}
+
+        def progress(stage: str, done: int, total: int, note: str) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, note="")
+            bar.update(tasks[stage], completed=done, note=note)
+
+        yield progress
 
 
 def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:

@@ -12,7 +12,7 @@ import click
 
 from airtouch.cli.shared.progress import Bar
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 
 SUMMARY, REPORT = "twin.json", "report.html"
 
@@ -62,6 +62,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     from airtouch.twin.fitting import calibrate, levers
     from airtouch.twin.recorded import flights as recordings
 
+    make_folder(out)
     _check_free(out / calibrate.FIT, resume, force)
     craft = vehicles.load(vehicle)
     with Bar("reading") as bar:

@@ -2,7 +2,10 @@
 
 
 class Bar:
-    """A progress bar on stderr: call it with (done, total[, note])."""
+    """A progress bar on stderr: call it with (done, total[, note]). The seconds run on a terminal, called or not.
+
+    Work of which it was told nothing counts as one step, done at the end.
+    """
 
     def __init__(self, name: str) -> None:
         from rich.console import Console
@@ -16,7 +19,9 @@ class Bar:
         self.progress.start()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, failure: object, *_: object) -> None:
+        if failure is None and self.progress.tasks[0].total is None:
+            self(1, 1)
         self.progress.stop()
 
     def __call__(self, done: int, total: int, note: str = "") -> None:

@@ -41,5 +41,5 @@ def left_out(failures: list[tuple[str, str]], scored: int) -> None:
 
 def write_json(path: Path, content: dict[str, Any], force: bool) -> None:
     """Write JSON, whole or not at all, and make its folder. Raises AirTouchError for a file that exists."""
-    make_folder(path)
+    make_folder(path.parent)
     write_bytes((json.dumps(content, indent=1, allow_nan=False) + "\n").encode(), path, force)

@@ -29,6 +29,7 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
 from airtouch.kernels.stream_detector import StreamEvents
+from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
 
@@ -186,7 +187,7 @@ def _resume_file(work: Path | None, flights: Sequence[FlightLog], free_air: Sequ
     """The file that keeps the state of a training with these arguments; None without a folder."""
     if work is None:
         return None
-    work.mkdir(parents=True, exist_ok=True)
+    make_folder(work)
     parts = [repr(recipe), str(seed), repr(labels), *(training_set.flight_hash(f) for f in (*flights, *free_air))]
     weights = b"" if start is None else b"".join(np.ascontiguousarray(v).tobytes() for v in start.weights.values())
     return work / f"training_{hashlib.sha256('|'.join(parts).encode() + weights).hexdigest()[:16]}.npz"

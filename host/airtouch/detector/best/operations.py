@@ -21,13 +21,13 @@ HEAD = "head"  #: dense layer: row t reads row t of several layers
 
 @dataclass(frozen=True)
 class Operation:
-    """What one operation is.
+    """One operation in all its forms.
 
-    kind: what int8 and C do with the rows that a layer reads; DENSE multiplies them with weights.
-    kernel_shape(layer): of its float weights, the last axis that of the outputs. rows(layer, kernel, bias, x): float
+    kind: the int8 arithmetic, also in C; DENSE multiplies the rows that a layer reads with weights.
+    kernel_shape(layer): shape of its float weights; the last axis is the outputs. rows(layer, kernel, bias, x): float
     NumPy, a row of output for each row of input. keras(layer, **options): a new Keras layer. window(layer, kernel,
-    bias, x): TensorFlow, over a window (1, 1, rows, inputs) without a past. Without ReLU and stride but for `keras`,
-    whose layer has both, and `window`, which has the stride.
+    bias, x): TensorFlow, over a window (1, 1, rows, inputs) without a past. Only `keras` includes ReLU; only `keras`
+    and `window` include the stride.
     """
 
     kind: LayerKind

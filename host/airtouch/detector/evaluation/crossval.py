@@ -17,7 +17,7 @@ from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.registry import Detector, Filtered, get
 from airtouch.detector.shared import sensors, training_set
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import FlightLog
 
 Tell = Callable[[str], None]
@@ -50,7 +50,7 @@ def crossval(
     if not physical_filter and not isinstance(detector, Filtered):
         raise AirTouchError(f"{name} has no physical filter to switch off")
     folds = by_fold(files) if folds is None else folds
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     study = _Study(name, detector, seed, options or {}, physical_filter, silenced, silent_training, free_air, out)
     readable, left_out = readable_flights(files, evaluate.spare_of(detector))
     scores: list[FlightScore] = []

@@ -21,15 +21,15 @@ from airtouch.errors import AirTouchError
 from airtouch.logs import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 
-ASSUMED_SIGMA_S = 0.1  #: timing error of a detection where the model does not state one
-TRUE_SIGMA_S = 0.01  #: timing error of an edge of the down range: a sample
-PERIOD_S = 0.01  #: between two samples, where nothing else is said
-MIN_SPEED_MPS = 0.05  #: below it a timing error is not turned into less than this much distance
+ASSUMED_SIGMA_S = 0.1  #: s, timing error of a detection by a model that states none
+TRUE_SIGMA_S = 0.01  #: s, timing error of an edge of the down range: one sample
+PERIOD_S = 0.01  #: s, default sample time
+MIN_SPEED_MPS = 0.05  #: m/s, least speed by which a timing error is multiplied
 
 
 @dataclass(frozen=True)
 class EdgePoint:
-    """Where an edge was felt: position, kind ("entry", "exit", "edge") and 1-sigma along the track."""
+    """A detected edge: position, kind ("entry", "exit", "edge") and 1-sigma along the track."""
 
     sample: int
     kind: str
@@ -54,7 +54,10 @@ class Platform:
 
 @dataclass(frozen=True)
 class EdgeMap:
-    """The edges of one flight in the plane, m: track (n, 2), edges along it, platforms; where positions come from."""
+    """The edges of one flight in the plane, m.
+
+    xy: track (n, 2). points: edges along it. position: source of the positions. lag_s, sigma_s: of the detections.
+    """
 
     xy: np.ndarray
     points: list[EdgePoint]
@@ -66,7 +69,7 @@ class EdgeMap:
 
 @dataclass(frozen=True)
 class Timed:
-    """Edges of a flight, by how much they are late, and 1-sigma of their time, s."""
+    """Edges of a flight, their constant lag (s) and 1-sigma of their time (s)."""
 
     edges: Sequence[Edge | Detection]
     lag_s: float
@@ -79,7 +82,7 @@ def true(log: FlightLog) -> Timed:
 
 
 def felt(log: FlightLog, detector: str = "best", model: Path | None = None) -> Timed:
-    """The edges that a detector feels, with the shipped model for None.
+    """The edges that a detector reports, with the shipped model for None.
 
     Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
     """
@@ -129,8 +132,8 @@ def edge_points(
 ) -> list[EdgePoint]:
     """Detections as points of the track.
 
-    xy: track, (n, 2), metres. samples: where each detection came, and lag_s the constant lag of the
-    detector, which is taken back. sigma_s: its timing error; times the speed there it is sigma_m.
+    xy: track, (n, 2), metres. samples: index of each detection; lag_s, the constant lag of the detector, is
+    subtracted. sigma_s: timing error of a detection; sigma_m is its product with the speed at that sample.
     """
     points = []
     half = max(1, round(0.1 / period_s))
@@ -146,7 +149,7 @@ def edge_points(
 
 
 def passes(points: list[EdgePoint]) -> list[tuple[EdgePoint, EdgePoint]]:
-    """Entry and the exit that follows it; an entry without an exit, or the reverse, is left out."""
+    """Pairs of an entry and the next exit. An entry without an exit is left out, and an exit without an entry."""
     ordered = sorted(points, key=lambda p: p.sample)
     return [(a, b) for a, b in pairwise(ordered) if a.kind == "entry" and b.kind == "exit"]
 
@@ -155,7 +158,7 @@ def platforms(points: list[EdgePoint]) -> list[Platform]:
     """Group the passes into platforms and fit each one's outline.
 
     Two passes belong together where they overlap along the direction of flight and lie, across it,
-    no further apart than four times the usual distance between successive rows.
+    no further apart than four times the median distance between successive rows.
     """
     crossed = passes(points)
     groups: list[list[tuple[EdgePoint, EdgePoint]]] = []

@@ -29,31 +29,34 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.networks.int8_network import multiplications
 
-#: What `tune` chooses from: P at entry, P at exit, samples between edges, samples an alert counts.
-ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-EXIT = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
-DWELL = (25, 50, 100, 150)
-HOLD = (25, 50, 100, 200)
-#: Of one flight: P(over a platform), armed, alert of FR-CFAR; (n,) each.
+#: The grid of decoding settings that `tune` searches. The paper gives none, so it is chosen from the training flights.
+ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  #: P(over a platform) at which an entry is reported
+EXIT = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)  #: P(over a platform) at which an exit is reported
+DWELL = (25, 50, 100, 150)  #: samples (10 ms) between two edges, at least
+HOLD = (25, 50, 100, 200)  #: samples for which an alert of FR-CFAR confirms an edge
+#: One flight: P(over a platform), whether edges may be reported, alert of FR-CFAR; (n,) each.
 DecodingInputs = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def run(log: FlightLog, model: Model | None = None) -> Trace:
-    """P(over a platform) and edges of one flight; AirTouchError that names missing columns."""
+    """P(over a platform), (n,), and edges of one flight of n samples, with the shipped model for None.
+
+    Raises AirTouchError that names missing columns.
+    """
     model = model or load(None)
     features = flight_features(log, parameters=decoding(model)[0])
     return _trace(log, model, features, probability_of(model, features.fused))
 
 
 def probability_of(model: Model, fused: np.ndarray) -> np.ndarray:
-    """P(over a platform), (n,), of a flight's fused features (n, 3); NaN where there is none."""
+    """P(over a platform), (n,), for the fused features (n, 3) of a flight; NaN until the network's window is full."""
     if model.scale is None:
         return probability_of_flight(model, fused)
     return probability_of_samples(model, fused, stride(model))
 
 
 def stride(model: Model) -> int:
-    """Samples to one answer where the model rolls over samples."""
+    """Samples between two outputs of a network that takes one sample at a time; AirTouchError for no whole number."""
     value = model.metadata.get("stride", 1)
     if not isinstance(value, int) or isinstance(value, bool) or value < 1:
         raise AirTouchError(f"the model's stride must be a whole number from 1, not {value!r}; train it again")
@@ -61,7 +64,7 @@ def stride(model: Model) -> int:
 
 
 def run_float(log: FlightLog, model: Model) -> Trace:
-    """As `run`, with the float network as trained: what quantisation is measured against."""
+    """The same as `run` with the float network before quantisation. The difference is the cost of quantisation."""
     features = flight_features(log, parameters=decoding(model)[0])
     windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
     logits = infer_float(model.float_layers, windows).astype(np.float64)
@@ -79,10 +82,10 @@ def _trace(log: FlightLog, model: Model, features: Features, probability: np.nda
 def fit(
     flights: Sequence[FlightLog], seed: int = 0, *, physical_filter: bool = True, **options: Any
 ) -> Model:
-    """Train, prune and quantise the network, then choose decoding and lag on flights it has not fitted.
+    """Train, prune and quantise the network, then choose decoding settings and lag on held-out training flights.
 
-    Those are the training flights that were held out for early stopping (all of them
-    where none were). options: of `train.train_paper` (epochs, sparsity, df_lambda, progress, ...).
+    The held-out flights are those of early stopping; without any, all flights are used.
+    options: arguments of `train.train_paper` (epochs, sparsity, df_lambda, progress, ...).
     """
     from airtouch.detector.paper.training import train_paper
 
@@ -90,7 +93,7 @@ def fit(
 
 
 def retune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = True) -> Model:
-    """The same network with decoding and lag chosen again, from the flights it was trained with."""
+    """The same network with decoding settings and lag chosen again. flights: those of its training."""
     unseen = set(model.metadata["held_out"])
     chosen = [log for log in flights if os.path.basename(log.source) in unseen]
     return tune(model, chosen or flights, physical_filter)

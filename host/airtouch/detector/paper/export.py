@@ -13,14 +13,14 @@ from airtouch.parameters import DEFAULT
 from airtouch.reference import z_score_window
 from airtouch.reference.networks.int8_network import Int8Network, quantise, run
 
-GOLDEN = 16  #: windows with known answers
+GOLDEN = 16  #: number of golden windows
 GOLDEN_SAMPLES = 300  #: samples of the golden flight of a rolling network, three windows
 _GOLDEN_NAMES = ("airtouchGoldenInputs", "airtouchGoldenOutputs")
 _ROLLING_GOLDEN = ("airtouchRollingGoldenInputs", "airtouchRollingGoldenOutputs")
 
 
 def render(model: Model) -> dict[str, str]:
-    """File name -> text, without the lines that say where it came from."""
+    """File name -> C text, without the header lines on its origin."""
     return _render_rolling(model) if model.scale else _render_window(model)
 
 
@@ -54,7 +54,7 @@ def _render_rolling(model: Model) -> dict[str, str]:
 
 
 def golden_vectors(network: Int8Network) -> tuple[np.ndarray, np.ndarray]:
-    """int8 inputs (GOLDEN, inputs) and outputs (GOLDEN, outputs): made-up smooth windows, NumPy's answers."""
+    """int8 inputs (GOLDEN, inputs), random smooth windows, and their outputs (GOLDEN, outputs) by NumPy."""
     rows, columns, channels = network.input_shape
     walk = np.random.default_rng(0).normal(size=(GOLDEN, rows, columns * channels)).cumsum(axis=1)
     first = network.layers[0]
@@ -63,8 +63,7 @@ def golden_vectors(network: Int8Network) -> tuple[np.ndarray, np.ndarray]:
 
 
 def golden_samples(network: Int8Network, stride: int) -> tuple[np.ndarray, np.ndarray]:
-    """int8 samples (GOLDEN_SAMPLES, columns) of a made-up smooth flight and the outputs while it lasts: NumPy's, of
-    whole windows."""
+    """int8 samples (GOLDEN_SAMPLES, columns) of a random smooth flight; outputs of its whole windows by NumPy."""
     rows, columns, channels = network.input_shape
     walk = np.random.default_rng(0).normal(scale=0.3, size=(GOLDEN_SAMPLES, columns * channels)).cumsum(axis=0)
     first, size = network.layers[0], rolling_size(network, stride)
@@ -122,7 +121,7 @@ extern const networkInt8_t airtouchNetwork;
 
 
 def _decoding(model: Model, prefix: str) -> str:
-    """What whoever gets the network's outputs, and not the network, needs to make edges of them."""
+    """C constants that turn the network's outputs into edges, for the processor that does not run the network."""
     settings = decoding(model)[0] if "parameters" in model.metadata else DEFAULT
     return f"""// How its logits become edges, as chosen with it; samples of 10 ms.
 #define {prefix}_OUTPUT_SCALE {float_literal(model.int8.layers[-1].output_scale)}  // P is the softmax of the logits

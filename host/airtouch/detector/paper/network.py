@@ -62,7 +62,7 @@ def build_keras(constraints: Mapping[str, object] | None = None, rows: int = INP
 
 
 def weights_of_keras(model: "keras.Model") -> dict[str, np.ndarray]:
-    """The arrays of `weight_shapes` out of a Keras model."""
+    """The weights of a Keras model, with the names of `weight_shapes`."""
     arrays = {}
     for name in WEIGHTED:
         kernel, bias = model.get_layer(name).get_weights()
@@ -80,7 +80,7 @@ def pruning_of(final_sparsity: Mapping[str, float], steps: int, block: int = BLO
                ) -> tuple[dict, object]:
     """A Keras kernel constraint for each layer named, and the callback that drives them all.
 
-    final_sparsity: share of zeros at the end, by layer. The callback re-ranks the weights after each batch
+    final_sparsity: fraction of zeros after training, by layer. The callback re-ranks the weights after each batch
     that Keras reports, until `steps` optimiser steps; the masks then stay. Zeros are exact.
     """
     import keras

@@ -21,13 +21,13 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 
 EPOCHS = 10  #: the 200 of the paper overfit once flights are held out (host/docs/train.md)
-BATCH = 128  #: windows; the paper takes 32
-SPARSITY = 0.8  #: zeros of the first dense layer; what it costs: host/docs/ablations.md
-HELD_OUT = 0.15  #: share of the flights that decide when to stop
-PRUNED_BY = 0.6  #: share of the steps after which the zeros stay where they are
+BATCH = 128  #: windows a batch; 32 in the paper
+SPARSITY = 0.8  #: fraction of zeros in the first dense layer; its cost: host/docs/ablations.md
+HELD_OUT = 0.15  #: fraction of the flights held out for early stopping
+PRUNED_BY = 0.6  #: fraction of the steps after which the pruning masks are fixed
 PATIENCE = 3  #: epochs without a lower loss on the held-out flights
-PEAK_RATE = 2e-3  #: learning rate at the top of the one cycle
-BATCHES_A_CALL = 50  #: for speed: batches between two returns to Python
+PEAK_RATE = 2e-3  #: largest learning rate of the cycle
+BATCHES_A_CALL = 50  #: batches between two returns to Python, for speed
 STRIDE = 4  #: every fourth window is used: neighbours differ by one sample in a hundred
 
 #: progress(stage, done, total, note), stage "features" (flights) or "epochs"
@@ -138,7 +138,7 @@ def windows_of(log: FlightLog, features: Features, index: int = 0,
 
 
 def held_out(flights: int, seed: int) -> np.ndarray:
-    """Indices of the flights that decide when to stop, in order; none of fewer than four."""
+    """Sorted indices of the flights held out for early stopping; empty for fewer than four flights."""
     if flights < 4:
         return np.zeros(0, dtype=int)
     return np.sort(np.random.default_rng(seed).permutation(flights)[:max(1, round(HELD_OUT * flights))])
@@ -164,7 +164,7 @@ def data_hash(windows: Windows) -> str:
 
 
 def class_weights(over: np.ndarray) -> tuple[float, float]:
-    """What a window beside and over a platform counts, so that both classes count alike."""
+    """Weights in the loss of a window beside and of one over a platform; with them both classes have equal weight."""
     share = float(np.clip(np.mean(over), 1e-3, 1.0 - 1e-3))
     return 0.5 / (1.0 - share), 0.5 / share
 
@@ -181,15 +181,17 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
 
 def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
                 progress: Progress, conv_sparsity: float = 0.0) -> tuple[dict[str, np.ndarray], int]:
-    """The trained weights, and after how many epochs."""
+    """The trained weights and the number of epochs."""
     model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
     return network.weights_of_keras(model), len(losses)
 
 
 def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
               progress: Progress, conv_sparsity: float = 0.0):
-    """The trained Keras model and the loss on the held-out windows after each epoch (on the training
-    windows where none are held out). Windows may be of any length where sparsity is 0."""
+    """The trained Keras model, and the loss on the held-out windows after each epoch.
+
+    Without held-out windows it is the loss on the training windows. With sparsity 0 windows may have any length.
+    """
     import keras
 
     train, held = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, held))

@@ -41,7 +41,7 @@ def write_sources(files: Mapping[Path, str], force: bool) -> None:
         if path.exists() and path.read_bytes() != text.encode() and not force:
             raise AirTouchError(f"{path}: exists already and differs; use --force to replace it")
     for path, text in files.items():
-        make_folder(path)
+        make_folder(path.parent)
         write_bytes(text.encode(), path, force=True)
 
 

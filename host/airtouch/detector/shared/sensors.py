@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.detector.shared.channels import level_acceleration
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, nearest
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
 from airtouch.reference.motion_channels import ACCELERATION, CHANNEL_TABLE, MOTORS, RATES, MotionConfig
 
@@ -81,7 +81,7 @@ def without(log: FlightLog, sensors: tuple[str, ...]) -> FlightLog:
     columns = {ACCELERATION: (*ACC, *ACC_WORLD), RATES: GYRO, MOTORS: PWM}
     for sensor in sensors:
         if sensor not in columns:
-            raise AirTouchError(f"no sensor {sensor!r}; known: {', '.join(SENSORS)}")
+            raise AirTouchError(f"no sensor {sensor!r}{nearest(sensor, SENSORS)}; known: {', '.join(SENSORS)}")
     dropped = {name for sensor in sensors for name in columns[sensor]}
     return FlightLog({name: values for name, values in log.columns.items() if name not in dropped}, log.meta)
 

@@ -9,7 +9,7 @@ from airtouch.simulation.compiled import jit
 
 @jit
 def rotate(q, x, y, z):
-    """The body vector (x, y, z) in world axes."""
+    """The body vector (x, y, z) in world axes, a tuple; q (4,)."""
     w, a, b, c = q[0], q[1], q[2], q[3]
     tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
     return (x + w * tx + b * tz - c * ty, y + w * ty + c * tx - a * tz, z + w * tz + a * ty - b * tx)
@@ -17,7 +17,7 @@ def rotate(q, x, y, z):
 
 @jit
 def rotate_back(q, x, y, z):
-    """The world vector (x, y, z) in body axes."""
+    """The world vector (x, y, z) in body axes, a tuple; q (4,)."""
     w, a, b, c = q[0], -q[1], -q[2], -q[3]
     tx, ty, tz = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
     return (x + w * tx + b * tz - c * ty, y + w * ty + c * tx - a * tz, z + w * tz + a * ty - b * tx)
@@ -35,7 +35,7 @@ def euler(q):
 
 @jit
 def from_euler(roll, pitch, yaw, q):
-    """Write the quaternion of roll, pitch and yaw (rad) into q."""
+    """Write the quaternion of roll, pitch and yaw (rad) into q (4,)."""
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)

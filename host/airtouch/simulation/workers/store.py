@@ -15,6 +15,7 @@ from typing import Any
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
@@ -29,10 +30,7 @@ def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -
     with force these flights are removed.
     """
     text = json.dumps(request, indent=1, sort_keys=True)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise AirTouchError(f"{folder}: cannot make this folder: {error.strerror}") from None
+    make_folder(folder)
     known = folder / REQUEST
     if known.is_file() and known.read_text() == text:
         return

@@ -13,9 +13,9 @@ TOC_CHANNEL, READ_CHANNEL, WRITE_CHANNEL, MISC_CHANNEL = 0, 1, 2, 3
  DEFAULT_V2) = range(9)
 CODES = {"int8_t": 0, "int16_t": 1, "int32_t": 2, "float": 6, "uint8_t": 8, "uint16_t": 9, "uint32_t": 10}
 FORMATS = {0: "<b", 1: "<h", 2: "<i", 6: "<f", 8: "<B", 9: "<H", 10: "<I"}
-EXTENDED, CORE, READ_ONLY = 0x10, 0x20, 0x40
+EXTENDED, CORE, READ_ONLY = 0x10, 0x20, 0x40  #: bits of the type in the table of contents (param.h)
 PERSISTENT = 1  #: bit of the extended type
-KIND = 0x0F
+KIND = 0x0F  #: mask of the bits with the C type
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.logs.files import make_folder
 from airtouch.simulation import scenario
 from airtouch.simulation.batch import available_cores
 from airtouch.simulation.scenario import Scenario
@@ -78,7 +79,7 @@ def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, f
     Finished rounds are in fit.json, so that the same call continues after a stop. Raises AirTouchError if fit.json is
     a fit of other flights or settings.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     workers = workers or available_cores()
     aim, levers, asked = _asked(recorded, vehicle, flights, seed)
     with bar("fitting") as report:

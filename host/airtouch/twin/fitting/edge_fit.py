@@ -22,9 +22,9 @@ from airtouch.vehicle import Vehicle
 
 #: effects whose levers are moved; motors and their delay are felt in each answer to an edge
 EFFECTS = ("ground_effect", "flow_scale", "flow_latency", "range_bias", "range_step", "motor_lag", "actuator_delay")
-FLIGHTS = 60  #: of each comparison
+FLIGHTS = 60  #: simulated flights of each comparison
 STEPS = 4  #: Gauss-Newton steps
-SHRINK = 0.5  #: of a step that did not help
+SHRINK = 0.5  #: factor of a step that raised the misfit
 FIRST = 500_000  #: number of the first flight; larger than that of any flight of the rounds
 
 

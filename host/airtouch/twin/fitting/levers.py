@@ -47,8 +47,12 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
 
     near: error of the recorded flights' down range near the platform.
     """
-    near = near or NearRange(0.0, -0.045, 0.03, 0.035)
-    gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
+    return (*_of_vehicle(vehicle), *_of_free_air(), *_of_sensor_noise(vehicle), *_of_edges(),
+            *_of_flow_and_range(near or NearRange(0.0, -0.045, 0.03, 0.035)))
+
+
+def _of_vehicle(vehicle: Vehicle) -> tuple[Lever, ...]:
+    """Mission, thrust, battery, motors and inertia."""
     yaw = vehicle.yaw_torque_over_thrust_m
     return (
         Lever(MISSION, "height_m", 0.0, -0.1, 0.1, 0.01, "m"),
@@ -62,6 +66,12 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
         Lever(VEHICLE, "yaw_torque_over_thrust_m", yaw, 0.3 * yaw, 3 * yaw, 0.15 * yaw, "m"),
         *(Lever(VEHICLE, f"inertia_kg_m2.{i}", value, 0.5 * value, 2.0 * value, 0.06 * value, "kg m²")
           for i, value in enumerate(vehicle.inertia_kg_m2)),
+    )
+
+
+def _of_free_air() -> tuple[Lever, ...]:
+    """Noise of the motors, gusts, drag and flapping."""
+    return (
         Lever("motor_noise", "rms", 0.006, 0.0, 0.05, 0.0015, "1"),
         Lever("motor_noise", "time", 0.8, 0.05, 3.0, 0.15, "s"),
         Lever("motor_noise", "fast", 0.005, 0.0, 0.05, 0.0015, "1"),
@@ -72,6 +82,13 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
         Lever("rotor_drag", "horizontal", 0.0147, 0.0, 0.08, 0.004, "N s/m"),
         Lever("blade_flapping", "tilt", 0.01, 0.0, 0.1, 0.01, "rad s/m"),
         Lever("blade_flapping", "hub", 0.02, 0.0, 0.1, 0.02, "m"),
+    )
+
+
+def _of_sensor_noise(vehicle: Vehicle) -> tuple[Lever, ...]:
+    """Noise of IMU, optical flow and range."""
+    gyro, acc = vehicle.gyro_noise_rms_radps, vehicle.acc_noise_rms_mps2
+    return (
         *(Lever(VEHICLE, f"acc_noise_ratio.{i}", vehicle.acc_noise_ratio[i], 0.05, 6.0, 0.1, f"of {acc:g} m/s²")
           for i in range(3)),
         *(Lever(VEHICLE, f"gyro_noise_ratio.{i}", vehicle.gyro_noise_ratio[i], 0.05, 6.0, 0.1, f"of {gyro:g} rad/s")
@@ -80,6 +97,12 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
         Lever(VEHICLE, "flow_noise_time_s", vehicle.flow_noise_time_s, 0.02, 3.0, 0.1, "s"),
         Lever(VEHICLE, "range_drift_rms", vehicle.range_drift_rms, 0.0, 0.05, 0.002, "1"),
         Lever(VEHICLE, "range_drift_time_s", vehicle.range_drift_time_s, 0.05, 3.0, 0.1, "s"),
+    )
+
+
+def _of_edges() -> tuple[Lever, ...]:
+    """The air over a platform and at its edges."""
+    return (
         Lever("ground_effect", "strength", 1.4, 0.0, 3.0, 0.15, "1", 0.3),
         Lever("ground_effect", "fade", 0.08, 0.03, 0.3, 0.01, "m"),
         Lever("ground_effect", "even", 0.3, 0.0, 1.0, 0.2, "1", 0.3),
@@ -89,6 +112,12 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
         Lever("ground_effect", "pitch", 0.8, 0.0, 2.0, 0.1, "1"),
         Lever("ground_effect", "swirl", 0.004, 0.0, 0.05, 0.001, "m"),
         Lever("ground_effect", "leaving", 0.02, -0.1, 0.1, 0.006, "1", 0.01),
+    )
+
+
+def _of_flow_and_range(near: NearRange) -> tuple[Lever, ...]:
+    """What optical flow and range read over a platform and at its edges."""
+    return (
         Lever("flow_scale", "share", -0.04, -0.1, 1.0, 0.03, "1", 0.02),
         Lever("flow_scale", "transient", 0.7, -1.0, 1.0, 0.08, "1", 0.25),
         Lever("flow_scale", "time", 0.15, 0.02, 1.0, 0.04, "s"),

@@ -21,8 +21,8 @@ ANCHOR_S, CARRIED_S = 1.0, 0.8  #: s of readings over the floor that anchor the 
 READING_STD_M, DRIFT_M = 0.002, 0.02
 #: mean and standard deviation of the prior of near (m), fade (m), delay (s); weak if the flights differ in height
 PRIOR = np.array([[-0.04, 0.04], [0.055, 0.01], [0.035, 0.01]])
-FIRM = 10.0  #: weight of this prior against the flights
-LEAST, MOST = (-0.2, 0.01, 0.0), (0.0, 0.2, 0.1)
+FIRM = 10.0  #: weight of the prior relative to the flights
+LEAST, MOST = (-0.2, 0.01, 0.0), (0.0, 0.2, 0.1)  #: bounds of near (m), fade (m), delay (s)
 ALIKE_M = 0.06  #: m, largest difference of the steps at one platform, whose readings differ by height
 FEWEST = 4  #: least number of flights
 

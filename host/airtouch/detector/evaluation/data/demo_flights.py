@@ -1,4 +1,4 @@
-"""The flights of `airtouch demo`: recorded ones or the simulator's, split by flight."""
+"""The flights of `airtouch demo`, recorded or simulated, split by flight into training and test."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
-TRAIN, TEST = 52, 18  #: flights at most: as many as fit in two minutes on two cores
-FEWEST = 4  #: flights to train and to test with
-HELD_OUT = 4  #: every fourth fold, or flight where there are no folds, is held out
-GENERATED, SCENARIO = 32, "paper-low"  #: simulated flights, where none are recorded
+TRAIN, TEST = 52, 18  #: largest numbers of flights; with them the demo takes two minutes on two cores
+FEWEST = 4  #: least number of flights, training and test together
+HELD_OUT = 4  #: every fourth fold is held out, or every fourth flight if there are no folds
+GENERATED, SCENARIO = 32, "paper-low"  #: number and scenario of the simulated flights
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """Flights to train on, flights held out, and in words what they are."""
+    """Training flights, held-out flights, and a description of their source for the report."""
 
     train: list[FlightFile]
     test: list[FlightFile]
@@ -27,16 +27,18 @@ class Chosen:
 
 
 def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
-           tell: Callable[[str], None] = lambda _: None) -> Chosen:
-    """The flights of a folder, or without one flights of the simulator, which are written to `simulated`.
+           tell: Callable[[str], None] = lambda _: None,
+           progress: Callable[[int, int], None] = lambda *_: None) -> Chosen:
+    """The recorded flights of `folder`, or for None simulated flights, which are written to the folder `simulated`.
 
-    speed_mps: of flights whose manifest does not say. tell: is given a line on a simulated flight that diverged.
+    speed_mps: speed of flights whose manifest has none. tell: called with a line for each simulated flight that
+    diverged. progress: called with the numbers of simulated flights and of all, first with 0.
     Raises AirTouchError for fewer than FEWEST flights.
     """
     if folder is not None:
         files, where = dataset.collect([folder], speed_mps), f"recorded flights in {folder}"
     else:
-        files, where = generated(simulated, tell), f"flights of the simulator ({simulated})"
+        files, where = generated(simulated, tell, progress), f"flights of the simulator ({simulated})"
     if len(files) < FEWEST:
         raise AirTouchError(f"{folder or simulated}: {len(files)} flights are too few to train and to test; "
                             f"at least {FEWEST} are needed")
@@ -45,21 +47,23 @@ def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
 
 
 def split(files: Sequence[FlightFile]) -> tuple[list[FlightFile], list[FlightFile]]:
-    """(to train on, held out): whole folds of the manifest; by place in the list for a flight without one."""
+    """(training flights, held-out flights). Folds stay whole; a flight without one counts by its index."""
     fold = [i if f.condition.fold is None else f.condition.fold for i, f in enumerate(files)]
     held = [k % HELD_OUT == 0 for k in fold]
     return ([f for f, out in zip(files, held, strict=True) if not out],
             [f for f, out in zip(files, held, strict=True) if out])
 
 
-def generated(folder: Path, tell: Callable[[str], None] = lambda _: None) -> list[FlightFile]:
-    """Simulated flights, written with their manifest; compiles the simulator on the first call."""
+def generated(folder: Path, tell: Callable[[str], None] = lambda _: None,
+              progress: Callable[[int, int], None] = lambda *_: None) -> list[FlightFile]:
+    """Simulate flights and write them with their manifest. The first call compiles the simulator."""
     from airtouch.simulation import batch, scenario
     from airtouch.simulation.flight import Diverged
     from airtouch.simulation.workers import store
 
     scene = scenario.load(SCENARIO)
     folder.mkdir(parents=True, exist_ok=True)
+    progress(0, GENERATED)
     for number, flown in enumerate(batch.flights(scene, GENERATED)):
         path = store.path_of(folder, scene.name, 0, number)
         path.unlink(missing_ok=True)
@@ -67,17 +71,18 @@ def generated(folder: Path, tell: Callable[[str], None] = lambda _: None) -> lis
             tell(str(flown))
         else:
             logs.write(flown, path)
+        progress(number + 1, GENERATED)
     store.write_manifest(folder, scene, 0, GENERATED)
     return dataset.collect([folder])
 
 
 def spread(files: list[FlightFile], most: int) -> list[FlightFile]:
-    """At most `most` of them, evenly over the list, so that every condition stays in."""
+    """At most `most` files, taken evenly from the list, so that every condition is represented."""
     return files if len(files) <= most else [files[i * len(files) // most] for i in range(most)]
 
 
 def readable(files: Sequence[FlightFile]) -> tuple[list[FlightLog], list[tuple[str, str]]]:
-    """Logs to train on, and what cannot be used with the reason. Raises AirTouchError where none can."""
+    """The readable logs, and (file, reason) for each other one. Raises AirTouchError if none is readable."""
     readable_by_path, left_out = readable_flights(files)
     if not readable_by_path:
         raise AirTouchError(f"no flight to train on; the first was left out because: {left_out[0][1]}")

@@ -1,4 +1,4 @@
-"""Flights to train on, flown in the simulator instead of recorded."""
+"""Simulated training flights."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from airtouch.simulation.scenario import Scenario
 from airtouch.vehicle import Vehicle
 
 SCENARIO = "paper-mixed"
-SPARE = 2  #: flights tried for each one wanted, at most
+SPARE = 2  #: most simulated flights for each usable one
 
 #: progress(stage, done, total, note)
 Progress = Callable[[str, int, int, str], None]
@@ -23,7 +23,7 @@ def training_flights(
     count: int, name: str | Scenario = SCENARIO, *, vehicle: Vehicle | None = None, without: Sequence[str] = (),
     seed: int = 0, progress: Progress | None = None,
 ) -> tuple[list[FlightLog], dict[str, Any]]:
-    """(the first `count` flights that end well and cross an edge, what they are, for a model's metadata).
+    """(the first `count` flights that end well and cross an edge, their description for a model's metadata).
 
     name: a built-in scenario, a .toml file or a scenario. vehicle: the default one if left out. without: effects of
     it to switch off. Same arguments, same flights. Held in memory: about 0.5 MB each.

@@ -1,0 +1,36 @@
+"""Flights written by processes are those that one process writes, byte for byte, and those that `fly` returns."""
+
+import numpy as np
+
+from airtouch import logs
+from airtouch.simulation import scenario
+from airtouch.simulation.flight import fly
+from airtouch.simulation.workers import local, store
+
+SHORT = """
+name = "short"
+[[mission.step]]
+do = "take-off"
+height_m = 0.4
+time_s = 1.0
+[[mission.step]]
+do = "hover"
+time_s = 0.5
+"""
+
+
+def test_two_processes_write_what_one_does(tmp_path, vehicle):
+    scene = scenario.parse(SHORT, "short")
+    numbers = [3, 0, 7]
+    for workers in (1, 2):
+        folder = tmp_path / str(workers)
+        folder.mkdir()
+        ended = list(local.write(folder, scene, numbers, vehicle=vehicle, effects={"wind": {"x": 0.4}}, seed=5,
+                                 workers=workers))
+        assert ended == [None] * 3
+    for number in numbers:
+        one, two = (store.path_of(tmp_path / name, "short", 5, number) for name in "12")
+        assert one.read_bytes() == two.read_bytes()
+        flown = fly(scene, vehicle, 5, number, effects={"wind": {"x": 0.4}})
+        np.testing.assert_allclose(logs.read(one)["m1_pwm"], flown["m1_pwm"])
+    assert len(list((tmp_path / "2").glob("*"))) == 3
