@@ -5,7 +5,8 @@ SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/
   gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/batch/*.[ch])
 #: C that needs neither the firmware's headers nor the GAP8's SDK
 FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c gap8/kernels/*.c) gap8/app/src/gap8_core.c \
-  $(addprefix firmware/app/src/,app_core.c app_level.c app_local.c app_log.c app_paper.c app_params.c floor_height.c)
+  $(addprefix firmware/app/src/,app_begin.c app_core.c app_edges.c app_gap8.c app_level.c app_local.c app_log.c \
+  app_paper.c app_params.c floor_height.c)
 FLIES_INCLUDES = -Ifirmware/kernels -Ifirmware/link -Ifirmware/app/src -Igap8/kernels -Igap8/model -Igap8/app/src
 
 .PHONY: help setup demo test lint tidy docs fuzz fuzz-logs mutate repeat bench firmware emulate gap8 flash clean
@@ -21,6 +22,8 @@ setup: .venv/.kernels  ## make .venv with everything in it
 
 .venv/.kernels: .venv/.packages $(SOURCES)
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	@echo "Compiling the simulator: half a minute the first time"
+	@$(BIN)/python -c "from airtouch.simulation import compiled; compiled.compile_all()"
 	@touch $@
 
 demo: setup  ## the main job: train, prune, export, detect through the C kernels, report

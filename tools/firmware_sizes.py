@@ -6,6 +6,7 @@ Builds each of IMAGES with the firmware's own makefiles (over a minute each), th
 `make firmware`, and prints the table of host/docs/flash.md. Stops at a compiler's warning.
 """
 
+import argparse
 import re
 import subprocess
 import sys
@@ -86,6 +87,6 @@ def main(base: Path) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
-        raise SystemExit(__doc__)
-    main(Path(sys.argv[1]).expanduser().resolve())
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
+    main(parser.parse_args().base.expanduser().resolve())

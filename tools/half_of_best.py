@@ -4,8 +4,9 @@
 parts the app, on since its battery was plugged in, from `best` over a log. Folds 0 to 2, clean flights.
 """
 
+import argparse
 import csv
-import sys
+import os
 from pathlib import Path
 
 import numpy as np
@@ -52,4 +53,7 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/flights/airtouch"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path, help="of the authors' flights (FLIGHTS/airtouch)",
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "airtouch")
+    main(parser.parse_args().folder)

@@ -2,11 +2,13 @@
 
     python tools/high_edges.py FOLDER... --fold 0 --fold 1 --fold 2 --model MODEL.npz... [--twin FOLDER]
 
-Prints three tables of the flights over one platform, by class of height:
+Prints tables of the flights over one platform, by class of height:
 1. the "over" logit over the platform (median), and its change where one channel is muted (held at 0); each flight by
    the --model that was not trained on it, so the models of a cross-validation can be given together;
-2. standard deviation of the channels in hover and in the last second before the entry: the air in which edges lie;
-3. with --twin: standard deviation above 3 Hz over the platform divided by that before it, recorded, and with the
+2. the same logit where the air before the entry, the platform, or both are replaced by the flight's own hover: how
+   much of it comes from the way to the platform, which is a part of the mission and not of the platform's air;
+3. standard deviation of the channels in hover and in the last second before the entry: the air in which edges lie;
+4. with --twin: standard deviation above 3 Hz over the platform divided by that before it, recorded, and with the
    twin's responses (`airtouch.twin.overlay`) added to the recorded air.
 """
 
@@ -37,21 +39,48 @@ from airtouch.twin.recorded.features import CLASSES, height_class
 CHANNELS = NAMES[:-1]  #: without the empty one
 SPLIT_HZ = 3.0
 SETTLED, BEFORE = slice(30, -10), slice(-300, -40)  #: samples: over a platform from the entry on; before the entry
+AHEAD = 40  #: samples before the entry in which the platform is already felt
+HOVER_S = 2.0  #: shortest hover of a flight in tables 2 and 3
+REPLACED = ("as flown", "before: hover", "platform: hover", "both: hover")
 COLUMNS = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "m1", "m2", "m3", "m4")
 RESPONSES = 60
+
+
+def over(model: BestModel, values: np.ndarray, flown: Course) -> float:
+    """Median "over" logit over the platform. values: (n, 12) channels."""
+    steps = slice((flown.entry + SETTLED.start) // STRIDE, (flown.exit + SETTLED.stop) // STRIDE)
+    return float(np.median(float_logits(model.weights, model.recipe.graph, values)[steps, 0]))
 
 
 def muted(log: FlightLog, flown: Course, model: BestModel) -> np.ndarray:
     """(1 + channels,): median "over" logit over the platform, and its changes with each channel held at 0."""
     x, _ = channels_of(log, model.recipe.motion)
-    steps = slice((flown.entry + SETTLED.start) // STRIDE, (flown.exit + SETTLED.stop) // STRIDE)
-
-    def over(values: np.ndarray) -> float:
-        return float(np.median(float_logits(model.weights, model.recipe.graph, values)[steps, 0]))
-
-    whole = over(x)
-    return np.array([whole, *(over(np.where(np.arange(x.shape[1]) == i, 0.0, x)) - whole
+    whole = over(model, x, flown)
+    return np.array([whole, *(over(model, np.where(np.arange(x.shape[1]) == i, 0.0, x), flown) - whole
                               for i in range(len(CHANNELS)))])
+
+
+def hovering(values: np.ndarray, flown: Course, before: bool, platform: bool) -> np.ndarray:
+    """Channels (n, k) with the air before the entry, the platform, or both replaced by the flight's own hover.
+
+    It ends before the entry as it was flown; from there on, and earlier than it is long, it is repeated there and back,
+    so that it has no jumps. Its mean is that of the last second before the entry.
+    """
+    out, start, middle = values.copy(), flown.phases()["hover"].start, flown.entry - AHEAD
+    hover = values[flown.phases()["hover"]]
+    hover = hover - hover.mean(axis=0) + values[middle - RATE_HZ:middle].mean(axis=0)
+    there_and_back = np.vstack([hover[::-1], hover])
+    for wanted, first, last in ((before, start, middle), (platform, middle, flown.exit)):
+        if wanted:
+            out[first:last] = there_and_back[np.arange(first - middle, last - middle) % len(there_and_back)]
+    return out
+
+
+def approach(log: FlightLog, flown: Course, model: BestModel) -> np.ndarray:
+    """Median "over" logit over the platform, (4,), for each of REPLACED."""
+    x, _ = channels_of(log, model.recipe.motion)
+    return np.array([over(model, hovering(x, flown, before, platform), flown)
+                     for platform in (False, True) for before in (False, True)])
 
 
 def fast(values: np.ndarray) -> np.ndarray:
@@ -70,6 +99,11 @@ def shaking(values: np.ndarray, entry: int, leave: int) -> tuple[np.ndarray, np.
     swift = fast(values)
     return (swift[max(entry + BEFORE.start, 0):max(entry + BEFORE.stop, 1)].var(axis=0),
             swift[entry + SETTLED.start:leave + SETTLED.stop].var(axis=0))
+
+
+def length(part: slice) -> int:
+    """Samples of a phase."""
+    return part.stop - part.start
 
 
 def row(title: str, count: int, values: Sequence[float], form: str) -> str:
@@ -111,9 +145,18 @@ def main() -> None:
                      if not training_set.contains(model.metadata, log)]
             if found:
                 print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
+    hovers = {name: [(log, flown) for log, flown in some if length(flown.phases()["hover"]) > HOVER_S * RATE_HZ]
+              for name, some in groups.items()}
+    if models:
+        print(head("over logit; replaced", REPLACED))
+        for name, some in hovers.items():
+            found = [approach(log, flown, model) for log, flown in some for model in models
+                     if not training_set.contains(model.metadata, log)]
+            if found:
+                print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
     print(head("standard deviation, usual swings", CHANNELS))
-    for name, some in groups.items():
-        pairs = [calm(log, flown) for log, flown in some if flown.phases()["hover"].stop - flown.level > 2 * RATE_HZ]
+    for name, some in hovers.items():
+        pairs = [calm(log, flown) for log, flown in some]
         for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):
             print(row(f"{name}, {title}", len(part), np.median(part, axis=0).tolist(), "{:.2f}"), flush=True)
     if options.twin:

@@ -185,8 +185,8 @@ def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def main() -> None:
-    """Each row as soon as its last draw is done."""
+def arguments() -> argparse.Namespace:
+    """The command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--start", type=Path, action="append", default=[],
@@ -207,13 +207,11 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=best.FINE_TUNING["steps"], help="of going on (default 300)")
     parser.add_argument("--alone-steps", type=int, default=1000, help="of training on the K alone; 0: no such rows")
     parser.add_argument("--speed", type=float, help="m/s, for flights whose manifest does not say")
-    options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
-    listed = dataset.collect(options.folders, options.speed)
-    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
-    if left_out:
-        raise SystemExit(f"not usable: {left_out[0][1]}")
-    groups = sorted({group_of(file, options.by) for file in listed})
+    return parser.parse_args()
+
+
+def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
+    """Ends the program, with one line, where options do not fit each other or the groups."""
     if len(options.start) not in (0, 1, len(groups)):
         raise SystemExit(f"{len(options.start)} models to start from for {len(groups)} groups; give one, or one for "
                          "each")
@@ -224,6 +222,18 @@ def main() -> None:
         raise SystemExit("--unlabelled learns beside a twin's edges: give --twin")
     if options.beside and (options.twin or not options.start):
         raise SystemExit("--beside goes on from a model: give --start, and no --twin")
+
+
+def main() -> None:
+    """Each row as soon as its last draw is done."""
+    options = arguments()
+    options.out.mkdir(parents=True, exist_ok=True)
+    listed = dataset.collect(options.folders, options.speed)
+    readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
+    if left_out:
+        raise SystemExit(f"not usable: {left_out[0][1]}")
+    groups = sorted({group_of(file, options.by) for file in listed})
+    check(options, groups)
     models = [best.load(path) for path in options.start]
     starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=False))
     twins = dict(zip(groups, options.twin if len(options.twin) > 1 else options.twin * len(groups), strict=False))

@@ -7,8 +7,8 @@ counted: their names are printed, add what they need. What follows a failed asse
 stopped by then. CONFIG_APP_STACKSIZE (firmware/app/app-config) counts words of four bytes.
 """
 
+import argparse
 import re
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -51,6 +51,10 @@ def deepest(folder: Path, entry: str) -> tuple[int, list[str], set[str]]:
 
 
 if __name__ == "__main__":
-    total, path, outside = deepest(Path(sys.argv[1]), sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("build", type=Path, help="folder that `make firmware` built in")
+    parser.add_argument("function", help="at which the chain begins")
+    options = parser.parse_args()
+    total, path, outside = deepest(options.build, options.function)
     print(f"{total} bytes: {' > '.join(path)}")
     print(f"not counted: {', '.join(sorted(outside))}")
