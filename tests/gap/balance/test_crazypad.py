@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
-from airtouch.gap.balance.hover_balance import BELIEFS, MIX, Reference, evidence, hypotheses
+from airtouch.gap.balance.hover_balance import ANSWER, BELIEFS, MIX, Reference, evidence, hypotheses, reference
 from airtouch.gap.diagnose import diagnose
 from airtouch.logs import read
 from airtouch.simulation import replay
@@ -12,13 +12,14 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active, get
 
 FLOWN = vehicle.load("crazyflie-2.1")
-NOMINAL = Reference(np.zeros(6), np.array(BELIEFS.between) ** 2)
+NOMINAL = Reference(np.zeros(6), np.array(BELIEFS.between) ** 2, np.zeros(2))  # both powers are 1 without corrections
+UNCORRECTED = (-9.0, -9.0)
 
 
 def told(thrusts: np.ndarray) -> np.ndarray:
-    """The pattern (6,) of commanded thrusts (4,), each over its nominal one; steady as a load is."""
+    """The pattern (8,) of commanded thrusts (4,), each over its nominal one; as steady as nominal flights."""
     mixed = MIX @ thrusts
-    return np.array([np.log(mixed[0]), *(mixed[1:] / mixed[0]), 0.4, 0.3])
+    return np.array([np.log(mixed[0]), *(mixed[1:] / mixed[0]), 0.0, 0.0, *UNCORRECTED])
 
 
 def best(pattern: np.ndarray) -> tuple:
@@ -55,10 +56,22 @@ def test_a_weight_in_front_keeps_yaw():
 
 
 def test_nominal_is_none_and_nonsense_is_unknown():
-    found, _ = best(np.array([0.0, 0.003, -0.003, 0.002, 0.0, 0.0]))
+    found, _ = best(np.array([0.0, 0.003, -0.003, 0.002, 0.0, 0.0, *UNCORRECTED]))
     assert found.name == "none"
-    found, _ = best(np.array([-0.3, 0.3, -0.3, 0.3, 0.4, 0.3]))
+    found, _ = best(np.array([-0.3, 0.3, -0.3, 0.3, 0.4, 0.3, *UNCORRECTED]))
     assert found.name == "unknown"
+
+
+def test_power_that_corrections_of_the_estimate_cause_is_nobodys():
+    own, corrected = np.array([-5.8, -2.3]), np.log10([[1e-6, 1e-6], [1e-4, 3e-5], [2e-4, 3e-4], [1e-7, 1e-3]])
+    powers = np.log10(10.0 ** own + ANSWER * 10.0 ** corrected)
+    table = np.column_stack([np.zeros((4, 4)), powers, corrected])
+    base = reference(table[:3])
+    np.testing.assert_allclose(base.quiet, own, atol=1e-9)
+    np.testing.assert_allclose(base.apart(table[3]), np.zeros(6), atol=1e-9)
+    without_velocity = np.column_stack([np.zeros((4, 4)), powers, np.full((4, 2), -9.0)])
+    np.testing.assert_allclose(reference(without_velocity[:3]).apart(without_velocity[3])[4:],
+                               powers[3] - powers[:3].mean(axis=0), atol=1e-3)
 
 
 def test_a_thread_tied_off_centre_turns_the_vehicle():
@@ -101,7 +114,7 @@ def test_cut_rotors_are_named(pad, nominal, name, rotors):
 
 
 @pytest.mark.parametrize(("name", "first"), [
-    ("add_weight_W1_near_M3_M4_E8_log00", "mass"), ("weight_on_string_W2_near_M3_E9_log01", "slung_load")])
+    ("add_weight_W1_near_M3_M4_E8_log00", "mass"), ("weight_on_string_W2_near_M3_E8_log00", "slung_load")])
 def test_weights_are_named(pad, nominal, name, first):
     found = diagnose([pad(name)], FLOWN, nominal["E8" if "E8" in name else "E9"])
     assert found.effects[0].name == first
@@ -112,6 +125,11 @@ def test_weights_are_named(pad, nominal, name, first):
 def test_a_further_normal_flight_is_none(pad, nominal):
     found = diagnose([pad("normal_flight_E9_log02")], FLOWN, nominal["E9"])
     assert (found.verdict, found.effects, found.ranking[0].name) == ("none", (), "none")
+
+
+def test_a_normal_flight_whose_position_was_measured_badly_is_none(pad, nominal):
+    found = diagnose([pad("normal_flight_E8_log03")], FLOWN, nominal["E8"][:3])  # 18 times their corrections
+    assert (found.verdict, found.effects) == ("none", ())
 
 
 def test_flights_of_one_condition_together(pad, nominal):
