@@ -11,15 +11,16 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import read
-from airtouch.logs.files import check_free
+from airtouch.logs.files import check_free, make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly as simulated
@@ -29,6 +30,7 @@ from tools.emulate.compare import report
 from tools.emulate.replay import VEHICLES, Replay, replay, rows
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
+NO_BASE = f"say where the firmware's sources are: make emulate CRAZYFLIE_BASE=~/crazyflie-firmware; {build.CLONE}"
 #: step -> parameters: three that are taken over, one out of range, the other detector and back
 CHANGES: dict[int, dict[str, float]] = {
     100: {"pFa": 1e-3}, 150: {"bandMid": 9.0}, 200: {"scoreIn": 99.0}, 250: {"detector": 0},
@@ -65,48 +67,92 @@ def show(what: str, seconds: float, result: Replay) -> None:
         print(f"  first difference: {result.first}")
 
 
-def positive(text: str) -> int:
-    """A whole number from 1 on, for argparse."""
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text} is less than 1")
-    return number
+def number(least: int) -> Callable[[str], int]:
+    """A whole number from `least` on, for argparse."""
+    def read_number(text: str) -> int:
+        try:
+            if (value := int(text)) >= least:
+                return value
+        except ValueError:
+            pass
+        raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} on")
+    return read_number
+
+
+class Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong with the command."""
+
+    def error(self, message: str) -> NoReturn:
+        """AirTouchError in place of a usage of seven lines."""
+        if "arguments are required" in message:
+            raise AirTouchError(NO_BASE)
+        raise AirTouchError(f"{message}; see python -m tools.emulate --help")
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command takes."""
-    found = argparse.ArgumentParser(prog="python -m tools.emulate", description=__doc__,
-                                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    """What the command takes. An option that is not given is None or False, so that `given` can refuse it where it
+    has no part."""
+    found = Parser(prog="python -m tools.emulate", description=__doc__,
+                   formatter_class=argparse.RawDescriptionHelpFormatter)
     found.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
     found.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
-    found.add_argument("--steps", type=positive, default=2400, help="of each flight (2400)")
-    found.add_argument("--begin", type=int, default=0, help="first row of each flight (0)")
-    found.add_argument("--built", action="store_true", help="take what `make firmware` built last")
-    found.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
-    found.add_argument("--height", action="store_true",
-                       help="closed loop over edges of every kind: the height kept or not")
-    found.add_argument("--seeds", type=positive, default=1, help="of --fly and --height: draws of the noise (1)")
+    what = found.add_mutually_exclusive_group()
+    what.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
+    what.add_argument("--height", action="store_true",
+                      help="closed loop over edges of every kind: the height kept or not")
+    what.add_argument("--gap8", action="store_true",
+                      help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
+    found.add_argument("--steps", type=number(1), help="of each recorded flight (2400)")
+    found.add_argument("--begin", type=number(0), help="first row of each recorded flight (0)")
+    found.add_argument("--seeds", type=number(1), help="of --fly and --height: draws of the noise (1)")
     found.add_argument("--traces", type=Path, help="of --fly: CSV for the first flight and the simulator's own")
-    found.add_argument("--force", action="store_true", help="overwrite that")
-    found.add_argument("--only", default="", help="of --height: cases whose names begin so")
+    found.add_argument("--force", action="store_true", help="of --traces: overwrite the file")
+    found.add_argument("--only", help="of --height: cases whose names begin so")
     found.add_argument("--keep", type=Path, help="of --height: folder of its flights; those that are there are not "
-                                                 "flown again")
-    found.add_argument("--gap8", action="store_true",
-                       help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
+                                                 "flown again, unless the image or the mission has changed")
+    found.add_argument("--built", action="store_true", help="take what `make firmware` built last")
     found.add_argument("--config", help="of firmware/app: app-config-tap and the like")
-    found.add_argument("--platform", default="cf2", choices=VEHICLES, help="of the firmware (cf2)")
+    found.add_argument("--platform", choices=VEHICLES, help="of the firmware (cf2)")
     return found
+
+
+def fits(options: argparse.Namespace) -> None:
+    """AirTouchError for an option that would have no effect."""
+    closed, begun = options.fly or options.height, f"--{'fly' if options.fly else 'height'}"
+    if options.flights and closed:
+        raise AirTouchError(f"{begun} flies the simulator's drone: leave out {options.flights[0]}")
+    if options.gap8 and len(options.flights) > 1:
+        raise AirTouchError(f"--gap8 takes one flight: leave out {options.flights[1]}")
+    if options.gap8 and options.platform not in (None, "cf2"):
+        raise AirTouchError(f"--gap8 compares the networks of the cf2: leave out --platform {options.platform}")
+    for name, of in (("traces", "fly"), ("only", "height"), ("keep", "height")):
+        if getattr(options, name) is not None and not getattr(options, of):
+            raise AirTouchError(f"--{name} is of --{of}: add it, or leave out --{name}")
+    for name in ("steps", "begin"):
+        if closed and getattr(options, name) is not None:
+            raise AirTouchError(f"--{name} is of a recorded flight, and {begun} flies none: leave it out")
+    if options.seeds is not None and not closed:
+        raise AirTouchError("--seeds is of --fly and --height, a recorded flight has one noise: leave it out")
+    if options.force and not options.traces:
+        raise AirTouchError("--force is of --traces: leave it out")
+    for name in ("config", "platform"):
+        if options.built and getattr(options, name) is not None:
+            raise AirTouchError(f"--built takes what was built last: leave out --{name}")
+    for name in ("height", "gap8"):
+        if getattr(options, name) and options.config and name not in options.config:
+            raise AirTouchError(f"--{name} needs app-config-{name}: leave out --config {options.config}")
 
 
 def given(options: argparse.Namespace) -> list[FlightLog]:
     """The flights of the command line from --begin on. AirTouchError, before anything is built, for what cannot be
     run."""
+    fits(options)
     check_free(options.traces, options.force)
-    if options.flights and (options.fly or options.height):
-        raise AirTouchError(f"--{'fly' if options.fly else 'height'} flies the simulator's drone: leave out "
-                            f"{options.flights[0]}")
-    if options.height:
-        height.cases(options.only)
+    options.begin, options.steps, options.seeds = options.begin or 0, options.steps or 2400, options.seeds or 1
+    options.only, options.platform = options.only or "", options.platform or "cf2"
+    height.cases(options.only)
+    if options.keep:
+        make_folder(options.keep)
     logs = [later(read(path), options.begin) for path in options.flights]
     for log in logs:
         rows(log)
@@ -129,7 +175,7 @@ def replayed(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
 
 def main(arguments: list[str]) -> int:
     """Build, run, print. 1 where a step differs."""
-    options = parser().parse_args(arguments)
+    options = parser().parse_intermixed_args(arguments)
     logs = given(options)
     build.tools()
     if not options.built:
@@ -149,8 +195,7 @@ def main(arguments: list[str]) -> int:
 if __name__ == "__main__":
     try:
         if len(sys.argv) < 2 or not sys.argv[1]:
-            raise AirTouchError(f"say where the firmware's sources are: make emulate "
-                                f"CRAZYFLIE_BASE=~/crazyflie-firmware; {build.CLONE}")
+            raise AirTouchError(NO_BASE)
         sys.exit(main(sys.argv[1:]))
     except AirTouchError as error:
         sys.exit(f"make emulate: {error}")

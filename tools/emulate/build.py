@@ -8,6 +8,7 @@ bootloader has in front of the firmware.
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -44,9 +45,9 @@ OWN, BOARDS, PAGE = 0x1FFF7000, 0x08001000, 0x1000
 
 
 def tools() -> None:
-    """AirTouchError where the compiler or QEMU is missing."""
+    """AirTouchError where the compiler, QEMU or another tool is missing."""
     for tool, package in (("arm-none-eabi-gcc", "gcc-arm-none-eabi libnewlib-arm-none-eabi"),
-                          ("qemu-system-arm", "qemu-system-arm")):
+                          ("qemu-system-arm", "qemu-system-arm"), ("git", "git"), ("make", "make")):
         if shutil.which(tool) is None:
             raise AirTouchError(f"no {tool}: apt-get install {package}")
 
@@ -59,19 +60,25 @@ def release(base: Path) -> str:
 
 def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf2") -> str:
     """`make firmware` of this checkout; what it printed. Another platform than cf2 gets FR-CFAR alone."""
-    checkout = (base / "tools/make/oot.mk").is_file()
+    if not (base / "tools/make/oot.mk").is_file():
+        raise AirTouchError(f"{base} is no checkout of bitcraze/crazyflie-firmware (no tools/make/oot.mk): {CLONE}")
     found = release(base) if (base / ".git").exists() else "unknown"
-    if checkout and found == "unknown":
+    if found == "unknown":
         raise AirTouchError(f"{base} does not say which release it is, and the board is written for {RELEASE}: {CLONE}")
-    if checkout and found.split("-")[0] != RELEASE:
+    if not re.fullmatch(rf"{RELEASE}(-\d+-g[0-9a-f]+)?", found):
         raise AirTouchError(f"{base} is {found}, the board is written for {RELEASE}: git -C {base} checkout {RELEASE}")
+    if sys.stderr.isatty():
+        print(f"compiling the firmware, {platform} with {config}: a minute", file=sys.stderr)
     networks = "" if platform == "cf2" else "no"
     run = subprocess.run(["make", "-C", ROOT, "--no-print-directory", "firmware", f"CRAZYFLIE_BASE={base}",
                           f"CONFIG={config}", f"PLATFORM={platform}", f"NETWORKS={networks}"],
                          capture_output=True, text=True)
     if run.returncode:
-        said = [line for line in run.stderr.splitlines() if line.startswith("make firmware: ")]
-        raise AirTouchError(said[0] if said else run.stderr[-2000:])
+        lines = run.stderr.splitlines()
+        said = [line.removeprefix("make firmware: ") for line in lines if line.startswith("make firmware: ")]
+        wrong = [line for line in lines if "error" in line.lower()] or lines or ["it did not say why"]
+        raise AirTouchError(said[0] if said else f"the firmware does not compile: {wrong[0]}; for all of it: make "
+                                                 f"firmware CRAZYFLIE_BASE={base} CONFIG={config} PLATFORM={platform}")
     return run.stdout
 
 

@@ -136,7 +136,10 @@ def _leg(elf: Path, case: Case, seed: int, on: int, platform: str, folder: Path 
     """Fly once, or take the flight from the folder, and print."""
     path = _kept_at(folder, elf, case, seed, on) if folder else None
     if path and path.exists():
-        leg = Leg(**json.loads(path.read_text()))
+        try:
+            leg = Leg(**json.loads(path.read_text()))
+        except (ValueError, TypeError):
+            raise AirTouchError(f"{path} is damaged: delete it, and it is flown again") from None
     else:
         flown = mission(case)
         one = fly(elf, flown, vehicle(platform), seed, parameters={"atHeight.enable": on}, blind_s=case.blind_s)
