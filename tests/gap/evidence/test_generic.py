@@ -1,5 +1,6 @@
 """The model without names: against closed forms, nominal flights of other seeds, and effects that nobody named."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -99,7 +100,8 @@ def test_torque_that_answers_the_commands_otherwise_shows_in_simulated_flights(s
     data = Data(study, flown(1, 50, {"inertia": {"fraction": 0.5}}))
     found = [generic.coefficients(generic.HalfResiduals(data, p, ()), 4, study.usual) for p in halves(data)]
     assert all(f[len(generic.BASIS):].any() for f in found)
-    recorded = [generic.coefficients(generic.HalfResiduals(data, p, ()), 4, study.usual, generic.BASIS)
+    among = np.arange(generic.WIDEST) < len(generic.BASIS)
+    recorded = [generic.coefficients(generic.HalfResiduals(data, p, ()), 4, study.usual, among)
                 for p in halves(data)]
     assert not any(f[len(generic.BASIS):].any() for f in recorded)
 
@@ -127,3 +129,30 @@ def test_clock_and_losses_count_as_unknown_only_where_they_are_not_named():
     np.testing.assert_allclose(share, 0.05, rtol=0.3)
     assert clock.clock_left(data, ()) == gain + more
     assert clock.clock_left(data, ("time_jitter", "packet_loss")) == 0.0
+
+
+def beside(study, term, given, seed):
+    """What columns gain beside an effect, without and with those that the effect itself makes."""
+    data = Data(study, flown(1, seed, {term.name: given}))
+    parts = halves(data)
+    fits = [fit.fit(data, p, [term]).terms for p in parts]
+    kept = generic.generic_gain(data, parts, fits)[0]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(generic, "_answerable", lambda *_: np.ones(generic.WIDEST, bool))
+        return kept, generic.generic_gain(data, parts, fits)[0]
+
+
+def test_what_answers_a_random_torque_is_not_new_beside_it(study):
+    """Torque of the motors' own noise is in the commands that fight it, so that what is left follows them."""
+    term = next(t for t in candidates.terms("motor_noise") if t.values["time"] == 0.02)
+    kept, asked = beside(study, term, {"rms": 0.003}, 51)
+    assert kept < 5.0 and asked > 20.0
+
+
+def test_how_changed_gains_turn_the_vehicle_about_its_yaw_axis_is_not_asked(study):
+    data, yaw = Data(study, flown(1, 52)), [generic.BASIS.index(n) for n in ("yaw", "d_yaw")]
+    for name, values, asked in (("controller_gain", {"attitude": 1.4}, False), ("mass", {"fraction": 0.1}, True)):
+        term = candidates.terms(name)[0]
+        term = replace(term, values={**term.values, **values})
+        assert (generic._answerable(data, [term], 5)[yaw] == asked).all()
+        assert generic._answerable(data, [term], 4).all()  # roll and pitch are modelled

@@ -24,6 +24,7 @@ STEP = 0.02  #: of a scaled parameter, over which slopes are taken
 TRIES = 5  #: of a step, each shorter than the one before (Levenberg-Marquardt)
 LEAST_DAMPING, CALMED = 0.01, 0.1  #: of a step after one that failed; by what a step that gains multiplies it
 FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew
+TURNS, SETTLED = 6, 0.3  #: in which mean and random effects are fitted, at most, and the gain below which no more are
 ROUNDS = 4  #: in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
 COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
@@ -56,12 +57,17 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     x = _start(problem, mean, start)
     offsets, covariance = np.zeros(0), np.zeros((0, 0))
     added: np.ndarray | float = 0.0
-    for _ in range(2 if random and mean and start is None else 1):
-        if random and mean and start is not None:
-            added = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
+    if random and mean and start is not None:
+        added = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
+    before = -np.inf
+    for _ in range(TURNS if random and mean else 1):
         x, offsets, covariance, values = _gauss_newton(problem, mean, x, added, prior, bool(random))
         told, cost = problem.commanded(_active(mean, x), bool(random))
         added = _random_power(problem, random, values, _active(mean, x)) if random else 0.0
+        reached = problem.likelihood(values, added + told) - cost
+        if reached < before + SETTLED:
+            break
+        before = reached
     if random:
         told, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
     fitted, place = [], 0

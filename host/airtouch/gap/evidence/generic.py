@@ -22,7 +22,7 @@ from airtouch.gap.evidence.problem import BANDS_HZ, GROUPS, Part, Problem, probl
 from airtouch.gap.signals.channels import COUNT, TORQUE
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, blocks, frequencies, squared
-from airtouch.gap.signatures.candidates import Term
+from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
 
 CHANNELS = 9  #: that are regressed: force, torque, rate
 ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
@@ -32,6 +32,8 @@ LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
 WIDEST = len(BASIS) + LOOP
 LIFT, OF_HEIGHT = 2, ("height", "low", "high")  #: channel of the force along the thrust; columns of the height
 NOTHING = 1e-9  #: variance of a coefficient that has no scatter
+#: columns of the command that turns the vehicle about each axis of the torque
+OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
 ROUNDS = 3
 MOST_COLUMNS = 4  #: of one channel
 SURE = 3.0  #: standard deviations by which coefficients must scatter more than chance has them do
@@ -162,6 +164,23 @@ class HalfResiduals:
         return over, self.problem.freedom[known], self.problem.tail[known], self.groups[known]
 
 
+def _answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
+    """Whether a column says something new beside a hypothesis, bool (WIDEST,).
+
+    A random torque is in the commands that answer it: what is left follows these, as it should. And how a changed loop
+    turns the vehicle about its yaw axis upon a command is not modelled.
+    """
+    out = np.ones(WIDEST, bool)
+    out[len(BASIS):] = data.study.simulated
+    law, yaw = data.study.controller, TORQUE.stop - 1
+    if any(t.kind == SPECTRUM for t in terms):
+        out[OF_COMMAND.get(channel, [])] = False
+        out[len(BASIS):] = False
+    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.kind == MEAN]):
+        out[OF_COMMAND[yaw]] = False
+    return out
+
+
 def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:
     out = []
     channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
@@ -177,17 +196,17 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[_Cell]:
     return out
 
 
-def coefficients(half: HalfResiduals, channel: int, usual: Usual, among: Sequence[str] = ()) -> np.ndarray:
+def coefficients(half: HalfResiduals, channel: int, usual: Usual, among: np.ndarray | None = None) -> np.ndarray:
     """Coefficients (WIDEST,) that a channel asks for, one column after another; zero for the others.
 
-    among: of the basis, the columns that may be asked for; all columns by default.
+    among (WIDEST,): the columns that may be asked for; all by default.
     """
     cells = [c for c in half.cells if c.channel == channel]
     found = np.zeros(WIDEST)
     if not cells:
         return found
     n = cells[0].free
-    every = [BASIS.index(name) for name in among] or list(range(n))
+    every = [k for k in range(n) if among is None or among[k]]
     left = [half.values[c.own] for c in cells]
     for _ in range(ROUNDS):  # of weights
         told, right = np.zeros((n, n)), np.zeros(n)
@@ -245,7 +264,7 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
         a, b = (HalfResiduals(data, parts[k], terms[train]) for k in (train, test))
         left = [h.values.copy() for h in (a, b)]
         for channel in range(CHANNELS):
-            found = coefficients(a, channel, usual, () if data.study.simulated else BASIS)
+            found = coefficients(a, channel, usual, _answerable(data, terms[train], channel))
             for k, h in enumerate((a, b)):
                 for cell in (c for c in h.cells if c.channel == channel):
                     left[k][cell.own], _ = h.without(cell, found, usual)
@@ -259,7 +278,8 @@ def height_gain(data: Data, parts: Sequence[Part]) -> float:
     """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
     usual = data.study.usual or nothing_usual()
     halves = [HalfResiduals(data, part, ()) for part in parts]
-    return sum(_linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, usual, OF_HEIGHT), usual)
+    among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
+    return sum(_linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, usual, among), usual)
                for train, test in ((0, 1), (1, 0)))
 
 

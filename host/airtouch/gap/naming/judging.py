@@ -73,11 +73,20 @@ def price_of(terms: Sequence[Term]) -> float:
 
 
 def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choice: float) -> Judged:
-    """Fit on each half, judge on the other; choice: what the choice of this variant costs."""
+    """Fit on each half, judge on the other; choice: what the choice of this variant costs.
+
+    Beside a random effect the commands' floor is less certain, so what is chosen already gains less than it did; the
+    newcomer is not charged with that.
+    """
     held = chosen.terms if chosen else ()
     joint = (*held, *terms)
     timed = [t for t in terms if t.kind == CLOCK]
     paid = choice + (chosen.choice if chosen else 0.0)
+    beyond = chosen.beyond if chosen else 0.0
+    wider = 0.0
+    if chosen and chosen.fits and not _has_random(held) and _has_random(terms):
+        wider = sum(gain_of(on, test, chosen.fits[train].terms) - gain_of(on, test, chosen.fits[train].terms, True)
+                    for train, test in ROUND_TRIP)
     gain, fits = 0.0, []
     if chosen and not [t for t in terms if t.kind != CLOCK]:
         gain, fits = chosen.gain, list(chosen.fits)
@@ -89,7 +98,7 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
             refined = _refined(on.data, part, fit(on.data, part, others, _start(chosen, others, train)))
             gain += gain_of(on, test, refined.terms) if others else 0.0
             fits.append(refined)
-        gain -= price_of(refined.terms if others else ()) + paid
+        gain += beyond + wider - price_of(refined.terms if others else ()) - paid
     fitted = list(fits[0].terms) if fits else []
     for t in (t for t in joint if t.kind == CLOCK):
         on_clock, clock_nats = clock_gain(on.data, t)
@@ -97,12 +106,19 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
         gain += clock_nats if t in timed else 0.0
     strength, covariance, apart = strength_of(telling(terms), fitted, fits)
     return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, covariance=covariance,
-                  apart=apart)
+                  apart=apart, beyond=beyond + wider)
 
 
-def gain_of(on: Trial, half: int, terms: Sequence[Term]) -> float:
-    """Log likelihood that fitted effects add on a half, over no effect as sure of the commands' floor."""
-    return judge(on.data, on.parts[half], terms) - on.base[any(t.kind == SPECTRUM for t in terms)][half]
+def _has_random(terms: Sequence[Term]) -> bool:
+    return any(t.kind == SPECTRUM for t in terms)
+
+
+def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
+    """Log likelihood that fitted effects add on a half, over no effect as sure of the commands' floor.
+
+    wide: that floor is as uncertain as under random effects, though there are none.
+    """
+    return judge(on.data, on.parts[half], terms, wide) - on.base[wide or _has_random(terms)][half]
 
 
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -36,6 +36,8 @@ class Judged:
     fits: tuple[Fit, ...] = ()
     full: bool = True  #: fitted in full, not to first order only
     choice: float = 0.0  #: of the gain, what the choice of the effects' variants has cost
+    #: of the gain, what effects before the first random one gained while the commands' floor was more certain
+    beyond: float = 0.0
     strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     apart: np.ndarray | float = 0.0

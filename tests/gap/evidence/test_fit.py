@@ -1,0 +1,39 @@
+"""Fits of a mean effect with its random part: wherever they begin, they end where the likelihood is highest."""
+
+import numpy as np
+import pytest
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.naming import judging
+from airtouch.gap.naming.selection import Judged
+from airtouch.gap.signatures import candidates
+from gap_flights import flown
+
+
+@pytest.mark.parametrize("start", [0.05, 3.0])
+def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start):
+    given = {"strength": 1.0, "turbulence": 0.3}
+    data = Data(study, flown(1, 53, {"ground_effect": given}))
+    (mean,) = candidates.terms("ground_effect")[:1]
+    terms = (mean, candidates.random_part_of("ground_effect"))
+    whole = whole_of(data)
+    free, begun = fit(data, whole, terms), fit(data, whole, terms, np.array([start]))
+    assert begun.gained == pytest.approx(free.gained, abs=1.0)
+    assert begun.scaled == pytest.approx(free.scaled, rel=0.03)
+    assert begun.terms[1].values["turbulence"] == pytest.approx(free.terms[1].values["turbulence"], rel=0.03)
+
+
+def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(study):
+    """Beside a random effect the commands' floor is less certain: a changed gain, seen in them alone, gains less."""
+    data = Data(study, flown(1, 54, {"controller_gain": {"height": 0.5}}))
+    on = judging.trial_of(data)
+    gain = next(t for t in candidates.terms("controller_gain") if "height" in t.free)
+    chosen = judging.crossed(on, "controller_gain", (gain,), None, 0.0)
+    certain, uncertain = (sum(judging.gain_of(on, test, chosen.fits[train].terms, wide)
+                              for train, test in judging.ROUND_TRIP) for wide in (False, True))
+    assert isinstance(chosen, Judged) and certain > uncertain + 10.0
+    both = judging.crossed(on, "vibration", (candidates.terms("vibration")[0],), chosen, 0.0)
+    assert both.gain == pytest.approx(chosen.gain, abs=2.0)
+    assert both.beyond == pytest.approx(certain - uncertain)
