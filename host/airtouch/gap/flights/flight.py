@@ -78,7 +78,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     Raises AirTouchError, with the file and the remedy, without motor commands or
     accelerations, when the clock runs backwards, and when there is no flight in it.
     """
-    name, notes, cannot = log.source, [], []
+    name, notes = log.source, []
     if nothing_logged(log):
         raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
     log, unfit = _sane(log)
@@ -90,10 +90,36 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
                                 "compares what the motors were told with what the IMU felt")
     log = _at_100_hz(log, name)
     log, clock, lost = _regular(log, name)
+    if _stamped_at_arrival(log):
+        clock = np.zeros_like(clock)
+    cannot = _cannot(log)
+    angles = motion.attitude(log, PERIOD_S)
+    turn = as_matrix(*angles.T)
+    force = _body_force(log, turn, vehicle.gravity_mps2)
+    phase = _phases(log)
+    pwm = motion.held(log.stack(PWM))
+    if (phase != GROUND).sum() * PERIOD_S < LEAST_AIR_S:
+        raise AirTouchError(f"{name}: no flight in it ({(phase != GROUND).sum() * PERIOD_S:.1f} s in the air); "
+                            f"at least {LEAST_AIR_S:g} s are needed")
+    signals, touching = _signals(log, angles, turn, phase, vehicle)
+    rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
+    usable = ~lost & ~_near_contact(phase, pwm) & ~_knocks(force, (phase == GROUND) & (pwm.max(axis=1) <= 0.0))
+    usable &= ~_jolts(force, rates, phase != GROUND)
+    return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
+                  touching, tuple(notes), cannot)
+
+
+def _stamped_at_arrival(log: FlightLog) -> bool:
+    """Whether the host stamped the rows: the authors' logs."""
+    return str(log.meta.get("format", "")).startswith("authors")
+
+
+def _cannot(log: FlightLog) -> tuple[str, ...]:
+    """Sentences on what no diagnosis of this log can tell, for want of a channel or of an edge."""
+    cannot = []
     if not log.has(*GYRO):
         cannot.append("no gyro: torque only at low frequency, from the balance of the motors")
-    if str(log.meta.get("format", "")).startswith("authors"):
-        clock = np.zeros_like(clock)
+    if _stamped_at_arrival(log):
         cannot.append("logged times are those of arrival at the host: the drone's own clock cannot be judged")
     if not log.has("zrange_m"):
         cannot.append("no down range: range steps and flow scale cannot be seen; the floor is taken as flat, and the "
@@ -104,39 +130,49 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
         cannot.append("no edge crossed: range steps and flow scale cannot be seen")
     if not log.has("vx_mps", "vy_mps"):
         cannot.append("no velocity: drag, flapping and wind cannot be told from a constant push")
-    angles = motion.attitude(log, PERIOD_S)
-    known = log.with_columns(dict(zip(ATTITUDE, angles.T, strict=True)))
-    turn = as_matrix(*angles.T)
+    return tuple(cannot)
+
+
+def _body_force(log: FlightLog, turn: np.ndarray, gravity: float) -> np.ndarray:
+    """Specific force (n, 3) m/s^2 in body axes. turn: (n, 3, 3) body to world; gravity: m/s^2.
+
+    Of logs in world axes, some have gravity already subtracted: it is added again.
+    """
     force = motion.held(log.stack(ACC))
     if log.meta.get("acc_frame") == "world":
         force = np.einsum("nji,nj->ni", turn, force)
-        if np.median(force[:, 2]) < 0.5 * vehicle.gravity_mps2:
-            force += np.einsum("nji,j->ni", turn, [0.0, 0.0, vehicle.gravity_mps2])
+        if np.median(force[:, 2]) < 0.5 * gravity:
+            force += np.einsum("nji,j->ni", turn, [0.0, 0.0, gravity])
+    return force
+
+
+def _phases(log: FlightLog) -> np.ndarray:
+    """Phase of each sample, int8 (n,): places in `segments.KINDS`."""
     phase = np.zeros(len(log), np.int8)
     for part in segments(log):
         phase[part.start:part.stop] = KINDS.index(part.kind)
-    pwm = motion.held(log.stack(PWM))
-    if (phase != GROUND).sum() * PERIOD_S < LEAST_AIR_S:
-        raise AirTouchError(f"{name}: no flight in it ({(phase != GROUND).sum() * PERIOD_S:.1f} s in the air); "
-                            f"at least {LEAST_AIR_S:g} s are needed")
+    return phase
+
+
+def _signals(log: FlightLog, angles: np.ndarray, turn: np.ndarray, phase: np.ndarray, vehicle: Vehicle,
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Signals (n, COUNT) for effects, and `Flight.touching`. angles: (n, 3) rad, as the columns of ATTITUDE."""
+    known = log.with_columns(dict(zip(ATTITUDE, angles.T, strict=True)))
     signals = replay.signals_of(FlightLog({k: motion.held(v) for k, v in known.columns.items()}, known.meta),
                                 vehicle, (), PERIOD_S)
     row = prepare(vehicle, ())[0][0]
+    standing = row["range_below_rotors"] + row["leg_below_range"]  # height of the rotors
     heights = motion.rotor_heights(log, turn, row["rotor_x"], row["rotor_y"], row["range_below_rotors"],
-                                   row["range_below_rotors"] + row["leg_below_range"], phase == GROUND, PERIOD_S)
-    if heights is not None:
-        signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
-        signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
+                                   standing, phase == GROUND, PERIOD_S)
     touching = np.zeros(len(log), bool)
-    if heights is not None and not log.has("zrange_m"):
-        standing = row["range_below_rotors"] + row["leg_below_range"]
+    if heights is None:
+        return signals, touching
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = heights
+    signals[:, at.UPPER_HEIGHT:at.UPPER_HEIGHT + 4] = heights
+    if not log.has("zrange_m"):
         low = (phase != GROUND) & (heights.mean(axis=1) < standing + TOUCH_M)
         touching = np.convolve(low, np.ones(2 * int(TOUCH_S / PERIOD_S) + 1), "same") > 0.5
-    rates = motion.held(log.stack(GYRO)) if log.has(*GYRO) else None
-    usable = ~lost & ~_near_contact(phase, pwm) & ~_knocks(force, (phase == GROUND) & (pwm.max(axis=1) <= 0.0))
-    usable &= ~_jolts(force, rates, phase != GROUND)
-    return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
-                  touching, tuple(notes), tuple(cannot))
+    return signals, touching
 
 
 def _sane(log: FlightLog) -> tuple[FlightLog, list[str]]:
