@@ -171,7 +171,7 @@ class Slopes:
         size = sum(len(t.free) for t in mean)
         self.at = np.full(size, np.inf)  #: scaled parameters (k,) at which they were taken
         self.columns = [np.zeros(0)] * size
-        self.rises, self.doubts = [np.zeros(0)] * size, [np.zeros(0)] * size
+        self.rises, self.powers = [np.zeros(0)] * size, [np.zeros(0)] * size
         self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
 
     def take(self, x: np.ndarray, anew: bool = False) -> None:
@@ -181,7 +181,7 @@ class Slopes:
         if not len(moved):
             return
         before = _active(self.mean, x)
-        values, doubt = self.problem.values(before), self.problem.doubt(before)
+        values, power = self.problem.values(before), self.problem.of_torque(before)
         for i in moved:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
             there = x.copy()
@@ -189,7 +189,7 @@ class Slopes:
             after = _active(self.mean, there)
             self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.commands.rise(before, after) / step
-            self.doubts[i] = (self.problem.doubt(after) - doubt) / step
+            self.powers[i] = (self.problem.of_torque(after) - power) / step
             self.bent[i] = self.problem.bends(before, after)
         self.at = x.copy() if anew else self.at
 
@@ -201,11 +201,11 @@ class Slopes:
         """
         problem = self.problem
         gradient, information = problem.commands.slopes(_active(self.mean, x), np.array(self.rises), wide)
-        doubts = np.array(self.doubts)
-        if doubts.any():
+        powers = np.array(self.powers)
+        if powers.any():
             push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))
-            gradient = gradient + doubts @ push
-            information = information + (doubts * weight) @ doubts.T
+            gradient = gradient + powers @ push
+            information = information + (powers * weight) @ powers.T
         return gradient, information
 
 

@@ -16,7 +16,7 @@ from scipy.special import exp1
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data, spectra, step_doubt
-from airtouch.gap.loop.closed_loop import COMMAND_ONLY
+from airtouch.gap.loop.closed_loop import COMMAND_ONLY, Change
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
@@ -126,7 +126,7 @@ class Problem:
     def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: CommandView."""
         power, cost = self.commands.power([a for a in active if not a.gate], wide)
-        return np.concatenate([self.doubt(active), power - self.commands.floor]), cost
+        return np.concatenate([self.of_torque(active), power - self.commands.floor]), cost
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
         """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
@@ -135,15 +135,29 @@ class Problem:
         told, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + told, cost
 
-    def doubt(self, active: Sequence[Active]) -> np.ndarray:
-        """Power (own,) of what the loop model may be wrong by in the torque that it changes."""
+    def of_torque(self, active: Sequence[Active]) -> np.ndarray:
+        """Power (own,) that effects of the loop add to the floor of the torque: what another loop makes of noise, less
+
+        what this one does, and what the loop model may be wrong by.
+        """
         law = self.data.study.controller
         loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
         if not self.own or not loop or not law.changes_loop(loop):
             return np.zeros(self.own)
         change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
         steps = step_doubt(self.data, loop)
-        return DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else self._gather(steps).real)
+        doubt = DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else self._gather(steps).real)
+        return doubt + self.power[:self.own] * self._noise(law.torque_change(loop, frequencies(AIR)))
+
+    def _noise(self, change: Change) -> np.ndarray:
+        """By what a changed loop multiplies the torque's floor (own,), less 1, as far as it is noise of the loop."""
+        before, after = change.left
+        table = np.zeros((len(before), COUNT))
+        nominal = self.data.study.floor.power[AIR][:, TORQUE]
+        table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]
+        parts = [np.tile(table[self.keep[AIR]], int(chosen.sum())) if regime == AIR else
+                 np.zeros(self._size((i, regime, chosen))) for i, regime, chosen in self.part.pieces]
+        return np.concatenate(parts) if parts else np.zeros(0)
 
     def bends(self, before: Sequence[Active], after: Sequence[Active]) -> bool:
         """Whether the loops of roll and pitch differ between two hypotheses."""

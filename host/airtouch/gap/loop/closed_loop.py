@@ -28,7 +28,14 @@ from airtouch.gap.loop.disturbed import logged_over_flown
 from airtouch.gap.loop.edge_response import EdgeFloor
 from airtouch.gap.loop.loop_model import excess_phase, of_loop, torque_per_command
 from airtouch.gap.loop.noise_spectra import spectra
-from airtouch.gap.loop.turning import NO_STEP, Step, step_of, step_under, turnings_per_command
+from airtouch.gap.loop.turning import (
+    NO_STEP,
+    Step,
+    step_of,
+    step_under,
+    turning_beside_command,
+    turnings_per_command,
+)
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -50,7 +57,8 @@ class Change(NamedTuple):
 
     torque that turns the vehicle, (2, bins, 3), which the loop model had at `before`: level, and stepped.
     cut (bins, 3): size of that part of the change of stepped blocks which the limits of the command make.
-    logged (bins, 1): `disturbed.logged_over_flown`.
+    logged (bins, 1): `disturbed.logged_over_flown`. left (2, bins, 3): power of the torque that the commands do not
+    tell, before and after, (rad/s^2)^2/Hz.
     """
 
     motors: np.ndarray
@@ -58,6 +66,7 @@ class Change(NamedTuple):
     before: np.ndarray
     cut: np.ndarray
     logged: np.ndarray
+    left: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -119,7 +128,8 @@ class ClosedLoop:
         motors = self._torque(row, AXES[1], f) / self._torque(first, AXES[1], f)
         share /= np.maximum(np.abs(share) / MOST_CHANGE, 1.0)
         logged = logged_over_flown(firmware(first, AXES[1]), f)
-        return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]), logged[:, None])
+        return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]), logged[:, None],
+                      np.stack([self._left(first, f), self._left(row, f)]))
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
@@ -165,6 +175,17 @@ class ClosedLoop:
         step = step_under(usual, controller, self._plain, row)
         each = turnings_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, (NO_STEP, step, usual))
         return np.stack(each) / self._torque(row, AXES[i], f)
+
+    def _left(self, row: Any, f: np.ndarray) -> np.ndarray:
+        """Power (bins, 3) of the torque that the commands do not tell, (rad/s^2)^2/Hz; 1 in yaw, which has no model."""
+        left = np.ones((len(f), 3))
+        for i, axis in enumerate(AXES[1:] if self.by_firmware else ()):
+            left[:, i] = self._of_axis("left", row, axis, f, partial(self._left_of, row, i + 1, f))
+        return left
+
+    def _left_of(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
+        """`_left` of axis i, (bins,)."""
+        return turning_beside_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH)
 
     def with_steps(self, told: np.ndarray, over: np.ndarray, f: np.ndarray) -> "ClosedLoop":
         """The same with `steps`, from blocks of nominal flights in which a set-point stepped.

@@ -13,6 +13,7 @@ from airtouch.gap.loop.noise_spectra import FOLDS, aliases_of, difference, kick_
 
 KICKS = np.linspace(1.0, 0.0, 21)  #: shares that are tried of a step's first sample
 STEP_HZ = (1.5, 14.0)  #: where they are fitted
+GYRO_FOLDS = tuple(k for k in range(-5, 5) if k)  #: multiples of the log's rate below half of the IMU's
 UNCUT = 0.95  #: share of a kick from which the command's limits do not cut it
 #: of the gains, with which what is left of a cut kick falls: so it does in ten pairs of simulated flights each with
 CUT_POWER = 0.6  #: attitude gains of 0.5 to 1.5 and rate gains of 0.8 to 1.3
@@ -47,7 +48,7 @@ def turnings_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarr
     """`turning_per_command` for each of several steps."""
     at = np.maximum(f, 0.05)
     parts = loop_parts(c, row, axis, at)
-    cross, power = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
+    cross, power, _ = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
     made = {NO_STEP: (cross, power)}
     known = [s for s in dict.fromkeys(steps) if s.power]
     for s, stepped in zip(known, _stepped(c, row, at, parts, [s.kick for s in known]), strict=True):
@@ -65,19 +66,43 @@ def _with_steps(cross: np.ndarray, power: np.ndarray, amount: float, logged: np.
     return cross + amount * turned * logged.conj(), power + amount * np.abs(logged) ** 2
 
 
-def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray, parts: Parts,
-                        ) -> tuple[np.ndarray, np.ndarray]:
-    """S_yu and S_uu (sources, bins) of the angular acceleration and the logged command for noise of unit power.
+def turning_beside_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray,
+                           width: float = 0.0) -> np.ndarray:
+    """Power (bins,) of the angular acceleration that a logged command does not tell, rad^2/s^4/Hz.
 
-    parts: of the loop at f, no lower than 0.05 Hz.
+    S_yy - |S_yu|^2 / S_uu of roll or pitch for noise of given strengths (sources,); width: as for
+    `turning_per_command`. It is the noise of the gyro, and what the loop does of noise between two rows of the log.
+    """
+    parts = loop_parts(c, row, axis, np.maximum(f, 0.05))
+    spectra = [strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts)]
+    if width > 0.0:
+        spectra = [gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in spectra]
+    cross, power, turning = spectra
+    return turning - np.abs(cross) ** 2 / power
+
+
+def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray, parts: Parts,
+                        ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """S_yu, S_uu and S_yy (sources, bins) of the angular acceleration y and the logged command u for noise of unit
+
+    power. parts: of the loop at f, no lower than 0.05 Hz.
     """
     logged, turned = transfers(c, row, np.maximum(f, 0.05), parts)
     cross, aliases = turned * logged.conj(), aliases_of(c, row, axis, f)
-    for k, folded in zip(FOLDS[1:], aliases, strict=False):  # noise of the gyro folds into log and command alike
-        beyond = f + k / PERIOD_S
-        both = folded.conj() / butterworth(2j * np.pi * np.abs(beyond), c.chip_hz)
-        cross[0] += difference(f) * np.where(beyond < 0.0, both.conj(), both)
-    return cross, with_aliases(np.abs(logged) ** 2, aliases)
+    turning = np.abs(turned) ** 2
+    folds = GYRO_FOLDS if len(aliases) else ()
+    for k in folds:  # noise of the gyro folds into the log
+        turning[0] += np.abs(_sensed(c, f, k)) ** 2
+    for k, folded in zip(FOLDS[1:], aliases, strict=False):  # and into the command alike
+        cross[0] += _sensed(c, f, k) * np.where(f + k / PERIOD_S < 0.0, folded, folded.conj())
+    return cross, with_aliases(np.abs(logged) ** 2, aliases), turning
+
+
+def _sensed(c: Controller, f: np.ndarray, k: int) -> np.ndarray:
+    """Angular acceleration (bins,) that the log shows at f for noise of the gyro k times the log's rate above it."""
+    beyond = f + k / PERIOD_S
+    sensed = 1.0 / butterworth(2j * np.pi * np.abs(beyond), c.chip_hz)
+    return difference(f) * np.where(beyond < 0.0, np.conj(sensed), sensed)
 
 
 def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, over: np.ndarray,
@@ -92,7 +117,7 @@ def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.nda
         return NO_STEP
     at = np.maximum(f, 0.05)
     parts = loop_parts(c, row, axis, at)
-    cross, noise = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
+    cross, noise, _ = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
     best, least = NO_STEP, np.inf
     for kick, (logged, turned) in zip(KICKS, _stepped(c, row, at, parts, KICKS), strict=True):
         step = Step(float(np.median(((over - 1.0) * noise / np.abs(logged) ** 2)[known])), float(kick))
