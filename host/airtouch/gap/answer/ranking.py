@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from airtouch.gap.answer.named_effects import chosen_effects
-from airtouch.gap.answer.shrink import Cells, Shrink, shrink_of
+from airtouch.gap.answer.shrink import Cells, Shrink, nearer, shrink_of
 from airtouch.gap.answer.unexplained import why_not
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import FIRST_GAIN
@@ -13,23 +13,22 @@ from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import CLOCK
 
 AT_FLOOR = 1.0  #: gap that is at its floor
-CALMED = 0.5  #: of how far a flight is below the floor, that effects named may leave
 CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
 
 
-def verdict_of(selection: Selection, gap: Shrink, simulated: bool) -> str:
+def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> str:
     """What does not stand over the floor is nothing, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
-    in both halves of the data, in whose common part the gap is measured. simulated: the flights are a simulator's;
-    there a flight calmer than nominal ones, which the effects named bring to the floor, has them, and no nominal flight
-    has odd times; a recorded one had calm air or a poor link.
+    in both halves of the data, in whose common part the gap is measured. In a simulator's flights some bands may be
+    calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no nominal
+    flight has odd times. A recorded one had calm air or a poor link.
     """
-    calmed = simulated and abs(gap.after - AT_FLOOR) < CALMED * abs(gap.before - AT_FLOOR)
-    odd_times = simulated and selection.of_times > selection.allowed
     apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if gap.before <= AT_FLOOR and not (apart or calmed or odd_times):
-        return "none"
+    if gap.before <= AT_FLOOR and not apart:
+        odd_times = selection.of_times > selection.allowed
+        if not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, cells)):
+            return "none"
     if not selection.explained:
         return "unknown"
     return "none" if selection.chosen is None else "effect"
@@ -39,7 +38,7 @@ def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked]
     """Every candidate with probability and shrink, best first; the shrink of what was chosen; verdict and effects."""
     parts = selection.parts
     overall = shrink_of(data, parts, selection.chosen, cells)
-    verdict = verdict_of(selection, overall, data.study.simulated)
+    verdict = verdict_of(data, selection, overall, cells)
     effects = chosen_effects(data, selection) if verdict == "effect" else []
     answer = effects[0].name if effects else verdict
     chance = agreeing(probabilities(selection, verdict == "none"), answer)
@@ -51,7 +50,8 @@ def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked]
             share = overall.share
         elif one is not None and one.full and one.gain > FIRST_GAIN:
             share = shrink_of(data, parts, one, cells).share
-        out.append(Ranked(name, float(p), share, why_not(selection, name, verdict)))
+        nats = None if one is None else float(one.gain)
+        out.append(Ranked(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
     return out, overall, verdict, effects
