@@ -34,17 +34,18 @@ class Found:
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate: its probability, the share of the gap that it takes away on held-out data, and why it is not the
-    answer."""
+    """A candidate: its probability, the share of the gap that it takes away on held-out data, why it is not the
+    answer, and the log likelihood (nats) that held-out data gain by it alone."""
 
     name: str
     probability: float
     shrink: Quantity
     why: str = ""
+    nats: float | None = None
 
     def plain(self) -> dict[str, Any]:
-        why = {"why": self.why} if self.why else {}
-        return {"name": self.name, "probability": self.probability, "shrink": self.shrink.plain(), **why}
+        more = ({"why": self.why} if self.why else {}) | ({} if self.nats is None else {"nats": self.nats})
+        return {"name": self.name, "probability": self.probability, "shrink": self.shrink.plain(), **more}
 
 
 @dataclass(frozen=True)

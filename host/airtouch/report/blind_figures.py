@@ -37,7 +37,9 @@ def rows(score: Mapping[str, Any]) -> Rows:
         goals = ("at least 0.95", "at most 5 %") if group == "all" else ("", "")
         out.append((f"effect left out, {group}: AUROC of unknown", f"{part['auroc']:.3f}" if part["auroc"] is not None
                     else "", str(part["wrong_name"]["n"]), goals[0]))
-        add(f"effect left out, {group}: given a wrong name", part["wrong_name"], goals[1])
+        add(f"effect left out, {group}: given a wrong name", part["wrong_name"])
+        add(f"effect left out, {group}: the same where the data tell the two apart", part.get("wrong_name_told_apart"),
+            goals[1])
     add("shrink with the right effect", score["shrink"]["right"], "at least 90 %")
     add("shrink with a wrong effect", score["shrink"]["wrong"], "at most 20 %")
     add("parameters: median relative error", score["parameters"]["error"], "at most 10 %")

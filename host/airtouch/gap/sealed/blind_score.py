@@ -2,13 +2,14 @@
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.sealed.blind import alike
 from airtouch.gap.sealed.blind_severity import SEEN
 from airtouch.gap.signatures.candidates import terms
@@ -105,14 +106,29 @@ def top(case: Case | None, name: str, first: int) -> bool:
 
 
 def unknown(single: Mapping[str, Any], plain: Mapping[str, Case], cases: Sequence[Case]) -> dict[str, Any]:
-    """Effects taken out of the registry: is `unknown` said, is it likelier than where they are in."""
+    """Effects taken out of the registry: is `unknown` said, is it likelier than where they are in.
+
+    wrong_name_told_apart: among those flights whose data tell the effect from the names that it was given.
+    """
     out = {_name(c): c for c in cases if c.get("without") and _name(c) in single}
     groups = {"all": list(out), **{LEVELS[i]: [n for n in out if single[n]["level"] == i] for i in range(3)}}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
     return {g: {"said_unknown": share(out[n]["verdict"] == "unknown" for n in names),
                 "wrong_name": share(out[n]["verdict"] == "effect" for n in names),
+                "wrong_name_told_apart": share(out[n]["verdict"] == "effect" for n in names
+                                               if told_apart(plain.get(n), single[n]["name"], _named(out[n]))),
                 "auroc": auroc([score[n] for n in names], [_chance(plain[n], "unknown") for n in names if n in plain])}
             for g, names in groups.items() if names}
+
+
+def told_apart(case: Case | None, true: str, named: Iterable[str]) -> bool:
+    """Whether held-out data gain more by an effect than by others together: as much as a first effect must gain.
+
+    case: the diagnosis with all effects. True where no others are named, and where the gains are not known.
+    """
+    gained = {r["name"]: r["nats"] for r in case["ranking"] if "nats" in r} if case else {}
+    others = [gained.get(n, 0.0) for n in named]
+    return not others or true not in gained or gained[true] - sum(others) >= FIRST_GAIN
 
 
 def auroc(positive: Sequence[float], negative: Sequence[float]) -> float | None:
