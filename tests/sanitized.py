@@ -12,7 +12,7 @@ from objects import compiled
 
 ROOT = Path(__file__).parents[1]
 INCLUDES = [f"-I{ROOT / folder}" for folder in ("firmware/kernels", "firmware/link", "gap8/kernels", "gap8/model",
-                                                "gap8/app/src")]
+                                                "gap8/app/src", "tests")]
 #: both ends of the link and the networks behind it
 SOURCES = [*sorted((ROOT / "firmware" / "link").glob("*.c")), ROOT / "firmware/kernels/feature_window.c",
            *sorted((ROOT / "gap8" / "kernels").glob("*.c")), *sorted((ROOT / "gap8" / "app" / "src").glob("gap8_*.c")),

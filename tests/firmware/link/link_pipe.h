@@ -1,13 +1,11 @@
 // A pipe of bytes whose faults a script orders: packets that are lost, doubled, cut, damaged, late or made up.
 #pragma once
 
-#include <stdbool.h>
 #include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "edge_link.h"
+#include "promise.h"
 
 #define QUEUE 64
 #define ROOM 160  // of a packet on the pipe: faults may lengthen it
@@ -27,20 +25,6 @@ typedef struct {
   const uint8_t *at;
   size_t left;
 } script_t;
-
-static uint32_t noise = 1;
-
-static void check(bool good, const char *what) {
-  if (!good) {
-    fprintf(stderr, "broken promise: %s\n", what);
-    abort();
-  }
-}
-
-static uint8_t random8(void) {
-  noise = noise * 1664525u + 1013904223u;
-  return (uint8_t)(noise >> 24);
-}
 
 static uint8_t next(script_t *script) {
   if (script->left == 0) {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "gap8_core.h"
+#include "promise.h"
 #include "stream_window.h"
 
 #define STEPS 300  // of a session without faults: longer than any window
@@ -18,20 +19,6 @@ static const struct {
 } sessions[GAP8_NETWORKS] = {{AIRTOUCH_STREAM_SHA256, EDGE_LINK_BEST},
                              {AIRTOUCH_MODEL_SHA256, EDGE_LINK_PAPER},
                              {AIRTOUCH_ROLLING_SHA256, EDGE_LINK_PAPER_STREAM}};
-static uint32_t noise = 1;
-
-static void check(bool good, const char *what) {
-  if (!good) {
-    fprintf(stderr, "broken promise: %s\n", what);
-    abort();
-  }
-}
-
-static uint8_t random8(void) {
-  noise = noise * 1664525u + 1013904223u;
-  return (uint8_t)(noise >> 24);
-}
-
 static void fill(void *to, size_t bytes) {
   for (size_t i = 0; i < bytes; i++) {
     ((uint8_t *)to)[i] = random8();
