@@ -47,3 +47,12 @@ def test_it_stays_within_bounds_and_needs_flights(made, laid):
     assert edge_strength.strengths(flown[:2], laid) == {}
     bare = type(flown[0])({k: v for k, v in flown[0].columns.items() if k != "zrange_m"}, flown[0].meta)
     assert edge_strength.strengths([bare] * 5, laid) == {}
+
+
+def test_every_class_of_height_comes_as_often(laid):
+    of = {height_class(r.edges[0].height_after_m): r for r in laid}
+    some = [of["low"]] * 7 + [of["high"]] * 5
+    evened = edge_strength.every_height(some)
+    names = [height_class(r.edges[0].height_after_m) for r in evened]
+    assert len(evened) == 12 and names.count("low") == names.count("high") == 6
+    assert edge_strength.every_height([]) == []

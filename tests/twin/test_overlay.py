@@ -48,7 +48,12 @@ def test_free_air_holds_no_edge(made):
         flown = course(log)
         assert len(part.start) + len(part.end) < len(log) - (flown.exit - flown.entry)
         np.testing.assert_array_equal(part.start[-1, 6:], log.stack(overlay.PWM)[flown.entry - 61])
-        np.testing.assert_array_equal(part.hover, part.start[-len(part.hover):])
+        assert part.step + part.wait == flown.entry - max(flown.start - 100, 0)
+        values = overlay.values_of(log)[:flown.entry - 60]
+        for quiet in part.quiet:  # level flight before the platform, and the velocity step is in none of it
+            at = next(i for i in range(len(values)) if np.array_equal(values[i], quiet[0]))
+            np.testing.assert_array_equal(values[at:at + len(quiet)], quiet)
+            assert flown.level < at and not at < flown.step < at + len(quiet)
 
 
 def test_laid_edges_are_where_the_labels_say(made, laid):
@@ -58,7 +63,8 @@ def test_laid_edges_are_where_the_labels_say(made, laid):
     with_edges, edges = overlay.flights(air, laid, seed=2)
     without, same = overlay.flights(air, silent, seed=2)
     assert edges == same and len(edges) >= 2
-    for log, bare, (entry, leave), response in zip(with_edges, without, edges, laid, strict=True):
+    made_of = [(log, bare, e) for log, bare, e in zip(with_edges, without, edges, strict=True) if e]
+    for (log, bare, (entry, leave)), response in zip(made_of, laid, strict=True):
         assert leave.sample - entry.sample == response.edges[1].sample - response.edges[0].sample
         assert leave.sample < len(log)
         moved = np.flatnonzero((log.stack(overlay.ACC_WORLD) != bare.stack(overlay.ACC_WORLD)).any(axis=1))
@@ -67,6 +73,25 @@ def test_laid_edges_are_where_the_labels_say(made, laid):
         # where two stretches meet it goes on: in level flight nothing jumps
         mean = bare.stack(overlay.PWM).mean(axis=1)[entry.sample - 40:leave.sample]
         assert np.abs(np.diff(mean)).max() < 12000.0
+
+
+def test_an_edge_comes_as_long_after_the_velocity_step_as_in_a_recorded_flight(made, laid):
+    """Once anywhere in a hover: a detector took what the step does for an edge, and edges after it for the step."""
+    air = overlay.free_air([log for _, log, _ in made])[:1]
+    _, edges = overlay.flights(air, laid * 5, seed=3)
+    waits = [e[0].sample - air[0].step for e in edges if e]
+    assert len(waits) > 10 and np.std(waits) > 0.0
+    assert all(0.85 * air[0].wait - 1 <= w <= 1.15 * air[0].wait + 1 for w in waits)
+
+
+def test_a_third_of_the_flights_has_no_platform(made, laid):
+    """They are the same free air: nothing of a response is in them."""
+    air = overlay.free_air([log for _, log, _ in made])
+    loud = [overlay.Response(r.values + 1e3, r.edges) for r in laid] * 4
+    logs, edges = overlay.flights(air, loud, seed=5)
+    shaken = [float(np.abs(log.stack(overlay.ACC_WORLD)).max()) > 500.0 for log in logs]
+    assert shaken == [bool(e) for e in edges]
+    assert edges.count([]) == pytest.approx(len(edges) / 3.0, abs=1.0)
 
 
 def test_flights_without_down_range_have_no_free_air(made):

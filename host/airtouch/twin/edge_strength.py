@@ -7,6 +7,7 @@ weak edges is unsure of them.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -69,6 +70,18 @@ def as_strong(response: Response, factors: Strengths) -> Response:
     apart = min(round(APART_S * RATE_HZ), (leave - entry) // 2)
     gain = np.interp(np.arange(len(response.values)), [entry + apart, leave - apart], [at_entry, at_exit])
     return replace(response, values=response.values * gain[:, None])
+
+
+def every_height(laid: Sequence[Response]) -> list[Response]:
+    """As many responses, each class of height as often as any other; of a class with few some come again.
+
+    Most recorded heights are low, where an edge is easily learnt.
+    """
+    classes: dict[str | None, list[Response]] = {}
+    for response in laid:
+        classes.setdefault(height_class(response.edges[0].height_after_m), []).append(response)
+    turns = (some[i % len(some)] for i in range(len(laid)) for some in classes.values())
+    return list(islice(turns, len(laid)))
 
 
 def _slope(recorded: Sequence[np.ndarray], simulated: Sequence[np.ndarray]) -> float:

@@ -28,8 +28,11 @@ RATE_HZ = 100
 SPARE = 3  #: most flights simulated for each one returned; the rest diverged
 BEFORE_S, BEHIND_S, FADE_S = 0.4, 2.5, 0.5  #: s of a response: before the entry, after the exit, fade-out at its end
 FREE_S, AWAY_S, AFTER_S = 1.5, 0.6, 1.5  #: s: shortest hover; recorded samples left out before an entry, after an exit
-SETTLED_S, EARLIEST_S = 1.0, 2.0  #: s after the climb: start of hover, earliest added edge
-HOVERS = 2  #: hovers of other flights that are inserted into each flight
+SETTLED_S = 1.0  #: s after the climb, and after a velocity step: start of level flight
+QUIET_S = 0.6  #: s, shortest part of level flight that others are lengthened by
+SPREAD = 0.15  #: of the time from a velocity step to the entry, by which an added edge may come earlier or later
+BEYOND_S = (0.5, 2.0)  #: s, shortest and longest level flight behind an added exit
+BARE = 0.5  #: flights without a platform, for each one with
 JOIN_S = 0.3  #: s over which two parts are blended
 
 
@@ -45,12 +48,14 @@ class Response:
 class FreeAir:
     """The free air of a recorded flight, without its platform.
 
-    start: (n, 10) with take-off, level from row `level` on. hover: (k, 10). end: (m, 10).
+    start: (n, 10) with take-off and velocity step, the latter at row `step`; wait: rows from there to the platform.
+    quiet: parts (k, 10) of level flight without a step: hover, and forward flight. end: (m, 10).
     """
 
     start: np.ndarray
-    level: int
-    hover: np.ndarray
+    step: int
+    wait: int
+    quiet: tuple[np.ndarray, ...]
     end: np.ndarray
 
 
@@ -106,41 +111,58 @@ def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:
             flown, values = course(log, 0.3), values_of(log)
         except AirTouchError:
             continue
-        before = flown.entry - round(AWAY_S * RATE_HZ)
+        settled, before = round(SETTLED_S * RATE_HZ), flown.entry - round(AWAY_S * RATE_HZ)
         first = max(flown.start - RATE_HZ, 0)
-        hover = values[flown.level + round(SETTLED_S * RATE_HZ):before]
-        if len(hover) >= FREE_S * RATE_HZ:
-            end = values[flown.exit + round(AFTER_S * RATE_HZ):]
-            out.append(FreeAir(values[first:before], flown.level - first, hover, end))
+        if before - flown.level - settled >= FREE_S * RATE_HZ:
+            hover = values[flown.level + settled:min(flown.step, before)]
+            quiet = [values[flown.step + settled:before], *([] if flown.pulse_s else [hover])]
+            out.append(FreeAir(values[first:before], flown.step - first, flown.entry - flown.step,
+                               tuple(x for x in quiet if len(x) >= QUIET_S * RATE_HZ),
+                               values[flown.exit + round(AFTER_S * RATE_HZ):]))
     return out
 
 
 def flights(air: Sequence[FreeAir], laid: Sequence[Response],
             seed: int = 0) -> tuple[list[FlightLog], list[list[Edge]]]:
-    """A flight, with its edges, for each response that fits. The same arguments give the same flights.
+    """A flight, with its edges, for each response that fits, and BARE as many without. The same arguments give the
+    same flights.
 
-    Each has the free air of one recorded flight, lengthened by hovers of other flights that are shifted to its mean.
+    An edge comes as long after the velocity step as in one of the recorded flights, so that what a step does is learnt
+    beside what a platform does; a flight without platform is made alike. Each has the free air of one recorded flight,
+    lengthened by level flight of others that is shifted to its mean.
     """
     rng = np.random.default_rng([seed, 77])
-    out, labels = [], []
-    for number, response in enumerate(laid):
-        chosen = air[int(rng.integers(len(air)))]
-        middle = np.median(chosen.hover, axis=0)
-        others = [air[i].hover for i in rng.integers(len(air), size=HOVERS)]
-        hovers = _joined([chosen.start, *(h - np.median(h, axis=0) + middle for h in others)])
-        values = _joined([hovers, chosen.end])
+    quiet = [part for one in air for part in one.quiet]
+    bare = [laid[i] for i in rng.integers(len(laid), size=round(BARE * len(laid)))] if quiet else []
+    out: list[FlightLog] = []
+    labels: list[list[Edge]] = []
+    for number, (response, there) in enumerate([*((r, True) for r in laid), *((r, False) for r in bare)]):
+        chosen, other = (air[int(i)] for i in rng.integers(len(air), size=2))
         entry, leave = (e.sample for e in response.edges)
-        earliest = max(chosen.level + round(EARLIEST_S * RATE_HZ), entry)
-        at = int(rng.integers(earliest, max(len(hovers) - (leave - entry), earliest) + 1))
-        if at + leave - entry + round(SETTLED_S * RATE_HZ) > len(values):
+        at = chosen.step + round(other.wait * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD))
+        values = _lengthened(chosen, quiet, at + leave - entry + round(RATE_HZ * rng.uniform(*BEYOND_S)), rng)
+        if at < entry or at + leave - entry + round(SETTLED_S * RATE_HZ) > len(values):
             continue
-        rows = slice(at - entry, min(at - entry + len(response.values), len(values)))
-        values[rows] += response.values[:rows.stop - rows.start]
+        if there:
+            rows = slice(at - entry, min(at - entry + len(response.values), len(values)))
+            values[rows] += response.values[:rows.stop - rows.start]
         values[:, -len(PWM):] = np.clip(values[:, -len(PWM):], 0.0, PWM_MAX)
         columns = dict(zip(COLUMNS, values.T, strict=True)) | {"time_s": np.arange(len(values)) / RATE_HZ}
         out.append(FlightLog(columns, {"source": f"overlay_{seed}_{number:06d}", "sample_period_s": 1.0 / RATE_HZ}))
-        labels.append([replace(e, sample=at - entry + e.sample) for e in response.edges])
+        labels.append([replace(e, sample=at - entry + e.sample) for e in response.edges] if there else [])
     return out, labels
+
+
+def _lengthened(chosen: FreeAir, quiet: Sequence[np.ndarray], rows: int, rng: np.random.Generator) -> np.ndarray:
+    """A flight's start, level flight to as many rows, and its end, (n, 10)."""
+    behind = chosen.start[chosen.step + round(SETTLED_S * RATE_HZ):]
+    middle = np.median(behind if len(behind) >= QUIET_S * RATE_HZ else chosen.start[-RATE_HZ:], axis=0)
+    parts, length = [chosen.start], len(chosen.start)
+    while quiet and length < rows:
+        part = quiet[int(rng.integers(len(quiet)))]
+        parts.append(part - np.median(part, axis=0) + middle)
+        length += len(part) - round(JOIN_S * RATE_HZ)
+    return _joined([_joined(parts)[:rows], chosen.end])
 
 
 def values_of(log: FlightLog) -> np.ndarray:
