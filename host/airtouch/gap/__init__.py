@@ -24,7 +24,7 @@ Where each decision is made; a folder imports only those above it:
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
 - `sealed`, withheld effects: `blind`, `blind_draw`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.
-- `diagnose` calls them all and fills a `result`.
+- `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`.
 """
 
 import importlib

@@ -13,6 +13,7 @@ from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
 from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -59,6 +60,7 @@ class Data:
     turning: list[np.ndarray] = field(default_factory=list)  #: spectra in the air of the measured angular acceleration
     quiet: list[np.ndarray] = field(default_factory=list)  #: blocks in the air and axes where no set-point stepped
     bridging: list[np.ndarray] = field(default_factory=list)  #: power that lost rows add to the blocks in the air
+    workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         self.first = [{r: starts(f, r) for r in (AIR, REST)} for f in self.flights]
@@ -83,7 +85,7 @@ def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]
     if response is None:
         every = _replayed(data, replayed)
         return _without_means(data, replayed, every) if data.slow else every
-    return _cached(data, "_applied", active, lambda: _applied(data, response, active, replayed))
+    return _cached(data, "applied", active, lambda: _applied(data, response, active, replayed))
 
 
 def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
@@ -140,8 +142,8 @@ def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, n
 
 def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    kept = data.__dict__.setdefault("_ungated", [{} for _ in data.flights])
-    return _cached(data, "_spectra", active, lambda: [
+    kept = data.workspace.once("ungated", (), lambda: [{} for _ in data.flights])
+    return _cached(data, "spectra", active, lambda: [
         _replay(data, *each, active) for each in zip(data.flights, data.first, kept, strict=True)])
 
 
@@ -154,11 +156,8 @@ def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], kept: dict
 def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],
             ) -> list[dict[str, np.ndarray]]:
     """Spectra under a hypothesis, made once while it is among the KEPT last used; those of no effect always."""
-    cache = data.__dict__.setdefault(name, {})
-    key = tuple((a.effect.name, *a.values.values(), a.gate) for a in active)
-    spectra_of = cache.pop(key) if key in cache else make()
-    if not active or sum(len(f) for f in data.flights) <= KEPT_SAMPLES:
-        cache[key] = spectra_of  # the last one used is the last in it
-        if len(cache) > KEPT:
-            cache.pop(next(k for k in cache if k))
-    return spectra_of
+    if not active:
+        return data.workspace.once(f"{name} of no effect", (), make)
+    if sum(len(f) for f in data.flights) > KEPT_SAMPLES:
+        return make()
+    return data.workspace.once(name, tuple((a.effect.name, *a.values.values(), a.gate) for a in active), make, KEPT)

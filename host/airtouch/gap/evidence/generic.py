@@ -60,14 +60,14 @@ class Usual:
 
 def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
     """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and regime; made once."""
-    kept = data.__dict__.get("_basis")
-    if kept is None:
-        kept = []
+    def make() -> list[list[dict[str, np.ndarray]]]:
+        out = []
         for flight, first in zip(data.flights, data.first, strict=True):
             signals = basis(flight, data.study.vehicle)
-            kept.append([{r: blocks(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
-        data.__dict__["_basis"] = kept
-    return kept
+            out.append([{r: blocks(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
+        return out
+
+    return data.workspace.once("basis", (), make)
 
 
 def _loop_columns(data: Data) -> list[np.ndarray]:
@@ -75,18 +75,18 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
 
     band's alone, weighted as what is left of the torque is; made once.
     """
-    kept = data.__dict__.get("_loop")
-    if kept is None:
+    def make() -> list[np.ndarray]:
         f, response = frequencies(AIR), data.study.response
         bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
         bands[:FIRST_BIN] = False
         shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP)
-        kept = []
+        out = []
         for i, torque in enumerate(commanded(data)):
             weighted = torque if response is None else response.weighted(data.quiet[i], torque)
-            kept.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
-        data.__dict__["_loop"] = kept
-    return kept
+            out.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
+        return out
+
+    return data.workspace.once("loop", (), make)
 
 
 def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
@@ -133,10 +133,7 @@ class HalfResiduals:
         self.values, added, _ = problem.modelled(terms)
         self.power = problem.power + added
         self.groups = problem.groups
-        kept = problem.__dict__.setdefault("_cells", [])
-        if not kept:
-            kept += _cells(data, part, problem)
-        self.cells = kept
+        self.cells = problem.workspace.once("cells", (), lambda: _cells(data, part, problem))
 
     def system(self, cell: _Cell, values: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Normal matrix and right-hand side for values of a cell; tails as those of what is left of them."""

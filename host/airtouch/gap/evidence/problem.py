@@ -22,6 +22,7 @@ from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
 from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
@@ -45,7 +46,7 @@ class Problem:
 
     def __init__(self, data: Data, part: Part) -> None:
         # the data keeps its problems: no cycle, no garbage to wait for
-        self.data, self.part = weakref.proxy(data), part
+        self.data, self.part, self.workspace = weakref.proxy(data), part, Workspace()
         self._constant: list[tuple[np.ndarray, float]] | None = None
         self.keep = {r: judged(r) for r in (AIR, REST)}
         for keep in self.keep.values():
@@ -251,16 +252,11 @@ def _tail(nu: float) -> float:
 def whole_of(data: Data, flights: Sequence[int] | None = None) -> Part:
     """Every block of every flight, one and the same part in each call, or of the flights of these numbers."""
     if flights is None:
-        if "_whole" not in data.__dict__:  # the blocks of each new part are flattened anew, and kept
-            data.__dict__["_whole"] = whole_of(data, range(len(data.flights)))
-        return data.__dict__["_whole"]
+        return data.workspace.once("whole", (), lambda: whole_of(data, range(len(data.flights))))
     return Part(tuple((i, r, np.ones(len(data.first[i][r]), bool)) for i in flights for r in (AIR, REST)
                       if len(data.first[i][r])))
 
 
 def problem_of(data: Data, part: Part) -> Problem:
     """The flattened blocks of a part, made once."""
-    kept = data.__dict__.setdefault("_problems", {})
-    if id(part) not in kept:
-        kept[id(part)] = (part, Problem(data, part))
-    return kept[id(part)][1]
+    return data.workspace.once("problem", id(part), lambda: (part, Problem(data, part)))[1]  # the part lives as long

@@ -36,19 +36,17 @@ def growth(term: Any, x: float) -> float:
 
 def power(data: Any, term: Any) -> list[dict[str, np.ndarray]]:
     """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and regime."""
-    cache = data.__dict__.setdefault("_random", {})
     unit = replace(term, gate=()).fitted(np.ones(len(term.free)))
-    key = (term.name, tuple(sorted(unit.values.items())))
-    if key not in cache:
-        cache[key] = [_unit_power(data, i, unit) for i in range(len(data.flights))]
+    of_unit = data.workspace.once("random", (term.name, *sorted(unit.values.items())),
+                                  lambda: [_unit_power(data, i, unit) for i in range(len(data.flights))])
     p = next(q for q in term.effect.parameters if q.name == term.free[0])
     neutral = p.neutral or 0.0
     step = unit.values[term.free[0]] - neutral
     scale = growth(term, (term.values[term.free[0]] - neutral) / step)
     if term.gate:
         return [{r: scale * v * _covered(data, i, r, term.gate) for r, v in f.items()}
-                for i, f in enumerate(cache[key])]
-    return [{r: scale * v for r, v in f.items()} for f in cache[key]]
+                for i, f in enumerate(of_unit)]
+    return [{r: scale * v for r, v in f.items()} for f in of_unit]
 
 
 def _covered(data: Any, i: int, regime: str, gate: Sequence[tuple[str, float, float]]) -> np.ndarray:

@@ -46,10 +46,7 @@ class Lines:
 
 def lines(data: Any) -> Lines:
     """The lines of the flights of `data` (`data.Data`), worked out once."""
-    kept = data.__dict__.get("_lines")
-    if kept is None:
-        kept = data.__dict__["_lines"] = _found(data)
-    return kept
+    return data.workspace.once("lines", (), lambda: _found(data))
 
 
 def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ then multiplies them by the ratio of the modelled spectra with and without it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -36,6 +36,7 @@ from airtouch.gap.loop.turning import (
     turning_beside_command,
     turnings_per_command,
 )
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -87,6 +88,7 @@ class ClosedLoop:
     slopes: Slopes
     edges: EdgeFloor | None = None
     steps: tuple[Step, Step] = (NO_STEP, NO_STEP)
+    workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
     def spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
         """First samples and spectra (blocks, bins, AXES) of a flight's commands as if flown as hard as nominal ones."""
@@ -97,12 +99,7 @@ class ClosedLoop:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
         row = self._row(active)
         key = row.tobytes()
-        kept = self.__dict__.setdefault("_kept", {})
-        if key not in kept:
-            if len(kept) > 500:
-                kept.clear()
-            kept[key] = self._power(row) / self.nominal_power()
-        return kept[key]
+        return self.workspace.once("ratio", key, lambda: self._power(row) / self.nominal_power(), PLANTS)
 
     def torque_change(self, active: Sequence[Active], f: np.ndarray) -> Change | None:
         """How effects change what the vehicle does upon a logged command; None where they leave the loop as it is.
@@ -112,13 +109,7 @@ class ClosedLoop:
         row, changed = self._plant(active)
         if not changed:
             return None
-        cache = self.__dict__.setdefault("_changes", {})
-        key = row.tobytes(), f.tobytes()
-        if key not in cache:
-            if len(cache) >= PLANTS:
-                cache.clear()
-            cache[key] = self._change(row, f)
-        return cache[key]
+        return self.workspace.once("change", (row.tobytes(), f.tobytes()), lambda: self._change(row, f), PLANTS)
 
     def _change(self, row: Any, f: np.ndarray) -> Change:
         """`torque_change` of the effects that make a plant row."""
@@ -150,14 +141,11 @@ class ClosedLoop:
 
     def _plant(self, active: Sequence[Active]) -> tuple[Any, bool]:
         """Plant row with effects, and whether they change the roll and pitch loops."""
-        cache = self.__dict__.setdefault("_plants", {})
-        key = tuple((a.effect.name, *a.values.values()) for a in active)
-        if key not in cache:
-            if len(cache) >= PLANTS:
-                cache.clear()
+        def make() -> tuple[Any, bool]:
             row = prepare(self.vehicle, (*self.calibration, *active))[0][0]
-            cache[key] = row, not _same_loop(row, self._plain)
-        return cache[key]
+            return row, not _same_loop(row, self._plain)
+
+        return self.workspace.once("plant", tuple((a.effect.name, *a.values.values()) for a in active), make, PLANTS)
 
     def _shares(self, row: Any, f: np.ndarray) -> np.ndarray:
         """Share of the commanded torque that turns the vehicle, complex (3, bins, 3); 1 in yaw.
@@ -209,22 +197,12 @@ class ClosedLoop:
         # in the torque of a command a controller counts for its period alone
         controller = by_firmware if self.by_firmware or what == "torque" else self.controllers[AXES.index(axis)]
         key = (what, axis, controller, *loops, f.tobytes())
-        cache = self.__dict__.setdefault("_axes", {})
-        if key not in cache:
-            if len(cache) >= LOOPS:
-                cache.clear()
-            cache[key] = make(controller)
-        return cache[key]
+        return self.workspace.once("axis", key, lambda: make(controller), LOOPS)
 
     def _loops(self, row: Any) -> list[tuple]:
         """The firmware's controller of each of AXES, and what else a plant row gives its loop."""
-        key = row.tobytes()
-        cache = self.__dict__.setdefault("_rows", {})
-        if key not in cache:
-            if len(cache) >= PLANTS:
-                cache.clear()
-            cache[key] = list(zip(firmware_of(row), (of_loop(row, axis) for axis in AXES), strict=True))
-        return cache[key]
+        return self.workspace.once("loops", row.tobytes(), lambda: list(
+            zip(firmware_of(row), (of_loop(row, axis) for axis in AXES), strict=True)), PLANTS)
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
         """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""
@@ -242,9 +220,8 @@ class ClosedLoop:
         return np.maximum(self._plain["gyro_noise"], 1e-9)
 
     def nominal_power(self) -> np.ndarray:
-        if "_base" not in self.__dict__:
-            self.__dict__["_base"] = self._power(self._plain)
-        return self.__dict__["_base"]
+        """Power of the commands (bins, AXES) that the model makes of the vehicle as calibrated."""
+        return self.workspace.once("power", (), lambda: self._power(self._plain))
 
     def _power(self, row: Any) -> np.ndarray:
         f = fine_frequencies()

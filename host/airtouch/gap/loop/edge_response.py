@@ -6,12 +6,13 @@ the simulator, flown with and without the effect over a platform like the flight
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from airtouch.gap.flights import motion
 from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import POSITION, PWM, VELOCITY, FlightLog
 from airtouch.logs.segments import PLATFORM_STEP_M
@@ -48,6 +49,7 @@ class EdgeFloor:
     usual: dict[str, np.ndarray]
     counts: dict[str, int]
     whiten: np.ndarray
+    workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
 
 def edges_of(flight: Flight) -> list[Edge]:
@@ -125,19 +127,18 @@ def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
 def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
     """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
     from airtouch.gap.signatures.candidates import terms
-    kept = floor.__dict__.setdefault("_templates", {})
     place = _place(flight)
-    key = (effect, parameter, place)
-    if key not in kept:
+
+    def make() -> dict[str, np.ndarray]:
         term = terms(effect)[0]
         step = term.step(parameter)
         neutral = term.effect.scaled(term.effect.values(), 0.0)
         moved = {**neutral, parameter: neutral[parameter] + step}
         base = _flown(floor, place, ())
         with_effect = _flown(floor, place, (Active(term.effect, moved),))
-        kept[key] = {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k])
-                     for k in KINDS}
-    return kept[key]
+        return {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k]) for k in KINDS}
+
+    return floor.workspace.once("templates", (effect, parameter, place), make)
 
 
 def expected(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequence[Active]) -> np.ndarray:
@@ -185,18 +186,21 @@ def calm(vehicle: Vehicle) -> Vehicle:
 
 def _flown(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
            ) -> dict[str, np.ndarray]:
-    kept = floor.__dict__.setdefault("_flown", {})
+    """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; made once."""
     key = (place, tuple((a.effect.name, tuple(a.values.items())) for a in active))
-    if key not in kept:
-        height, low, speed, length = place
-        text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - low, 0.02), height=height,
-                               way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
-        logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=calm(floor.vehicle),
-                                     effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
-        made: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
-        for log in logs:
-            for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - low))):
-                if BEFORE <= e.sample < len(log) - AFTER:
-                    made[e.kind].append(response(log, floor.vehicle, None, e.sample))
-        kept[key] = {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in made.items()}
-    return kept[key]
+    return floor.workspace.once("flown", key, lambda: _simulated(floor, place, active))
+
+
+def _simulated(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
+               ) -> dict[str, np.ndarray]:
+    height, low, speed, length = place
+    text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - low, 0.02), height=height,
+                           way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
+    logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=calm(floor.vehicle),
+                                 effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
+    made: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
+    for log in logs:
+        for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - low))):
+            if BEFORE <= e.sample < len(log) - AFTER:
+                made[e.kind].append(response(log, floor.vehicle, None, e.sample))
+    return {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in made.items()}

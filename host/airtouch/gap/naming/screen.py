@@ -26,31 +26,34 @@ class Screen:
     """Changes of the spectra by effect and parameter, made when first asked for."""
 
     data: Data
-    kept: dict[tuple, list[dict[str, np.ndarray]]] = field(default_factory=dict)
     judged: dict[int, tuple[np.ndarray, float, float]] = field(default_factory=dict)
 
     def column(self, problem: Problem, term: Term, i: int) -> np.ndarray:
         """Change of the flattened spectra per scaled parameter i of a term at neutral."""
-        key = _key(term, term.free[i])
-        if key not in self.kept:
+        gathered = problem._gather(self._change(term, i))
+        return np.where(problem.known, problem.with_commands(gathered), 0.0)
+
+    def _change(self, term: Term, i: int) -> list[dict[str, np.ndarray]]:
+        """Change of the spectra by flight and regime; made once."""
+        def make() -> list[dict[str, np.ndarray]]:
             low, high = term.bounds()
             x = np.zeros(len(term.free))
             x[i] = STEP if STEP <= high[i] else -STEP
             neutral = [term.active(np.zeros(len(term.free)))]
             before = spectra(self.data, neutral) if term.acts_when_neutral else self.data.base
             after = spectra(self.data, [term.active(x)])
-            self.kept[key] = [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
-                              for a, b in zip(after, before, strict=True)]
-        gathered = problem._gather(self.kept[key])
-        return np.where(problem.known, problem.with_commands(gathered), 0.0)
+            return [{r: ((a[r] - b[r]) / x[i]).astype(np.complex64) for r in a}
+                    for a, b in zip(after, before, strict=True)]
+
+        return self.data.workspace.once("change", _key(term, term.free[i]), make)
 
     def shows(self, term: Term) -> bool:
-        """Whether a term changes what the logged commands lead to expect, once `column` was asked for its parameters.
+        """Whether a term changes what the logged commands lead to expect.
 
         An effect of the closed loop, such as another gain, leaves no trace there: the commands alone show it.
         """
-        return any(np.abs(v).max(initial=0.0) > NOTHING for name in term.free
-                   for flight in self.kept[_key(term, name)] for v in flight.values())
+        return any(np.abs(v).max(initial=0.0) > NOTHING for i in range(len(term.free))
+                   for flight in self._change(term, i) for v in flight.values())
 
     def before(self, problem: Problem, residuals: np.ndarray, extra_power: np.ndarray) -> tuple[float, float]:
         """Log likelihood of what is left, offsets taken off, and what they cost; computed once for each array."""

@@ -17,6 +17,7 @@ from airtouch.gap.loop.command_spectra import FREEDOM, LENGTH, SHAPES, SPREAD, f
 from airtouch.gap.loop.controller import AXES
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT
 from airtouch.gap.signals.spectra import LENGTH as AIR_LENGTH
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
@@ -24,6 +25,7 @@ EDGE_FREEDOM = 6.0
 ROUNDS = 4
 WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold
 DOUBT = 0.1  #: of the logarithm of a change of the spectra by effects: the loop model is no better
+KEPT = 300  #: hypotheses whose expected power is kept
 SMALL = 1e-3  #: of a scaled parameter, over which the likelihood's slope is taken
 NOTHING = np.zeros(0)
 
@@ -33,7 +35,7 @@ class CommandView:
 
     def __init__(self, loop: ClosedLoop | None, flights: Sequence[Flight], first: Sequence[dict[str, np.ndarray]],
                  pieces: Sequence[tuple[int, str, np.ndarray]]) -> None:
-        self._loop, self.kept = loop, {}
+        self._loop, self.workspace = loop, Workspace()
         self.spectra: list[np.ndarray] = []
         self.flights: list[int] = []
         if loop is not None:
@@ -108,18 +110,17 @@ class CommandView:
         if not self.spectra:
             return self.floor, 0.0
         ratio = self.loop.ratio(active)
-        key = (ratio.tobytes(), wide)
-        if key not in self.kept:
-            if len(self.kept) > 300:
-                self.kept.clear()
-            made, cost = [], 0.0
-            for s in self.sizes:
-                wrong, price, _, _ = self._shift(s, ratio, wide)
-                cost += price
-                made.append(np.broadcast_to(self.loop.floor * ratio * np.exp(wrong), s.shape).ravel())
-            made.append(np.ones(len(self.edges) * edge_response.COUNT))
-            self.kept[key] = (np.concatenate(made), cost)
-        return self.kept[key]
+        return self.workspace.once("power", (ratio.tobytes(), wide), lambda: self._expected(ratio, wide), KEPT)
+
+    def _expected(self, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float]:
+        """`power` where that of the commands is a multiple (bins, AXES) of nominal flights'."""
+        made, cost = [], 0.0
+        for s in self.sizes:
+            wrong, price, _, _ = self._shift(s, ratio, wide)
+            cost += price
+            made.append(np.broadcast_to(self.loop.floor * ratio * np.exp(wrong), s.shape).ravel())
+        made.append(np.ones(len(self.edges) * edge_response.COUNT))
+        return np.concatenate(made), cost
 
     def rise(self, before: Sequence[Active], after: Sequence[Active]) -> np.ndarray:
         """By how much the logarithm of the expected power rises (bins, axes) from one hypothesis to another."""
