@@ -200,25 +200,33 @@ def show_corrections(folder: Path) -> None:
         for names in (sorted(set(drone)), *([d] for d in sorted(set(drone)))):
             own = [drone == d for d in names]
             power, caused = [table[m, 4 + k] for m in own], [10.0 ** table[m, 6 + k] for m in own]
-
-            def left(x, power=power, caused=caused):
-                return np.concatenate([y - np.log10(10.0 ** q + 10.0 ** x[-1] * c)
-                                       for y, q, c in zip(power, x[:-1], caused, strict=True)])
-            start = [*(y.min() for y in power), np.log10(hover_balance.ANSWER[k])]
-            found = least_squares(left, start)
-            before = np.concatenate([y - y.mean() for y in power])
-            print(f"{what}, {' and '.join(names)}: 10^{found.x[-1]:.2f} for one (m/s)^2; deviation between flights "
-                  f"{before.std():.2f}, left {np.std(left(found.x)):.2f} ({len(before)} flights)")
+            factor, before, left = corrections_fit(power, caused, float(np.log10(hover_balance.ANSWER[k])))
+            print(f"{what}, {' and '.join(names)}: 10^{factor:.2f} for one (m/s)^2; deviation between flights "
+                  f"{before.std():.2f}, left {left.std():.2f} ({len(before)} flights)")
     normal = np.array([family(r["condition"]) == "normal" for r in rows])
     bases = {d: hover_balance.reference(table[normal & (drone == d)]) for d in set(drone)}
-    apart = np.array([bases[d].apart(p)[4:] for d, p in zip(drone, table, strict=True)])
+    over = np.array([bases[d].difference(p)[4:] for d, p in zip(drone, table, strict=True)])
     for families in (["rotor damage"], ["added weight", "slung load"]):
         pairs = sorted({(r["condition"], r["drone"]) for r in rows if family(r["condition"]) in families})
-        means = np.array([np.mean([a for a, r in zip(apart, rows, strict=True)
+        means = np.array([np.mean([a for a, r in zip(over, rows, strict=True)
                                    if (r["condition"], r["drone"]) == pair], axis=0) for pair in pairs])
         print(f"{' and '.join(families)}, left over the normal flights, {len(pairs)} conditions: " + ", ".join(
             f"{n} {m:.2f} +- {s:.2f}" for n, m, s in zip(hover_balance.NAMES[4:6], means.mean(axis=0),
                                                          means.std(axis=0, ddof=1), strict=True)))
+
+
+def corrections_fit(power: list[np.ndarray], caused: list[np.ndarray], start: float,
+                    ) -> tuple[float, np.ndarray, np.ndarray]:
+    """log10 of the power for one (m/s)^2 of corrections, and the scatter (flights,) of log10 power before and after.
+
+    power: log10, of each drone's flights; caused: their corrections, (m/s)^2. Each drone has a power of its own beside.
+    """
+    def left(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([y - np.log10(10.0 ** own + 10.0 ** x[-1] * c)
+                               for y, own, c in zip(power, x[:-1], caused, strict=True)])
+
+    found = least_squares(left, [*(y.min() for y in power), start])
+    return float(found.x[-1]), np.concatenate([y - y.mean() for y in power]), left(found.x)
 
 
 def show(table: list[dict]) -> None:

@@ -63,7 +63,7 @@ def close(case: dict, folder: Path) -> bool:
     return bool((np.abs(carried / MEASURED[name] - 1.0) < CLOSE).all())
 
 
-def told(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float, curve: np.ndarray) -> float:
+def regressed_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float, curve: np.ndarray) -> float:
     """Lift of one flight over the measured curve (CURVE_M,), by least squares on all usable samples in the air."""
     voltage = gaussian_filter1d(np.nan_to_num(flight.log["vbat_V"], nan=float(np.nanmedian(flight.log["vbat_V"]))), 20,
                                 mode="nearest")
@@ -89,7 +89,7 @@ def main() -> None:
             vehicle = vehicles.load(folder / f"{row['vehicle']}.toml")
             flight = ready(read(folder / "flights" / row["file"]), vehicle)
             found.setdefault(f"day {row['day']}, {row['vehicle']}", []).append(
-                told(flight, vehicle, STANDING_Z_M[row["cf"]], CURVE[row["vehicle"]]))
+                regressed_lift(flight, vehicle, STANDING_Z_M[row["cf"]], CURVE[row["vehicle"]]))
     for name, each in sorted(found.items()):
         print(f"{name}: within {CLOSE:.0%} in {sum(abs(x - 1.0) < CLOSE for x in each)} of {len(each)}, "
               f"median {np.median(each):.2f}, standard deviation {np.std(each, ddof=1):.2f}")

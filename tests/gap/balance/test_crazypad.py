@@ -67,10 +67,10 @@ def test_power_that_corrections_of_the_estimate_cause_is_nobodys():
     powers = np.log10(10.0 ** own + ANSWER * 10.0 ** corrected)
     table = np.column_stack([np.zeros((4, 4)), powers, corrected])
     base = reference(table[:3])
-    np.testing.assert_allclose(base.quiet, own, atol=1e-9)
-    np.testing.assert_allclose(base.apart(table[3]), np.zeros(6), atol=1e-9)
+    np.testing.assert_allclose(base.own_power, own, atol=1e-9)
+    np.testing.assert_allclose(base.difference(table[3]), np.zeros(6), atol=1e-9)
     without_velocity = np.column_stack([np.zeros((4, 4)), powers, np.full((4, 2), -9.0)])
-    np.testing.assert_allclose(reference(without_velocity[:3]).apart(without_velocity[3])[4:],
+    np.testing.assert_allclose(reference(without_velocity[:3]).difference(without_velocity[3])[4:],
                                powers[3] - powers[:3].mean(axis=0), atol=1e-3)
 
 

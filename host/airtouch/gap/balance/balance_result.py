@@ -101,11 +101,11 @@ def _ranking(names: Sequence[str], first: str, total: Mapping[str, float], famil
 def _shrink(seen: np.ndarray, base: Reference, h: Hypothesis,
             weight: np.ndarray) -> tuple[tuple[float, float], Quantity]:
     """Gap before and after in deviations of the floor, and the share of it that goes, with its interval."""
-    apart, spread = base.apart(seen)[:4], np.sqrt(base.variance[:4])
+    gap, spread = base.difference(seen)[:4], np.sqrt(base.variance[:4])
     def rms(x):
         return float(np.sqrt(np.mean((x / spread) ** 2)))
-    before, after = rms(apart), rms(apart - weight @ h.change)
-    each = np.sqrt((((apart - h.change) / spread) ** 2).mean(axis=1))
+    before, after = rms(gap), rms(gap - weight @ h.change)
+    each = np.sqrt((((gap - h.change) / spread) ** 2).mean(axis=1))
     def part(a):
         return float(np.clip((before - a) / max(before - 1.0, 1e-9), 0.0, 1.0)) if before > 1.0 else 0.0
     low, high = _quantile(each, weight, 0.95), _quantile(each, weight, 0.05)
@@ -142,7 +142,7 @@ def _cells(seen: np.ndarray, base: Reference, vehicle: Vehicle, h: Hypothesis, w
     inertia, lift = vehicle.inertia_kg_m2, vehicle.mass_kg * vehicle.gravity_mps2
     unit = np.array([g, lift * half / inertia[0], lift * half / inertia[1],
                      lift * vehicle.yaw_torque_over_thrust_m / inertia[2]])
-    gap = base.apart(seen)[:4]
+    gap = base.difference(seen)[:4]
     after = gap - weight @ h.change
     floor = np.sqrt(base.variance[:4])
     channels = (("force_z", "m/s^2"), *((f"torque_{a}", "rad/s^2") for a in "xyz"))

@@ -13,7 +13,7 @@ part of its own and one in proportion to these corrections, which the log shows.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -139,41 +139,44 @@ def _hovers(flight: Flight) -> list[tuple[int, int]]:
 class Reference:
     """Nominal flights: mean (6,) and variance (6,) of a further nominal flight of any session.
 
-    quiet (2,): log10 of the power of unsteadiness and heave that no correction of the estimate causes.
+    own_power (2,): log10 of the power of unsteadiness and heave that no correction of the estimate causes.
     """
 
     mean: np.ndarray
     variance: np.ndarray
-    quiet: np.ndarray = field(default_factory=lambda: np.full(2, LEAST_POWER))
+    own_power: np.ndarray
 
-    def apart(self, seen: np.ndarray) -> np.ndarray:
-        """How far a pattern (8,) is from the nominal flights: (6,), powers beyond what their corrections cause."""
-        return _corrected(seen[None], self.quiet)[0] - self.mean
-
-
-def _corrected(table: np.ndarray, quiet: np.ndarray) -> np.ndarray:
-    """Patterns (flights, 8) without the corrections: (flights, 6), powers over what is expected of them, log10."""
-    expected = np.log10(10.0 ** quiet + ANSWER * 10.0 ** table[:, 6:])
-    return np.column_stack([table[:, :4], table[:, 4:6] - expected])
+    def difference(self, seen: np.ndarray) -> np.ndarray:
+        """Of a pattern (8,) from the nominal flights' mean: (6,), powers over what their corrections cause."""
+        return _over_caused(seen[None], self.own_power)[0] - self.mean
 
 
-def _quiet(power: np.ndarray, caused: np.ndarray) -> float:
+def _caused(table: np.ndarray) -> np.ndarray:
+    """Power (flights, 2) of unsteadiness and heave that the corrections of patterns (flights, 8) cause."""
+    return ANSWER * 10.0 ** table[:, 6:]
+
+
+def _over_caused(table: np.ndarray, own_power: np.ndarray) -> np.ndarray:
+    """Patterns (flights, 8) without the corrections: (flights, 6), log10 of the powers over those to be expected."""
+    return np.column_stack([table[:, :4], table[:, 4:6] - np.log10(10.0 ** own_power + _caused(table))])
+
+
+def _own_power(power: np.ndarray, caused: np.ndarray) -> float:
     """log10 of the power that flights have beside the one that is caused; power (flights,) log10, caused (flights,)."""
-    def left(own):
+    def mean_over(own: float) -> float:
         return float(np.mean(power - np.log10(10.0 ** own + caused)))
-    return LEAST_POWER if left(LEAST_POWER) <= 0.0 else float(brentq(left, LEAST_POWER, power.max()))
+    return LEAST_POWER if mean_over(LEAST_POWER) <= 0.0 else float(brentq(mean_over, LEAST_POWER, power.max()))
 
 
 def reference(table: np.ndarray, beliefs: Beliefs = BELIEFS) -> Reference:
     """Mean of nominal flights' patterns (flights, 8), and their scatter beside that which is believed."""
     table = table[np.isfinite(table).all(axis=1)]
-    caused = ANSWER * 10.0 ** table[:, 6:]
-    quiet = np.array([_quiet(table[:, 4 + k], caused[:, k]) for k in range(2)])
-    table = _corrected(table, quiet)
+    own_power = np.array([_own_power(*of) for of in zip(table[:, 4:6].T, _caused(table).T, strict=True)])
+    table = _over_caused(table, own_power)
     n, own = len(table), beliefs.own
     squares = ((table - table.mean(axis=0)) ** 2).sum(axis=0)
     variance = (squares + own * np.array(beliefs.between) ** 2) / (n - 1.0 + own)
-    return Reference(table.mean(axis=0), variance * (1.0 + 1.0 / n), quiet)
+    return Reference(table.mean(axis=0), variance * (1.0 + 1.0 / n), own_power)
 
 
 @dataclass(frozen=True)
@@ -244,17 +247,17 @@ def _rotors(rise: dict[int, np.ndarray]) -> np.ndarray:
 def evidence(seen: np.ndarray, base: Reference, every: Sequence[Hypothesis],
              beliefs: Beliefs = BELIEFS) -> tuple[np.ndarray, list[np.ndarray]]:
     """Log evidence of each hypothesis for a pattern (8,), and the weights of its samples."""
-    apart, nu = base.apart(seen), beliefs.freedom
+    difference, nu = base.difference(seen), beliefs.freedom
     logs, weights = [], []
     for h in every:
         variance = base.variance[:4] + (np.array(beliefs.worked_on) ** 2 if h.worked_on else 0.0)
-        each = np.log1p((apart[:4] - h.change) ** 2 / variance / nu)
+        each = np.log1p((difference[:4] - h.change) ** 2 / variance / nu)
         distance = 0.5 * (nu + 1.0) * each.sum(axis=1)
         w = np.exp(distance.min() - distance)
         log = np.log(w.mean()) - distance.min() + np.log(h.prior) - 0.5 * np.log(variance).sum()
         for k, (mean, spread) in enumerate(h.manner):
             width = spread ** 2 + base.variance[4 + k]
-            log -= 0.5 * (apart[4 + k] - mean) ** 2 / width + 0.5 * np.log(width)
+            log -= 0.5 * (difference[4 + k] - mean) ** 2 / width + 0.5 * np.log(width)
         logs.append(log)
         weights.append(w / w.sum())
     return np.array(logs), weights
