@@ -14,6 +14,7 @@ UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
 #: the loop in recorded flights, since its spectrum is assumed, not measured
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
+SAME_MODELS = 0.5  #: of these shares in a simulator's flights: twice what right names left there in 78 flights
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
 BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
 BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
@@ -114,7 +115,7 @@ class Selection:
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         gained = self.whole.gain if self.whole else 0.0
-        share = UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE
+        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.simulated else 1.0)
         return max(self.least_left, share * gained, 0.0 if self.simulated else self.usual)
 
     @property
