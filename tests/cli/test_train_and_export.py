@@ -1,13 +1,15 @@
 """`airtouch train` and `airtouch export` from the outside: bad input, exit codes, stale sources."""
 
-import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from click.testing import CliRunner
 
 from airtouch import logs
+from airtouch.cli import main
 from airtouch.cli.learning import export as export_command
 from airtouch.cli.learning import train as train_command
 from airtouch.detector import best, registry
@@ -17,9 +19,25 @@ from made_flight import SMALL, made_flight
 from small_model import random_model
 
 
-def airtouch(*arguments: object) -> subprocess.CompletedProcess:
-    code = "from airtouch.cli import main; main()"
-    return subprocess.run([sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True)
+class Told(NamedTuple):
+    """What the program left: its exit code and what it wrote."""
+
+    returncode: int | str
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def airtouch(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Told]:
+    """airtouch(...): the program's own entry, in this process; a process of its own would import for a second."""
+    def run(*arguments: object) -> Told:
+        monkeypatch.setattr(sys, "argv", ["airtouch", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as left:
+            main()
+        return Told(left.value.code or 0, *capsys.readouterr())
+
+    return run
 
 
 def test_a_model_is_exported_and_checked(tmp_path: Path) -> None:
@@ -33,7 +51,7 @@ def test_a_model_is_exported_and_checked(tmp_path: Path) -> None:
     assert isinstance(refused.exception, AirTouchError) and "stale or foreign" in str(refused.exception)
 
 
-def test_check_refuses_sources_that_no_shipped_model_gives(tmp_path: Path) -> None:
+def test_check_refuses_sources_that_no_shipped_model_gives(tmp_path: Path, airtouch: Callable[..., Told]) -> None:
     folder = tmp_path / "model"
     assert airtouch("export", "--out", folder).returncode == 0
     done = airtouch("export", "--check", "--out", folder)
@@ -49,7 +67,7 @@ def test_check_refuses_sources_that_no_shipped_model_gives(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("command", ["export", "evaluate"])
-def test_a_file_that_is_no_model_gives_one_line(tmp_path: Path, command: str) -> None:
+def test_a_file_that_is_no_model_gives_one_line(tmp_path: Path, airtouch: Callable[..., Told], command: str) -> None:
     wrong = tmp_path / "wrong.npz"
     wrong.write_bytes(b"PK nothing")
     arguments = [wrong] if command == "export" else [tmp_path, "--model", wrong]

@@ -4,10 +4,11 @@ import pytest
 
 from airtouch.detector import best
 from made_flight import SMALL, made_flight
+from shared_fixture import once
 
 
 @pytest.fixture(scope="session")
-def small():
+def small(tmp_path_factory):
     """A small network, trained on two made flights."""
     pytest.importorskip("tensorflow")
-    return best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL)
+    return once(tmp_path_factory, "small", lambda: best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL))

@@ -80,13 +80,14 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if len(some) < len(seen):
         notes.append(f"candidates were judged on {len(some)} of {len(seen)} flights, evenly chosen")
     control = _control(data, selection, gap_cells) if verdict == "effect" else {}
+    arms = _arms(vehicle, nominal, fitted, some, selection, overall) if verdict == "effect" else {}
     steps = advices.steps(verdict, effects, alike, first, seen, bool(nominal), vehicle.name)
     return Diagnosis(
         verdict, tuple(effects), tuple(ranking), alike, cells,
         {"before": overall.before, "after": overall.after if verdict == "effect" else overall.before,
          "floor": 1.0},
         overall.share if verdict == "effect" else None, control, advices.advice(steps),
-        _arms(vehicle, nominal, some, selection, overall) if verdict == "effect" else {}, tuple(dict.fromkeys(notes)),
+        arms, tuple(dict.fromkeys(notes)),
         measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen),
         tuple(unexplained(study, some, selection, cells)) if verdict == "unknown" else (), made, first, steps,
         vehicle.name, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
@@ -179,12 +180,13 @@ def _control(data: Data, selection: Selection, cells: Cells) -> dict[str, object
     return {}
 
 
-def _arms(vehicle: Vehicle, nominal: Sequence[Flight], some: Sequence[Flight], selection: Selection,
-          overall: Shrink) -> dict[str, object]:
+def _arms(vehicle: Vehicle, nominal: Sequence[Flight], fitted: calibrate.Calibration | None, some: Sequence[Flight],
+          selection: Selection, overall: Shrink) -> dict[str, object]:
     """The shrink with the vehicle as calibrated (or declared, without baseline) and as its file declares it."""
     if not nominal or selection.chosen is None:
         return {"declared": _plain(overall)}
-    data = Data(calibrate.declared(vehicle, nominal), some)
+    known = fitted.declared if fitted is not None else None
+    data = Data(known or calibrate.declared(vehicle, nominal), some)
     parts = halves(data)
     terms = tuple(t for t in selection.chosen.terms if t.kind != CLOCK)
     fits = tuple(fit(data, p, terms, _start(terms, selection.chosen)) for p in parts)

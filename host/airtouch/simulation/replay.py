@@ -179,8 +179,10 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
         volts = log["vbat_V"].copy()
     effects = slots.slots(acting, [stream(seed, 0, a.effect.name) for a in acting])
     model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
-    _run(plant, _Log(s, np.ascontiguousarray(np.nan_to_num(log.stack(PWM) if pwm is None else pwm)), volts), effects,
-         model)
+    commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
+    if not np.isfinite(commands).all():
+        commands = np.nan_to_num(commands)
+    _run(plant, _Log(s, commands, volts), effects, model)
     row = plant[0]
     rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
     force, torque = model.motion[:, :3] + row["acc_bias"], model.motion[:, 3:]

@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY, ClosedLoop
-from airtouch.gap.signals.channels import TORQUE, angular_acceleration
+from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
@@ -150,7 +150,12 @@ def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray
 def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], kept: dict, active: Sequence[Active],
             ) -> dict[str, np.ndarray]:
     rest = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), kept)
-    return {r: blocks(rest, first[r], r) for r in first}
+    out = {}
+    for r, begin in first.items():  # commands are the command view's: nothing is left of them here
+        replayed = blocks(rest[:, :COMMAND.start], begin, r)
+        out[r] = np.zeros((*replayed.shape[:2], COUNT), complex)
+        out[r][:, :, :COMMAND.start] = replayed
+    return out
 
 
 def _cached(data: Data, name: str, active: Sequence[Active], make: Callable[[], list[dict[str, np.ndarray]]],

@@ -277,10 +277,10 @@ def strongest(problem: Problem, term: Term, values: np.ndarray, others: np.ndarr
     if not unit.any():
         return term
 
-    size = squared(values)
+    likelihood = problem.likelihoods(squared(values), others, unit)
 
     def cost(log_x: float) -> float:
-        return -problem.likelihood_of(size, others + random_effects.growth(term, np.exp(log_x)) * unit)
+        return -likelihood(random_effects.growth(term, np.exp(log_x)))
 
     top = np.log(min(float(high[0]), 1e3))
     grid = np.linspace(np.log(0.003), top, 40)

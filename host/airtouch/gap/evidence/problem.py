@@ -7,7 +7,7 @@ tail stands in for it.
 
 import functools
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,8 +110,13 @@ class Problem:
         return int(piece[2].sum()) * int(self.keep[piece[1]].sum())
 
     def _gather(self, by_flight: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
-        parts = [by_flight[i][r][chosen][:, self.keep[r]].ravel() for i, r, chosen in self.part.pieces]
+        parts = [by_flight[i][r].take(places) for (i, r, _), places in zip(self.part.pieces, self._places, strict=True)]
         return np.concatenate(parts) if parts else np.zeros(0, complex)
+
+    @functools.cached_property
+    def _places(self) -> list[np.ndarray]:
+        """Of each piece, the indices of its values in the flattened spectra of its flight."""
+        return [np.flatnonzero(chosen[:, None, None] & self.keep[r]) for _, r, chosen in self.part.pieces]
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """Spectra with effects in the model, flattened."""
@@ -221,10 +226,45 @@ class Problem:
         """Log likelihood of each value."""
         return self._each(squared(values), added)
 
+    def likelihoods(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
+        """`likelihood_of` of others + x * unit as a function of x: only what changes with x is worked out anew."""
+        each = self._each(size, others)
+        own = np.flatnonzero((unit != 0.0) & self.known)
+        floor, tail, falls = self.power[own], self.tail[own], self._falls[own]
+        some, beside, moved = size[own], others[own], unit[own]
+
+        def at(x: float) -> float:
+            each[own] = _each(some, floor + (beside + x * moved), tail, falls)
+            return float(each.sum())
+
+        return at
+
     def _each(self, size: np.ndarray, added: np.ndarray | float) -> np.ndarray:
-        power = self.power + added
-        tails = (self.freedom + 1.0) * np.log1p(size / power / self.tail)
-        return np.where(self.known, -OVERLAP_WEIGHT * (np.log(power) + tails), 0.0)
+        each = _each(size, self.power + added, self.tail, self._falls)
+        each[self._unknown] = 0.0
+        return each
+
+    @functools.cached_property
+    def _falls(self) -> np.ndarray:
+        """Power of the tails' fall."""
+        return self.freedom + 1.0
+
+    @functools.cached_property
+    def _unknown(self) -> np.ndarray:
+        """Indices of values that are not known."""
+        return np.flatnonzero(~self.known)
+
+
+def _each(size: np.ndarray, power: np.ndarray, tail: np.ndarray, falls: np.ndarray) -> np.ndarray:
+    """Log likelihood of values of a squared size; in place of the power."""
+    tails = size / power
+    tails /= tail
+    np.log1p(tails, out=tails)
+    tails *= falls
+    np.log(power, out=power)
+    power += tails
+    power *= -OVERLAP_WEIGHT
+    return power
 
 
 def cell_words(group: int) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights import motion
+from airtouch.gap.workspace import Workspace
 from airtouch.logs.checks.clock import LEAST_AFTER, lost_samples, true_period
 from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
@@ -56,7 +57,7 @@ class Flight:
     touching: np.ndarray
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
-    memory: dict = field(default_factory=dict, repr=False)  #: what was worked out once
+    workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.pwm)

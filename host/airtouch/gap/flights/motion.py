@@ -15,11 +15,10 @@ def held(values: np.ndarray) -> np.ndarray:
     """Missing samples (n,) or (n, c) filled along the flight by straight lines; 0 where all are missing."""
     out = np.array(values, dtype=np.float64)
     table = out[:, None] if out.ndim == 1 else out
-    index = np.arange(len(table))
-    for j in range(table.shape[1]):
-        good = np.isfinite(table[:, j])
-        if not good.all():
-            table[:, j] = np.interp(index, index[good], table[good, j]) if good.any() else 0.0
+    finite = np.isfinite(table)
+    for j in np.flatnonzero(~finite.all(axis=0)):
+        good = np.flatnonzero(finite[:, j])
+        table[:, j] = np.interp(np.arange(len(table)), good, table[good, j]) if len(good) else 0.0
     return out
 
 

@@ -76,10 +76,7 @@ def highpassed(values: np.ndarray) -> np.ndarray:
 
 def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Collective, roll, pitch and yaw commands (n, 4), N per motor, above HIGHPASS_HZ."""
-    kept = flight.memory.get("commands")
-    if kept is None:
-        kept = flight.memory["commands"] = highpassed(vehicle.thrust(flight.pwm) @ MIX.T)
-    return kept
+    return flight.workspace.once("commands", vehicle, lambda: highpassed(vehicle.thrust(flight.pwm) @ MIX.T))
 
 
 def steady(flight: Flight) -> np.ndarray:
@@ -109,17 +106,18 @@ def starts(flight: Flight) -> np.ndarray:
 
 def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
     """First samples and spectra (blocks, bins, AXES) of the commands, N/sqrt(Hz)."""
-    kept = flight.memory.get("command spectra")
-    if kept is None:
-        first = starts(flight)
-        window = np.hanning(LENGTH + 1)[:-1]
-        scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
-        told = commands(flight, vehicle)[:, :len(AXES)]
-        cut = told[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
-        made = np.fft.rfft(cut * window[:, None], axis=1)[:, _kept()] * scale
-        calm = _calm(np.abs(made) ** 2)
-        kept = flight.memory["command spectra"] = (first[calm], made[calm])
-    return kept
+    return flight.workspace.once("command spectra", vehicle, lambda: _block_spectra(flight, vehicle))
+
+
+def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
+    first = starts(flight)
+    window = np.hanning(LENGTH + 1)[:-1]
+    scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
+    told = commands(flight, vehicle)[:, :len(AXES)]
+    cut = told[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
+    made = np.fft.rfft(cut * window[:, None], axis=1)[:, _kept()] * scale
+    calm = _calm(np.abs(made) ** 2)
+    return first[calm], made[calm]
 
 
 def _calm(power: np.ndarray) -> np.ndarray:

@@ -56,13 +56,10 @@ def edges_of(flight: Flight) -> list[Edge]:
     """Edges with enough flight around them, none where there is no down range."""
     if not flight.log.has("zrange_m"):
         return []
-    kept = flight.memory.get("edges")
-    if kept is None:
-        air = flight.phase != 0
-        kept = flight.memory["edges"] = [
-            e for e in true_edges(flight.log, PLATFORM_STEP_M)
-            if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()]
-    return kept
+    air = flight.phase != 0
+    return flight.workspace.once("edges", (), lambda: [
+        e for e in true_edges(flight.log, PLATFORM_STEP_M)
+        if BEFORE <= e.sample < len(flight) - AFTER and air[e.sample - BEFORE:e.sample + AFTER].all()])
 
 
 def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int) -> np.ndarray:

@@ -57,9 +57,14 @@ def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarr
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
     a = np.full(len(shapes), 1.0 / len(shapes))
+    model, over = np.empty(len(power)), np.empty(len(power))
     for _ in range(steps):  # multiplicative updates for the Itakura-Saito divergence
-        model = a @ shapes
-        a = np.maximum(a * np.sqrt((shapes @ (power / model ** 2)) / (shapes @ (1.0 / model))), 1e-9)
+        np.matmul(a, shapes, out=model)
+        np.divide(1.0, model, out=over)
+        np.divide(power, np.square(model, out=model), out=model)
+        up = shapes @ model
+        up /= shapes @ over
+        a = np.maximum(a * np.sqrt(up, out=up), 1e-9)
     e = power / (a @ shapes)
     return a * scale, float((e - np.log(e) - 1.0).sum()), controller
 

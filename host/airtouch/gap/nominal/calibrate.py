@@ -52,6 +52,7 @@ class Calibration:
     active: tuple[Active, ...]
     parameters: dict[str, Quantity]
     notes: tuple[str, ...]
+    declared: Study | None = None  #: with the vehicle as declared; None where flights were left out
 
 
 def declared(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
@@ -69,7 +70,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     propeller) are left out and named, as long as most agree.
     """
     flights, odd = _alike(vehicle, flights)
-    study = declared(vehicle, flights)
+    study = as_declared = declared(vehicle, flights)
     chosen, prior = _terms()
     for _ in range(2):
         data = Data(replace(study, calibration=(), controller=None, response=None), flights, slow=True)
@@ -83,7 +84,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         if study.simulated:  # where every flight has the same trim: chance is in the lowest bin already
             study = replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
-                              (*odd, *_inconsistent(study, flights)))
+                              (*odd, *_inconsistent(study, flights)), None if odd else as_declared)
 
 
 def _recorded(flight: Flight) -> bool:

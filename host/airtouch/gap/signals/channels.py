@@ -111,8 +111,14 @@ def _steady(flight: Flight, vehicle: Vehicle, active: Sequence[Active], controll
 
 
 def angular_acceleration(flight: Flight) -> np.ndarray:
-    """Differences of the gyro (n, 3), rad/s^2; zero where there is none, which holds at low frequency."""
-    out = np.zeros((len(flight), 3))
-    if flight.rates is not None:
-        out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
-    return held(np.where(flight.bridged[:, None], np.nan, out))
+    """Differences of the gyro (n, 3), rad/s^2; zero where there is none, which holds at low frequency.
+
+    Worked out once for a flight, and not to be changed.
+    """
+    def make() -> np.ndarray:
+        out = np.zeros((len(flight), 3))
+        if flight.rates is not None:
+            out[:-1] = np.diff(flight.rates, axis=0) / PERIOD_S
+        return held(np.where(flight.bridged[:, None], np.nan, out))
+
+    return flight.workspace.once("turning", (), make)

@@ -70,4 +70,4 @@ def _without(flight: Flight, rows: np.ndarray) -> Flight:
 
     rates = None if flight.rates is None else bridged(flight.rates)
     return replace(flight, pwm=bridged(flight.pwm), acceleration=bridged(flight.acceleration), rates=rates,
-                   lost=flight.lost | rows, memory={})
+                   lost=flight.lost | rows)

@@ -5,6 +5,7 @@ value over the floor's standard deviation is one standard normal number (real an
 imaginary part each) when nothing is wrong.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -52,15 +53,24 @@ def blocks(values: np.ndarray, first: np.ndarray, regime: str) -> np.ndarray:
     |.|^2 has the mean of the one-sided PSD; a constant x gives x * sqrt(duration / 1.5).
     """
     length = LENGTH[regime]
-    window = np.hanning(length + 1)[:-1]
-    scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
-    cut = values[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length, values.shape[1]))
-    spectrum = np.fft.rfft(cut * window[:, None], axis=1)
+    if not len(first):
+        return np.zeros((0, length // 2 + 1, values.shape[1]), complex)
+    window, scale = _window(length)
+    cut = values[first[:, None] + np.arange(length)]
+    cut *= window
+    spectrum = np.fft.rfft(cut, axis=1)
     spectrum *= scale
     spectrum[:, 0] /= np.sqrt(2.0)
     if length % 2 == 0:
         spectrum[:, -1] /= np.sqrt(2.0)
     return spectrum
+
+
+@functools.cache
+def _window(length: int) -> tuple[np.ndarray, float]:
+    """A Hann window (length, 1), and what makes of a spectrum under it one of unit/sqrt(Hz)."""
+    window = np.hanning(length + 1)[:-1]
+    return window[:, None], np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
 
 
 def squared(values: np.ndarray) -> np.ndarray:

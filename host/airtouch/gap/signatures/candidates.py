@@ -89,7 +89,7 @@ class Term:
         values = dict(self.values)
         for name, amount in zip(self.free, x, strict=True):
             p = self._parameter(name)
-            values[name] = float(np.clip(_neutral(p) + amount * unit(p), p.low, p.high))
+            values[name] = float(min(max(_neutral(p) + amount * unit(p), p.low), p.high))
         return values
 
     def fitted(self, x: np.ndarray) -> "Term":
