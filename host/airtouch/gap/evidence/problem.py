@@ -54,8 +54,10 @@ class Problem:
         if data.slow:
             self.keep[AIR][FIRST_BIN:, TORQUE] = False
         self.commands = CommandView(data.study.controller, data.flights, data.first, part.pieces)
-        self.power = self._gather([{r: data.study.floor.level(f, b[r], r) + (lost if r == AIR else 0.0) for r in b}
-                                   for f, b, lost in zip(data.flights, data.first, data.bridging, strict=True)]).real
+        self.noise = self._gather([{r: data.study.floor.level(f, b[r], r) for r in b}
+                                   for f, b in zip(data.flights, data.first, strict=True)]).real
+        self.power = self.noise + self._gather([{AIR: lost, REST: np.zeros(base[REST].shape)}
+                                                for lost, base in zip(data.bridging, data.base, strict=True)]).real
         self.channel = self._gather([{r: np.broadcast_to(np.arange(COUNT), s[r].shape) for r in s}
                                      for s in data.base]).real.astype(int)
         self.flight = np.concatenate([np.full(self._size(p), p[0]) for p in part.pieces]) \
@@ -153,7 +155,7 @@ class Problem:
         change = np.where(self.known[:self.own], self._gather(spectra(self.data, loop)) - self.base[:self.own], 0.0)
         steps = step_doubt(self.data, loop)
         doubt = DOUBT ** 2 * squared(change) * self.torque + (0.0 if steps is None else self._gather(steps).real)
-        return doubt + self.power[:self.own] * self._noise(law.torque_change(loop, frequencies(AIR)))
+        return doubt + self.noise * self._noise(law.torque_change(loop, frequencies(AIR)))
 
     def _noise(self, change: Change) -> np.ndarray:
         """By what a changed loop multiplies the torque's floor (own,), less 1, as far as it is noise of the loop."""
