@@ -13,8 +13,9 @@ Where each decision is made; a folder imports only those above it:
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, `problem`, `fit` with `least_squares`,
-  `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show,
-  `generic` with `basis` what has no name.
+  `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show.
+- `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
+  and free `powers`.
 - `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does
   both for every candidate, `select` adds effects one by one; `selection` holds what was found, with its probabilities.
 - `nominal`, what the baseline flights say: `calibrate` (vehicle, floors), `apparent` (strengths where there is none).

@@ -1,6 +1,7 @@
 """Selection on made flights whose truth is known: white noise of the declared sensors, and what a test injects."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -242,12 +243,20 @@ def test_a_loss_counts_beyond_chance_and_beyond_a_fifth_of_what_its_channel_gain
     assert np.count_nonzero(lost) == 3
 
 
+@pytest.mark.parametrize(("exact", "by_firmware", "same"),
+                         [(True, True, True), (True, False, False), (False, True, False)])
+def test_models_are_the_same_where_flights_are_simulated_and_the_firmware_is_ours(exact, by_firmware, same):
+    """Other simulators' flights scatter as little, but their models of the air are their own."""
+    study = replace(FLOOR, scatter=SimpleNamespace(exact=exact), controller=SimpleNamespace(by_firmware=by_firmware))
+    assert study.same_models is same and not replace(study, controller=None).same_models
+
+
 def test_in_flights_of_a_simulator_calm_is_a_gap_and_less_may_be_left():
     exact, usual = (found([made(3, louder=r)], ("mass",), simulated(mass=[1e-3]))[0] for r in (0.5, 1.0))
     recorded, _ = found([made(3, louder=0.5)], ("mass",), scattered(mass=[1e-3]))
     assert recorded.free_before < 12.0 and exact.free_before > usual.free_before + 100.0
-    many = replace(exact, nominal=6, steps=(Judged("mass", (), 1000.0),))
-    other = replace(many, simulated=False)
+    other = replace(exact, nominal=6, steps=(Judged("mass", (), 1000.0),))
+    many = replace(other, same_models=True)
     assert other.allowed == pytest.approx(0.1 * 1000.0) and many.allowed == pytest.approx(0.5 * other.allowed)
     assert replace(other, assumed=True).allowed == pytest.approx(0.2 * 1000.0)
     assert replace(many, assumed=True).allowed == pytest.approx(0.5 * 0.2 * 1000.0)

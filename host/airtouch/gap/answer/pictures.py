@@ -15,7 +15,7 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, TORQUE, residual
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, sensor_power, starts
-from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.signatures.candidates import MEAN, Term, random_of
 from airtouch.gap.where.band_sums import BANDS_HZ, filtered, stretches
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
@@ -132,7 +132,7 @@ def _spectra(study: Study, flights: Sequence[Flight], effects: Sequence[Term], c
              ) -> tuple[Spectrum, ...]:
     """Means over all blocks in the air. Of a random effect the power is taken off, as no sample can be predicted."""
     active = [t.active() for t in effects if t.kind == MEAN]
-    random = [t for t in effects if t.kind == SPECTRUM]
+    random = random_of(effects)
     before, after, added = [], [], 0.0
     for f in flights:
         first = starts(f, AIR)

@@ -1,1 +1,1 @@
-"""How likely the flights are under an effect: likelihood, fit, gates in time, the model without names."""
+"""How likely the flights are under an effect: likelihood, fit, gates in time."""

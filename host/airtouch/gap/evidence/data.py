@@ -36,8 +36,13 @@ class Study:
 
     @property
     def simulated(self) -> bool:
-        """Whether its nominal flights are those of a simulator with the same models."""
+        """Whether its nominal flights are those of a simulator, which are all drawn alike."""
         return self.scatter is not None and self.scatter.exact
+
+    @property
+    def same_models(self) -> bool:
+        """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
+        return self.simulated and self.controller is not None and self.controller.by_firmware
 
     @property
     def recorded(self) -> bool:

@@ -15,7 +15,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of, without_offsets
 from airtouch.gap.evidence.problem import GROUPS, LOOP, Part, Problem, problem_of
 from airtouch.gap.signals.spectra import squared
-from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term, random_of
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8
@@ -53,7 +53,7 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     problem = problem_of(data, part)
     terms = tuple(terms)
     mean = tuple(t for t in terms if t.kind == MEAN)
-    random = [t for t in terms if t.kind == SPECTRUM]
+    random = random_of(terms)
     x = _start(problem, mean, start)
     offsets, covariance = np.zeros(0), np.zeros((0, 0))
     added: np.ndarray | float = 0.0
@@ -100,7 +100,7 @@ def left_over(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
 
 def cell_gains(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (GROUPS,) that effects with these parameters add in each cell: view, channel and band."""
-    problem, values, power = left_over(data, part, (), any(t.kind == SPECTRUM for t in terms))
+    problem, values, power = left_over(data, part, (), bool(random_of(terms)))
     without = problem.each(values, power - problem.power)
     problem, values, power = left_over(data, part, terms)
     return np.bincount(problem.groups, problem.each(values, power - problem.power) - without, GROUPS)

@@ -19,7 +19,7 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.spectra import AIR, LENGTH
 from airtouch.gap.signatures import candidates
-from airtouch.gap.signatures.candidates import SPECTRUM, Term
+from airtouch.gap.signatures.candidates import Term, random_of
 from airtouch.logs.segments import KINDS
 
 MOST_STRETCHES = 4  #: of one flight
@@ -76,7 +76,7 @@ def _judged(data: Data, whole: Part, name: str, terms: Sequence[Term], gate: Gat
     acting = [replace(t, gate=gate) for t in terms]
     fitted = fit(data, whole, acting)
     free = sum(len(t.free) for t in acting)
-    without = level[any(t.kind == SPECTRUM for t in acting)]
+    without = level[bool(random_of(acting))]
     return Gated(name, fitted, judge(data, whole, fitted.terms) - without - cost - 0.5 * free * np.log(blocks), cost)
 
 

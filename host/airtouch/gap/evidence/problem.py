@@ -21,7 +21,7 @@ from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandView
 from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, OVERLAP_WEIGHT, REST, blocks, frequencies, judged, squared
-from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.signatures.candidates import MEAN, Term, random_of
 from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
@@ -138,7 +138,7 @@ class Problem:
 
     def modelled(self, terms: Sequence[Term], wide: bool = False) -> tuple[np.ndarray, np.ndarray, float]:
         """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
-        random = [t for t in terms if t.kind == SPECTRUM]
+        random = random_of(terms)
         mean = [t.active() for t in terms if t.kind == MEAN]
         told, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
         return self.values(mean), self.random_power(random) + told, cost

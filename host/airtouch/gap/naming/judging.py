@@ -15,7 +15,7 @@ from airtouch.gap.evidence.problem import Part
 from airtouch.gap.naming.screen import Screen
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.signals.spectra import AIR, REST
-from airtouch.gap.signatures.candidates import CLOCK, MEAN, SPECTRUM, Term, telling
+from airtouch.gap.signatures.candidates import CLOCK, MEAN, Term, random_of, telling
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
@@ -84,7 +84,7 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
     paid = choice + (chosen.choice if chosen else 0.0)
     beyond = chosen.beyond if chosen else 0.0
     wider = 0.0
-    if chosen and chosen.fits and not _has_random(held) and _has_random(terms):
+    if chosen and chosen.fits and not random_of(held) and random_of(terms):
         wider = sum(gain_of(on, test, chosen.fits[train].terms) - gain_of(on, test, chosen.fits[train].terms, True)
                     for train, test in ROUND_TRIP)
     gain, fits = 0.0, []
@@ -109,16 +109,12 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
                   apart=apart, beyond=beyond + wider)
 
 
-def _has_random(terms: Sequence[Term]) -> bool:
-    return any(t.kind == SPECTRUM for t in terms)
-
-
 def gain_of(on: Trial, half: int, terms: Sequence[Term], wide: bool = False) -> float:
     """Log likelihood that fitted effects add on a half, over no effect as sure of the commands' floor.
 
     wide: that floor is as uncertain as under random effects, though there are none.
     """
-    return judge(on.data, on.parts[half], terms, wide) - on.base[wide or _has_random(terms)][half]
+    return judge(on.data, on.parts[half], terms, wide) - on.base[wide or bool(random_of(terms))][half]
 
 
 def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[Fit]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

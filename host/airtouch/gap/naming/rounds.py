@@ -13,7 +13,7 @@ from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, covariance_among_all, crossed, price_of
 from airtouch.gap.naming.screen import first_order, random_look
 from airtouch.gap.naming.selection import Hypothesis, Judged
-from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, SPECTRUM, Term, names_alike, telling
+from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, Term, names_alike, random_of, telling
 from airtouch.gap.signatures.nominal_scatter import Scatter
 
 HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
@@ -54,7 +54,7 @@ def round_of(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], chosen: 
                 looked.append(Judged(name, (*held, *terms), gain, full=False, choice=choice,
                                      strength=own.among_all(each.mean(axis=0)),
                                      covariance=covariance_among_all(own, np.diag(_of_mean(each, variances, k)))))
-            elif any(t.kind == SPECTRUM for t in terms):
+            elif random_of(terms):
                 with_random.append((name, terms, choice))
             else:
                 sure.append(crossed(on, name, terms, chosen, choice))
@@ -129,7 +129,7 @@ def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: 
         if name in mean and not _same(terms[0], mean[name].terms[-1]):
             continue
         if len(terms) == 1 or terms[0].kind == MEAN:
-            random = next(t for t in terms if t.kind == SPECTRUM)
+            random = random_of(terms)[0]
             gain, strength = random_look(on.screen, on.parts, residuals, extra_power, random)
             looks.setdefault(name, []).append((gain - choice, strength, terms, choice))
     out = []

@@ -1,6 +1,6 @@
 """Which effect: candidates are judged one against another and added one by one while held-out data ask for them.
 
-`none` is the hypothesis of no effect. `unknown` is a model without names (gap.evidence.generic): it needs more
+`none` is the hypothesis of no effect. `unknown` is a model without names (gap.unnamed.generic): it needs more
 parameters, so a named effect that is right beats it; where it gains much on top of the named effects, something is left
 that they do not explain.
 """
@@ -14,7 +14,6 @@ from airtouch.gap.evidence.clock import clock_gain, clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, fit
 from airtouch.gap.evidence.gates import gated
-from airtouch.gap.evidence.generic import generic_gain, height_gain
 from airtouch.gap.evidence.problem import GROUPS, cell_words
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import (
@@ -29,13 +28,14 @@ from airtouch.gap.naming.judging import (
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SPECTRUM, Term, is_random
+from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, Term, is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.gap.unnamed.generic import generic_gain, height_gain
 
 #: of what the effects before it have gained, that another must gain, in flights of a simulator with the same models
 LEAST_SHARE, RECORDED_SHARE = 0.01, 0.1  #: and in others: no model of air is exact
 #: the same of what changes the loop, beside another that does or shakes it: twice what wrong ones gained at most beside
-#: right ones in 43 simulated flights; in recorded ones the loop model is no better than a quarter
+#: right ones in 43 simulated flights; in others the loop model is no better than a quarter
 ASSUMED_SHARE, LOOP_SHARE = 0.1, 0.25
 #: the same of what is random, to be named: what a model is wrong by looks random. Beside weak motors and offset masses
 #: motor noise gained 3 to 16 %: the yaw command of the logged instant is not that of the 10 ms around it
@@ -65,9 +65,10 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     before = nameless(on, None)
     after = nameless(on, steps[-1]) if steps else before
     last = steps[-1].terms if steps else ()
-    assumed = _is_random(last) if data.study.simulated else _assumes(data, last)
+    assumed = bool(random_of(last)) if data.study.simulated else _assumes(data, last)
     found = Selection(singles, tuple(steps), before, after, on.parts, least, data.study.nominal, assumed,
-                      _usual(data), data.study.simulated, clock_left(data, [t.name for t in last]))
+                      _usual(data), data.study.simulated, data.study.same_models,
+                      clock_left(data, [t.name for t in last]))
     return replace(found, contradicted=contradicted(on, found.chosen)) if found.simulated else found
 
 
@@ -191,11 +192,7 @@ def _usual(data: Data) -> float:
 
 def _assumes(data: Data, terms: Sequence[Term]) -> bool:
     """Whether the spectrum of effects is assumed: they are random or change the loop."""
-    return _is_random(terms) or _changes_loop(data, terms)
-
-
-def _is_random(terms: Sequence[Term]) -> bool:
-    return any(t.kind == SPECTRUM for t in terms)
+    return bool(random_of(terms)) or _changes_loop(data, terms)
 
 
 def _changes_loop(data: Data, terms: Sequence[Term]) -> bool:
@@ -221,7 +218,7 @@ def _needed_beside(on: Trial, held: Judged, more: Judged) -> float:
 
 
 def _assumed_share(data: Data) -> float:
-    return LOOP_SHARE if data.study.recorded else ASSUMED_SHARE
+    return ASSUMED_SHARE if data.study.same_models else LOOP_SHARE
 
 
 def _misfit(on: Trial, held: Judged, more: Judged, share: float, everywhere: bool = False) -> float:

@@ -14,7 +14,7 @@ UNKNOWN_GAIN, UNKNOWN_ALONE = 12.0, 25.0
 #: and as a share of what the effects named gain, as no model is exact; larger where one of them is random or changes
 #: the loop in recorded flights, since its spectrum is assumed, not measured
 UNKNOWN_SHARE, UNKNOWN_ASSUMED = 0.1, 0.2
-SAME_MODELS = 0.5  #: of these shares in a simulator's flights: twice what right names left there in 78 flights
+SAME_MODELS = 0.5  #: of these in flights of this project's simulator: twice what right names left there, 78 flights
 TEMPERATURE = 6.0  #: of probabilities: log likelihoods of real flights are too sure of themselves
 BEHIND = 1.0  #: log likelihood that others lie behind the effect that is the answer, at least
 BELOW = 0.9  #: of the probability of the first effect named, that of `unknown` where the verdict is not that
@@ -80,7 +80,8 @@ class Selection:
     nominal: int
     assumed: bool
     usual: float  #: log likelihood that a nameless model gains in nominal flights as long as these
-    simulated: bool = False  #: whether the flights come from the models that effects are fitted with
+    simulated: bool = False
+    same_models: bool = False  #: whether the flights come from the models that effects are fitted with
     of_times: float = 0.0
     contradicted: tuple[float, str] = (0.0, "")
 
@@ -115,7 +116,7 @@ class Selection:
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         gained = self.whole.gain if self.whole else 0.0
-        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.simulated else 1.0)
+        share = (UNKNOWN_ASSUMED if self.assumed else UNKNOWN_SHARE) * (SAME_MODELS if self.same_models else 1.0)
         return max(self.least_left, share * gained, 0.0 if self.simulated else self.usual)
 
     @property

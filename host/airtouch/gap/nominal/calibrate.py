@@ -14,7 +14,6 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import fit
-from airtouch.gap.evidence.generic import usual_of
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
@@ -27,6 +26,7 @@ from airtouch.gap.signals.response import Response, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.gap.signatures.candidates import Term, terms
 from airtouch.gap.signatures.nominal_scatter import scatter_of
+from airtouch.gap.unnamed.generic import usual_of
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle

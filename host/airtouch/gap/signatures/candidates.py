@@ -224,6 +224,11 @@ def telling(terms: Sequence[Term]) -> Term:
     return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 
+def random_of(terms: Sequence[Term]) -> list[Term]:
+    """The terms that add power, whose phase is not known."""
+    return [t for t in terms if t.kind == SPECTRUM]
+
+
 def is_random(name: str) -> bool:
     """Whether an effect's strength is that of a random force, which no strength below 0 has."""
     return name in SHAKES or name in EFFECTS and terms(name)[0].kind == SPECTRUM

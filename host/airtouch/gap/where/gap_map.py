@@ -18,7 +18,7 @@ from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.result import BASELINE, SPREAD, Cell, GapMap
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, TORQUE, residual
 from airtouch.gap.signals.spectra import frequencies
-from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term
+from airtouch.gap.signatures.candidates import MEAN, Term, random_of
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, sensor_rms, sums
 from airtouch.gap.where.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
 from airtouch.logs.segments import KINDS
@@ -165,7 +165,7 @@ def _after(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     active = [t.active() for t in terms if t.kind == MEAN]
     left = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
                 study.vehicle)
-    random = [t for t in terms if t.kind == SPECTRUM]
+    random = random_of(terms)
     if not random or not len(left.phase):
         return left
     data = Data(study, [flight])

@@ -1,4 +1,4 @@
-"""The flight's own signals, for a regression of what a hypothesis leaves (gap.evidence.generic)."""
+"""The flight's own signals, for a regression of what a hypothesis leaves (gap.unnamed.generic)."""
 
 import numpy as np
 from scipy.signal import lfilter

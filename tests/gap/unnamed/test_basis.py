@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.evidence.basis import BASIS, HEIGHT_M, LAG_S, TIME_S, basis
+from airtouch.gap.unnamed.basis import BASIS, HEIGHT_M, LAG_S, TIME_S, basis
 from airtouch.simulation import signals as at
-from gap_flights import VEHICLE, flight
+from gap_flights import VEHICLE, flight, flown
 
 REST_S, TILT = 1.0, 0.3
 WEIGHT_N = VEHICLE.mass_kg * VEHICLE.gravity_mps2
@@ -72,3 +72,14 @@ def test_time_height_and_axes_of_the_world():
     # a push along x of the world is felt along the body's x by cos, along its y by -sin of the yaw
     np.testing.assert_allclose(seen["world_x"][0], [c, -s, 0.0], atol=1e-12)
     np.testing.assert_allclose(seen["world_y"][0], [s, c, 0.0], atol=1e-12)
+
+
+def test_columns_are_the_signals_that_they_are_named_after():
+    one = flown(1, 43)[0]
+    made = columns(one)
+    hover = np.flatnonzero(one.phase == 2)
+    assert np.all(made["in_air"][one.on_ground] == 0.0) and np.all(made["one"] == 1.0)
+    assert abs(made["thrust"][hover, 0].mean() - 1.0) < 0.1  # of its weight
+    np.testing.assert_allclose(made["vx"][hover, 1], one.signals[hover, at.VELOCITY])
+    rows = np.stack([made[k][hover] for k in ("world_x", "world_y", "tilt")], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(rows, axis=2), 1.0, rtol=1e-9)  # rows of a rotation

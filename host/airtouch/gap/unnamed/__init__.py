@@ -1,0 +1,1 @@
+"""What no named effect explains: a regression on the flight's own signals, and free powers, of what is left."""

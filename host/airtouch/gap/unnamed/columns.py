@@ -1,0 +1,143 @@
+"""The columns of the regression as spectra: the flight's own signals, and the torque of its commands, band by band.
+
+In flights of this project's simulator, whose loop is modelled, roll and pitch torque is regressed on that of the logged
+commands as well, in time with them and a quarter turn later: how else they turn the vehicle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from airtouch.gap.evidence.data import Data, commanded
+from airtouch.gap.evidence.problem import BANDS_HZ, GROUPS, Part, Problem
+from airtouch.gap.signals.channels import TORQUE
+from airtouch.gap.signals.response import FIRST_BIN
+from airtouch.gap.signals.spectra import AIR, blocks, frequencies
+from airtouch.gap.signatures.candidates import MEAN, Term, random_of
+from airtouch.gap.unnamed.basis import BASIS, basis
+
+CHANNELS = 9  #: that are regressed: force, torque, rate
+ROLL_PITCH = (TORQUE.start, TORQUE.start + 1)  #: torques of a loop that is modelled; of yaw noise of the gyro is most
+TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
+LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
+LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
+WIDEST = len(BASIS) + LOOP
+NOTHING = 1e-9  #: variance of a coefficient that has no scatter
+#: columns of the command that turns the vehicle about each axis of the torque
+OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
+
+
+@dataclass(frozen=True)
+class Usual:
+    """Nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, GROUPS)."""
+
+    columns: np.ndarray
+    power: np.ndarray
+
+
+def nothing_usual() -> Usual:
+    """Where no nominal flight is known: columns and bands as the floor has them."""
+    return Usual(np.zeros((CHANNELS, WIDEST)), np.zeros((2, GROUPS)))
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One channel of one flight: elements own, columns (elements, free and offsets), spread of the offsets."""
+
+    channel: int
+    own: np.ndarray
+    columns: np.ndarray
+    offsets: np.ndarray
+
+    @property
+    def free(self) -> int:
+        """Columns whose coefficient may be anything."""
+        return self.columns.shape[1] - len(self.offsets)
+
+    def precision(self, usual: Usual) -> np.ndarray:
+        """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
+        nominal = np.maximum(usual.columns[self.channel, :self.free] ** 2, NOTHING)
+        return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
+
+
+def cells_of(data: Data, part: Part, problem: Problem) -> list[Cell]:
+    """The cells of a half; made once."""
+    return problem.workspace.once("cells", (), lambda: _cells(data, part, problem))
+
+
+def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
+    out = []
+    channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
+    for c in range(CHANNELS):
+        table, every = _table(data, part, problem, c), np.flatnonzero(channel == c)
+        for f in np.unique(flight):
+            here = known[every] & (flight[every] == f)
+            own = every[here]
+            offsets = [(x[own], p) for x, p in problem.constant() if np.any(x[own])]
+            if len(own):
+                out.append(Cell(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
+                                 np.array([p for _, p in offsets])))
+    return out
+
+
+def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
+    """Spectra (blocks, bins, columns) of the basis for x, y and z channels, by flight and regime; made once."""
+    def make() -> list[list[dict[str, np.ndarray]]]:
+        out = []
+        for flight, first in zip(data.flights, data.first, strict=True):
+            signals = basis(flight, data.study.vehicle)
+            out.append([{r: blocks(signals[:, :, a], first[r], r) for r in first} for a in range(3)])
+        return out
+
+    return data.workspace.once("basis", (), make)
+
+
+def _loop_columns(data: Data) -> list[np.ndarray]:
+    """Spectra (blocks, bins, 2, LOOP) in the air of the torque that the model makes of the commands, by flight: each
+
+    band's alone, weighted as what is left of the torque is; made once.
+    """
+    def make() -> list[np.ndarray]:
+        f, response = frequencies(AIR), data.study.response
+        bands = np.array([(f >= low) & (f < high) for low, high in pairwise(LOOP_HZ)]).T
+        bands[:FIRST_BIN] = False
+        shape = np.stack([turn * bands for turn in TURNS], axis=-1).reshape(len(f), 1, LOOP)
+        out = []
+        for i, torque in enumerate(commanded(data)):
+            weighted = torque if response is None else response.weighted(data.quiet[i], torque)
+            out.append(np.nan_to_num(weighted)[:, :, :2, None] * shape)
+        return out
+
+    return data.workspace.once("loop", (), make)
+
+
+def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
+    """The columns (elements, columns) at the elements of one channel, in their order."""
+    every, made = _columns(data), []
+    axis, turns = channel % 3, channel in ROLL_PITCH
+    for i, r, chosen in part.pieces:
+        columns = every[i][axis][r][chosen]
+        if turns:
+            loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP))
+            columns = np.concatenate([columns, loop], axis=2)
+        made.append(columns[:, problem.keep[r][:, channel]].reshape(-1, columns.shape[2]))
+    return np.concatenate(made) if made else np.zeros((0, len(BASIS)), complex)
+
+
+def answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
+    """Whether a column says something new beside a hypothesis, bool (WIDEST,).
+
+    A random torque is in the commands that answer it: what is left follows these, as it should. And how a changed loop
+    turns the vehicle about its yaw axis upon a command is not modelled.
+    """
+    out = np.ones(WIDEST, bool)
+    out[len(BASIS):] = data.study.simulated
+    law, yaw = data.study.controller, TORQUE.stop - 1
+    if random_of(terms):
+        out[OF_COMMAND.get(channel, [])] = False
+        out[len(BASIS):] = False
+    elif channel == yaw and law is not None and law.changes_loop([t.active() for t in terms if t.kind == MEAN]):
+        out[OF_COMMAND[yaw]] = False
+    return out
