@@ -1,7 +1,7 @@
 """The columns of the regression as spectra: the flight's own signals, and the torque of its commands, band by band.
 
-In flights of this project's simulator, whose loop is modelled, roll and pitch torque is regressed on that of the logged
-commands as well, in time with them and a quarter turn later: how else they turn the vehicle.
+In simulated flights of this project's firmware, whose loop is modelled, roll and pitch torque is regressed on that of
+the logged commands as well, in time with them and a quarter turn later: how else they turn the vehicle.
 """
 
 from collections.abc import Sequence
@@ -133,7 +133,7 @@ def answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:
     turns the vehicle about its yaw axis upon a command is not modelled.
     """
     out = np.ones(WIDEST, bool)
-    out[len(BASIS):] = data.study.simulated
+    out[len(BASIS):] = data.study.same_models
     law, yaw = data.study.controller, TORQUE.stop - 1
     if random_of(terms):
         out[OF_COMMAND.get(channel, [])] = False
