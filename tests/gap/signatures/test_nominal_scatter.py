@@ -256,3 +256,15 @@ def test_flights_of_the_simulator_are_all_drawn_alike():
     assert got.exact and got.freedom == table()["simulated"].freedom + 4
     recorded = scatter_of([Apparent(still, still, 0.0) for _ in range(4)], recorded=True)
     assert not recorded.exact and recorded.freedom == 8.0
+
+
+def test_simulated_flights_that_scatter_otherwise_than_their_class_are_believed():
+    """Four flights of another mission, with 0.1 of a ground effect each, where the class knows 0.005."""
+    rng, known = np.random.default_rng(8), table()["simulated"].rms
+    flights = [Apparent(one.strengths | {"ground_effect": rng.normal(0.1, 0.02, 1)},
+                        one.errors | {"ground_effect": np.array([0.02])}, one.rate)
+               for one in drawn(rng, {k: v for k, v in known.items() if k not in SHARED}, 4)]
+    got = scatter_of(flights)
+    assert got.exact and 0.05 < got.rms["ground_effect"][0] < 0.2
+    others = [got.rms[k] / v for k, v in known.items() if k in flights[0].strengths and k != "ground_effect"]
+    assert 0.8 < np.median(np.concatenate(others)) < 1.3  # those that scatter as the class does stay with it

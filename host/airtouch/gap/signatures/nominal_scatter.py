@@ -18,6 +18,7 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
+from scipy.special import logsumexp
 from scipy.stats import t as student
 
 from airtouch.gap.signatures.candidates import ALIKE, is_random
@@ -173,7 +174,7 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
             sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
             middle[name] = centre = sums / (worth + len(rows))
         own_rms = [_median(scale * (_column(rows, name, "strengths", k) - centre[k]),
-                           scale * _column(rows, name, "errors", k), p, worth)
+                           scale * _column(rows, name, "errors", k), p, (worth, min(worth, WORTH)))
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
@@ -191,18 +192,21 @@ def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.nda
     return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
 
 
-def _median(x: np.ndarray, error: np.ndarray, prior: float, worth: float) -> float:
+def _median(x: np.ndarray, error: np.ndarray, prior: float, worths: Sequence[float] = ()) -> float:
     """Posterior median of the standard deviation of values (n,) that chance alone scatters by `error` (n,).
 
-    The variance's prior is scaled inverse chi-square of `worth` degrees of freedom; where worth is 0 every order of
-    magnitude of GRID is as likely, and the least is told where the values say nothing. The likeliest value would be
-    none at all wherever chance can explain the values.
+    The variance's prior is scaled inverse chi-square about `prior`^2, of any of the degrees of freedom `worths` alike:
+    flights that do not scatter as a well-known class does are not of it. Without worths every order of magnitude of
+    GRID is as likely, and the least is told where the values say nothing. The likeliest value would be none at all
+    wherever chance can explain the values.
     """
-    if not worth and float(((1.0 + error ** 2) ** -2.0).sum()) < SAYS:  # Fisher information, of sure ones 1 each
+    if not worths and float(((1.0 + error ** 2) ** -2.0).sum()) < SAYS:  # Fisher information, of sure ones 1 each
         return LEAST
     variance = GRID[:, None] ** 2 + error ** 2
     level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
-    level -= 0.5 * worth * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) if worth else 0.0
+    if worths:
+        priors = [-0.5 * n * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) for n in worths]
+        level += logsumexp([p - logsumexp(p) for p in priors], axis=0)
     below = np.cumsum(np.exp(level - level.max()))
     return float(GRID[int(np.searchsorted(below, 0.5 * below[-1]))])
 
@@ -281,8 +285,8 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
             middle[name] = np.array([strengths.mean() for strengths, _ in columns])
             columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
         each, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
-        pooled = _median(each, errors, 0.0, 0.0)
-        rms[name] = np.array([_median(x, e, pooled, POOLED) for x, e in columns] if size > 1 else [pooled])
+        pooled = _median(each, errors, 0.0)
+        rms[name] = np.array([_median(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1 else [pooled])
     # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
     passing = {n: _moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
