@@ -71,10 +71,10 @@ def _cells(data: Data, part: Part, problem: Problem) -> list[Cell]:
     out = []
     channel, flight, known = (x[:problem.own] for x in (problem.channel, problem.flight, problem.known))
     for c in range(CHANNELS):
-        table, every = _table(data, part, problem, c), np.flatnonzero(channel == c)
+        table, elements = _table(data, part, problem, c), np.flatnonzero(channel == c)
         for f in np.unique(flight):
-            here = known[every] & (flight[every] == f)
-            own = every[here]
+            here = known[elements] & (flight[elements] == f)
+            own = elements[here]
             offsets = [(x[own], p) for x, p in problem.constant() if np.any(x[own])]
             if len(own):
                 out.append(Cell(c, own, np.column_stack([table[here], *(x for x, _ in offsets)]),
@@ -95,9 +95,9 @@ def _columns(data: Data) -> list[list[dict[str, np.ndarray]]]:
 
 
 def _loop_columns(data: Data) -> list[np.ndarray]:
-    """Spectra (blocks, bins, 2, LOOP) in the air of the torque that the model makes of the commands, by flight: each
+    """Spectra (blocks, bins, 2, LOOP) in the air of the torque that the model makes of the commands, by flight.
 
-    band's alone, weighted as what is left of the torque is; made once.
+    Each band's alone, weighted as what is left of the torque is; made once.
     """
     def make() -> list[np.ndarray]:
         f, response = frequencies(AIR), data.study.response
@@ -115,15 +115,15 @@ def _loop_columns(data: Data) -> list[np.ndarray]:
 
 def _table(data: Data, part: Part, problem: Problem, channel: int) -> np.ndarray:
     """The columns (elements, columns) at the elements of one channel, in their order."""
-    every, made = _columns(data), []
-    axis, turns = channel % 3, channel in ROLL_PITCH
+    spectra, rows = _columns(data), []
+    axis = channel % 3
     for i, r, chosen in part.pieces:
-        columns = every[i][axis][r][chosen]
-        if turns:
+        columns = spectra[i][axis][r][chosen]
+        if channel in ROLL_PITCH:
             loop = _loop_columns(data)[i][chosen, :, axis] if r == AIR else np.zeros((*columns.shape[:2], LOOP))
             columns = np.concatenate([columns, loop], axis=2)
-        made.append(columns[:, problem.keep[r][:, channel]].reshape(-1, columns.shape[2]))
-    return np.concatenate(made) if made else np.zeros((0, len(BASIS)), complex)
+        rows.append(columns[:, problem.keep[r][:, channel]].reshape(-1, columns.shape[2]))
+    return np.concatenate(rows) if rows else np.zeros((0, len(BASIS)), complex)
 
 
 def answerable(data: Data, terms: Sequence[Term], channel: int) -> np.ndarray:

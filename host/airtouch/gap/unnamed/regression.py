@@ -72,34 +72,49 @@ def coefficients(half: HalfResiduals, channel: int, usual: Usual, among: np.ndar
     found = np.zeros(WIDEST)
     if not cells:
         return found
-    n = cells[0].free
-    every = [k for k in range(n) if among is None or among[k]]
+    allowed = [k for k in range(cells[0].free) if among is None or among[k]]
     left = [half.values[c.own] for c in cells]
     for _ in range(ROUNDS):  # of weights
-        told, right = np.zeros((n, n)), np.zeros(n)
-        for cell, rest in zip(cells, left, strict=True):  # the flight's own share of every column is solved for
-            normal, slope = half.system(cell, half.values[cell.own], rest)
-            ridge = normal + np.diag(cell.precision(usual))
-            taken = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
-            told += normal[:n, :n] - normal[:n] @ taken[:, :n]
-            right += slope[:n] - normal[:n] @ taken[:, n]
-        told += np.diag(1e-9 * np.diag(told) + 1e-12)
-        free: list[int] = []
-        gain = 0.0
-        while len(free) < MOST_COLUMNS:
-            tried = [(_gain(told, right, [*free, k]), k) for k in every if k not in free]
-            if not tried or max(tried)[0] - gain < CHANCE:
-                break
-            gain, k = max(tried)
-            free.append(k)
+        normal, right = _shared_system(half, cells, left, usual)
+        free = _worth_asking(normal, right, allowed)
         found = np.zeros(WIDEST)
-        found[free] = np.linalg.solve(told[np.ix_(free, free)], right[free])
+        found[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
         left = [half.without(c, found, usual)[0] for c in cells]
     return found
 
 
-def _gain(told: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
-    return 0.5 * float(right[free] @ np.linalg.solve(told[np.ix_(free, free)], right[free]))
+def _shared_system(half: HalfResiduals, cells: Sequence[Cell], left: Sequence[np.ndarray], usual: Usual,
+                   ) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and right-hand side of the coefficients that all flights share, each flight's own solved for.
+
+    left: what earlier coefficients leave of each cell.
+    """
+    n = cells[0].free
+    total, right = np.zeros((n, n)), np.zeros(n)
+    for cell, rest in zip(cells, left, strict=True):
+        normal, slope = half.system(cell, half.values[cell.own], rest)
+        ridge = normal + np.diag(cell.precision(usual))
+        own = np.linalg.solve(ridge, np.column_stack([normal[:, :n], slope]))
+        total += normal[:n, :n] - normal[:n] @ own[:, :n]
+        right += slope[:n] - normal[:n] @ own[:, n]
+    return total + np.diag(1e-9 * np.diag(total) + 1e-12), right
+
+
+def _worth_asking(normal: np.ndarray, right: np.ndarray, allowed: Sequence[int]) -> list[int]:
+    """Columns that gain more than CHANCE one after another, the best first; at most MOST_COLUMNS."""
+    free: list[int] = []
+    gain = 0.0
+    while len(free) < MOST_COLUMNS:
+        tried = [(_gain(normal, right, [*free, k]), k) for k in allowed if k not in free]
+        if not tried or max(tried)[0] - gain < CHANCE:
+            break
+        gain, k = max(tried)
+        free.append(k)
+    return free
+
+
+def _gain(normal: np.ndarray, right: np.ndarray, free: Sequence[int]) -> float:
+    return 0.5 * float(right[free] @ np.linalg.solve(normal[np.ix_(free, free)], right[free]))
 
 
 def linear_gain(half: HalfResiduals, channel: int, found: np.ndarray, usual: Usual) -> float:
