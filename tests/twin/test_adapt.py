@@ -108,6 +108,7 @@ def test_more_flights_are_a_new_twin_and_the_same_ones_are_not_fitted_again(made
     from airtouch.twin.fitting import calibrate, edge_fit
     monkeypatch.setattr(calibrate, "ROUNDS", 1)
     monkeypatch.setattr(calibrate, "BATCH", 40)
+    monkeypatch.setattr(edge_fit, "FLIGHTS", 16)
     flights, work = flights_of(made, 5), tmp_path / "work"
     folder = write(tmp_path / "flights", flights)
     listed = [replace(f, file=replace(f.file, path=folder / f"flight_{i}.csv.gz")) for i, f in enumerate(flights)]

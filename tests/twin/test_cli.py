@@ -34,8 +34,11 @@ def folder(made, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def twin(folder, tmp_path_factory):
+    """A fit of one round; how well edges are fitted is the matter of fitting/test_edge_fit.py."""
     out = tmp_path_factory.mktemp("twin") / "mine"
-    result = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40, "--workers", 1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(edge_fit, "FLIGHTS", 16)
+        result = run("twin", folder, "--out", out, "--rounds", 1, "--batch", 40, "--workers", 1)
     assert result.exit_code == 0, result.output + str(result.exception)
     return out, result.output
 
