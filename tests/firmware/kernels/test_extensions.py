@@ -16,7 +16,8 @@ from airtouch.kernels import band_power, library
 ROOT = Path(__file__).parents[3]
 KERNELS, HOST, GAP8 = ROOT / "firmware/kernels", ROOT / "host/airtouch/kernels/batch", ROOT / "gap8/kernels"
 PLAIN = "-DAIRTOUCH_PLAIN_C"
-NO_CHECKS = "-fno-sanitize=undefined"  # zig would build its checks' library first, 16 s; sanitizers have tests of their own
+#: zig would build the library of its checks first, 16 s; sanitizers have tests of their own
+NO_CHECKS = "-fno-sanitize=undefined"
 FLAGS = ["-std=c11", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion"]
 COMPILERS = {"cc": [shutil.which(os.environ.get("CC", "cc")) or ""], "clang": [shutil.which("clang") or ""],
              "zig": [sys.executable, "-m", "ziglang", "cc"] if importlib.util.find_spec("ziglang") else [""]}
