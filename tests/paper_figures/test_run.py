@@ -77,7 +77,8 @@ def test_figures_of_other_settings_are_not_replaced_unasked(figures, tmp_path):
 
 def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tmp_path, monkeypatch):
     monkeypatch.setattr("airtouch.cli.paper.find_flights", lambda: None)
-    result = CliRunner().invoke(command, ["--out", str(tmp_path), "--workers", "1"])  # another would make the real ones
+    # one worker: a process of its own would make the real figures, not these
+    result = CliRunner().invoke(command, ["--out", str(tmp_path), "--workers", "1"])
     assert result.exit_code == 2 and "reproduced" in result.stdout and "Not made" not in result.stdout
     with pytest.raises(AirTouchError, match="no figure 'fig8x'; did you mean"):
         run.names(["fig8x"])
