@@ -156,7 +156,7 @@ def test_a_kept_flight_that_is_damaged_is_named(tmp_path):
     elf = tmp_path / "board.elf"
     elf.touch()
     case = height.cases("flat")[0]
-    path = height._kept_at(tmp_path, elf, case, 1, 0)
+    path = height.kept_at(tmp_path, elf, case, 1, 0)
     path.write_text("{")
     with pytest.raises(AirTouchError, match="is damaged: delete it, and it is flown again"):
         height.report(elf, only="flat", folder=tmp_path)

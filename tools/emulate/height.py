@@ -126,7 +126,7 @@ def summary(legs: Sequence[Leg]) -> str:
     return f"{text}; {false} false"
 
 
-def _kept_at(folder: Path, elf: Path, case: Case, seed: int, on: int) -> Path:
+def kept_at(folder: Path, elf: Path, case: Case, seed: int, on: int) -> Path:
     """File of a flight; another image, board or mission has another."""
     what = hashlib.sha256(elf.read_bytes() + repr((case, seed, on)).encode()).hexdigest()
     return folder / f"{what[:16]}.json"
@@ -134,7 +134,7 @@ def _kept_at(folder: Path, elf: Path, case: Case, seed: int, on: int) -> Path:
 
 def _leg(elf: Path, case: Case, seed: int, on: int, platform: str, folder: Path | None) -> Leg:
     """Fly once, or take the flight from the folder, and print."""
-    path = _kept_at(folder, elf, case, seed, on) if folder else None
+    path = kept_at(folder, elf, case, seed, on) if folder else None
     if path and path.exists():
         try:
             leg = Leg(**json.loads(path.read_text()))

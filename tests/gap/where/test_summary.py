@@ -1,0 +1,35 @@
+"""The headline: the cell that most of the gap is in, or that the named effects explain."""
+
+from airtouch.gap.answer import advice, words
+from airtouch.gap.result import Found
+from airtouch.gap.where import summary
+from made_diagnosis import cell, diagnosis
+
+
+def test_headline_is_what_most_of_the_gap_is_not_the_largest_ratio():
+    """A take-off cell of 26 floors in one block against a sideways force of 10 floors in four phases."""
+    cells = [cell("force_z", "take-off", 2.6, blocks=1),
+             *(cell("force_y", p, 1.0, blocks=10) for p in ("hover", "cruise", "over platform", "landing"))]
+    one = summary.headline(cells)
+    assert (one.channel, one.phase) == ("force_y", "hover")
+    said = words.sentences(diagnosis(cells, "unknown", ()))
+    assert said[0] == ("The gap lies mostly in sideways force at 0-0.5 Hz: in hover it is 1 m/s^2, 10 times the floor, "
+                       "and it "
+                       "stands out in 4 of 5 phases in the air.")
+    texts = [s.text for s in advice.steps("unknown", [], [], one, [], True, "v")]
+    assert "more of hover" in texts[0] and not any("take-off" in t for t in texts)
+
+
+def test_a_cell_of_the_ground_or_of_one_regime_is_no_headline():
+    cells = [cell("force_z", "ground", 9.0), cell("force_z", "hover", 8.0, regime="height < 0.1 m"),
+             cell("force_x", "hover", 0.5)]
+    assert summary.headline(cells).channel == "force_x"
+    assert summary.headline(cells[:2]) is None
+
+
+def test_headline_of_named_effects_is_where_they_take_most():
+    cells = [cell("torque_x", "hover", 16.0, 0.9, after=15.9), cell("force_z", "over platform", 0.43, 0.04, after=0.04)]
+    found = diagnosis(cells, effects=(Found("ground_effect", {}),))
+    assert found.headline is cells[1] and "lift" in words.sentences(found)[0]
+    assert ("1 of 2 cells still stand out, the largest in hover in roll torque at 0-0.5 Hz "
+            "(18 to 18 times the floor)") in words.answer(found)

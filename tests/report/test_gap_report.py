@@ -1,0 +1,162 @@
+"""The gap report: self-contained, well formed, the answer first, every figure of the diagnosis in it and none of its
+own."""
+
+import html.parser
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import airtouch
+import made_diagnosis
+from airtouch.errors import AirTouchError
+from airtouch.gap.answer import advice, words
+from airtouch.gap.answer.pictures import of_measurement
+from airtouch.gap.flights.flight import ready
+from airtouch.gap.measure import measure
+from airtouch.gap.nominal import calibrate
+from airtouch.gap.result import Found, Quantity
+from airtouch.gap.signatures.candidates import term_of
+from airtouch.gap.where import summary
+from airtouch.gap.where.gap_map import gap_map, where
+from airtouch.report import gap_report, gap_tables
+from airtouch.simulation.effects import EFFECTS
+from made_diagnosis import VEHICLE, cell, diagnosis, of_flights
+
+
+@pytest.fixture(scope="module")
+def flown():
+    return made_diagnosis.flown()
+
+
+class Checker(html.parser.HTMLParser):
+    """Collects open tags, text and everything that is loaded."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.loaded, self.text = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+        self.loaded += [value for key, value in attrs if key in ("src", "href")]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def checked(path):
+    source = path.read_text()
+    checker = Checker()
+    checker.feed(source)
+    inside = {v for v in checker.loaded if v.startswith("#")}
+    assert not checker.open and all(v.startswith("data:image/png;base64,") for v in set(checker.loaded) - inside)
+    assert all(f'id="{v[1:]}"' in source for v in inside), inside
+    assert "http" not in re.sub(r"base64,[^\"]*", "", source) and "<script" not in source and "viewport" in source
+    return " ".join(" ".join(checker.text).split()), checker
+
+
+def test_page_of_a_diagnosis(flown, tmp_path):
+    path, found = tmp_path / "gap.html", of_flights(flown)
+    gap_report.write_diagnosis(path, found, command="airtouch gap diagnose <x>")
+    text, checker = checked(path)
+    said = words.sentences(found)
+    assert found.headline.channel == "force_x" and "forward force at 0-0.5 Hz" in said[0]
+    assert "imu bias (probability 93%)" in said[1] and "takes away 90% (80% to 95%)" in said[2]
+    assert [text.index(s) for s in said] == sorted(text.index(s) for s in said)
+    order = [text.index(s) for s in (said[2], "What to do next", "The largest cells", "still be the wrong one")]
+    assert order == sorted(order)
+    for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note",
+                 "no velocity",
+                 "wrong effect: wind", "imu_bias, vehicle as declared", "airtouch gap diagnose <x>",
+                 "another fits better", "airtouch collect --mission hover"):
+        assert part in text, part
+    assert sum(v.startswith("data:") for v in checker.loaded) == 3
+    with pytest.raises(AirTouchError, match="--force"):
+        gap_report.write_diagnosis(path, found, command="x")
+
+
+def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(flown, tmp_path):
+    path, found = tmp_path / "gap.html", of_flights(flown)
+    gap_report.write_diagnosis(path, found, command="x")
+    source = path.read_text()
+    for s in (*words.sentences(found), found.advice):
+        assert source.count(s.replace("<", "&lt;").replace(">", "&gt;")) == 1, s
+    assert source.count('<td class="headline"') == 1 and source.count('<tr class="headline"') == 1
+    title = re.search(r'<td class="headline"[^>]*title="([^"]*)"', source).group(1)
+    assert title.startswith(gap_tables.in_words(found.headline))
+
+
+def test_phases_are_folded_by_importance(tmp_path):
+    cells = [cell("force_z", "take-off", 2.6, blocks=1),
+             *(cell("force_y", p, 1.0, blocks=40) for p in ("hover", "cruise")), cell("force_z", "landing", 0.05)]
+    maps = gap_tables.maps(cells, summary.headline(cells))
+    assert [m["name"] for m in maps] == ["In hover", "In cruise", "At take-off", "At landing"]
+    assert [m["open"] for m in maps] == [True, False, False, False]
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis(cells, "unknown", ()), command="x")
+    assert (tmp_path / "gap.html").read_text().count("<details open>") == 1
+
+
+@pytest.mark.parametrize(("verdict", "words_there"), [
+    ("none", "No unmodelled effect stands out (probability 93%)"),
+    ("unknown", "No known effect explains it (probability 93%)")])
+def test_pages_of_other_verdicts(flown, tmp_path, verdict, words_there):
+    path = tmp_path / "gap.html"
+    gap_report.write_diagnosis(path, of_flights(flown[:1], (), verdict=verdict), command="x")
+    text, _ = checked(path)
+    assert words_there in text and "How far it closes" not in text
+
+
+def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects(tmp_path):
+    entry = {"channel": "force_y", "band_hz": [0.0, 0.5], "phase": "hover", "flight": "a/log.csv", "from_s": 34.0,
+             "to_s": 42.0,
+             "over_floor": 6.1, "follows": ["height"],
+             "nearest": [{"name": "wind", "fails": "gains 3 nats, 12 are needed"}]}
+    found = diagnosis([cell("force_y", "hover", 1.0)], "unknown", (), unexplained=(entry,))
+    steps = advice.steps("unknown", [], [], found.headline, [], True, VEHICLE.name)
+    path = tmp_path / "gap.html"
+    gap_report.write_diagnosis(path, replace(found, next=steps), command="x")
+    text, _ = checked(path)
+    assert ("sideways force, 0-0.5 Hz, hover: up to 6.1 times the floor from 34.0 to 42.0 s of log.csv; "
+            "follows height") in text
+    assert "wind: gains 3 nats, 12 are needed" in text
+    assert 'href="#add-an-effect"' in path.read_text() and "EFFECT = Effect(" in text  # the link leads to a whole file
+
+
+def test_page_of_a_measurement(flown, tmp_path):
+    path, found = tmp_path / "gap.html", measure(flown, VEHICLE)
+    gap_report.write_measurement(path, found, of_measurement(found, flown, VEHICLE), command="airtouch gap measure x")
+    text, checker = checked(path)
+    assert text.index("Most of the gap lies") < text.index("On the ground") < text.index("The largest cells")
+    assert sum(v.startswith("data:") for v in checker.loaded) == 3 and "Which effect" not in text and "→" not in text
+
+
+def test_the_report_computes_nothing():
+    """Its modules import no code that fits, replays or calibrates."""
+    for name in ("gap_report", "gap_tables", "gap_figures"):
+        source = (Path(airtouch.__file__).parent / f"report/{name}.py").read_text()
+        lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
+        used = {f"{module}.{what}." for module, names in lines for what in names.replace(" ", "").split(",")}
+        allowed = ("measure", "result", "where.gap_map", "where.summary", "answer.advice", "answer.pictures",
+                   "answer.words", "signals.channels")
+        assert used and all(u.startswith(tuple(f"airtouch.gap.{a}." for a in allowed)) for u in used), (name, used)
+        assert not re.search(r"\b(residual|calibrate|ready|shrink_of|gap_map)\(", source)
+
+
+@pytest.mark.parametrize("name", list(EFFECTS))
+def test_any_effect_can_be_shown(flown, name):
+    term = term_of(Found(name, {k: Quantity(v) for k, v in EFFECTS[name].values().items()}))
+    assert dict(term.values) == EFFECTS[name].values()
+    study, flight = calibrate.declared(VEHICLE, ()), ready(flown[0], VEHICLE)
+    made = gap_map(study, [flight], terms=[term])
+    assert all(c.after is not None and c.after >= 0.0 for c in made.cells) and len(where(made)) >= 10
+    assert gap_tables.maps(made.cells)
+
+
+def test_the_page_shows_the_docs_own_effect():
+    page = (Path(airtouch.__file__).parents[1] / "docs/effects.md").read_text()
+    assert gap_report.example_effect() in page
