@@ -61,7 +61,7 @@ class Constants(NamedTuple):
     """What follows from the plant alone."""
 
     hover_speed: float  #: rad/s of a rotor
-    ahead: int  #: physics steps from the position controller's run to the log's row
+    ahead: int  #: physics steps from the firmware's 100 Hz run to the log's row
     body: rigid_body.Constants
     noise: motors.Noise
 
@@ -81,13 +81,13 @@ def control(flight, fixed, row, volts):
     The command is in state.motors.pwm; fixed: Constants; volts: what the motors see.
     """
     plant, state, stream = flight.plant[0], flight.state[0], flight.streams[0].ranging[:]
-    k = state.step
+    k, ahead = state.step, 2 * fixed.ahead
     for tick in range(max(2 * k - 1, 0), 2 * k + 1):
         imu.reading(plant, state, tick)
         ranging.range_reading(plant, state, flight.world, tick, stream)
         ranging.flow_reading(plant, state, tick, stream)
-        autopilot.estimate(plant, state, tick, volts)
-    autopilot.steer(plant, state, row, 2 * (k + fixed.ahead))
+        autopilot.estimate(plant, state, tick + ahead, volts)
+    autopilot.steer(plant, state, row, 2 * k + ahead)
 
 
 @inlined

@@ -84,7 +84,7 @@ FIELDS: tuple[tuple[str, int, float, str], ...] = (
     ("range_mixed", 1, 0.0, "share of edges with one reading between the two surfaces, or beyond"),
     ("sensor_delay", 1, 0.0, "s, from IMU to controller"),
     ("time_jitter", 1, 0.0, "s rms, on logged time"),
-    ("controller_ahead", 1, 0.0, "s, of the position controller's run before a row is logged, whole 2 ms"),
+    ("controller_ahead", 1, 0.004, "s, from the run of position controller and prediction to a logged row, whole 2 ms"),
     ("packet_loss", 1, 0.0, "share of logged samples lost"),
     ("loss_burst", 1, 1.0, "samples lost in a row, mean"),
     ("thrust_base", 1, 36000.0, "command in hover, of 65535"),

@@ -18,7 +18,7 @@ from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
 from airtouch.simulation.flight import prepare
 
-BASELINE, PAIRED = range(6), range(100, 112)  #: numbers of flights
+BASELINE, PAIRED = range(6), range(100, 124)  #: numbers of flights
 VEHICLE = "crazyflie-2.1-flow"
 #: effect, values
 CHANGES = {
@@ -31,8 +31,9 @@ CHANGES = {
     "late commands": ("actuator_delay", {"delay": 0.003}),
     "late sensors": ("sensor_latency", {"delay": 0.002}),
 }
-#: by which the share of torque may be off; of late sensors, whose share is least where it turns most, more
-CLOSE, LATE = 0.1, 0.17
+#: by which the share of torque may be off, of itself where it is above 1; of late sensors, whose share is least where
+#: it turns most, more
+CLOSE, LATE = 0.1, 0.2
 
 
 def flown(active, numbers, vehicle=None):
@@ -96,7 +97,8 @@ def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, hi
     seen = shares(name)[stepped] / shares(None)[stepped]
     judged = (f > low) & (f < high)
     told, seen = (in_bands(x[judged]) for x in (told, seen))
-    np.testing.assert_allclose(told, seen, atol=LATE if name == "late sensors" else CLOSE)
+    off = np.abs(told - seen) / np.maximum(np.abs(seen), 1.0)
+    np.testing.assert_array_less(off, LATE if name == "late sensors" else CLOSE)
 
 
 @pytest.mark.parametrize("name", CHANGES)
@@ -135,8 +137,12 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
 
 
 def test_an_attitude_gain_is_named_with_its_strength(study):
-    """Once called more inertia: at half the gain steps turn the vehicle less for what the log shows of them."""
+    """Once called more inertia: at half the gain steps turn the vehicle less for what the log shows of them.
+
+    The position's gain acts before it, so that one flight knows their product best.
+    """
     found = diagnose.brief(study, gap_flights.flown(1, 97, {"controller_gain": {"attitude": 0.55}}))
     assert [e.name for e in found.effects] == ["controller_gain"]
-    gain = found.effects[0].parameters["attitude"]
-    assert gain.low < 0.55 < gain.high < 0.8
+    gain, position = (found.effects[0].parameters[name] for name in ("attitude", "position"))
+    assert gain.low < 0.55 < gain.high
+    assert gain.value * position.value == pytest.approx(0.55, rel=0.2)

@@ -119,6 +119,21 @@ def test_where_a_row_lies_in_the_controllers_cycle(sweep):
     assert at > 3.0 * behind
 
 
+def test_a_row_has_the_yaw_loops_kick_only_where_the_yaw_is_renewed(sweep):
+    """The estimator renews the yaw each 10 ms, the yaw's derivative is over 2 ms: there the commands answer a
+    rate with 1 + 0.35 x 10 ms / 2 ms times what they answer it with in the four runs behind, or more."""
+    def answer(settings):
+        weak = {"rotor": 2, "thrust_loss": 0.1}  # it yaws as it takes off
+        log = sweep({"weak_motor": weak, "time_jitter": {"rms": 0.0, **settings}})
+        yaw, rate = log.stack(PWM)[150:300] @ [1.0, -1.0, 1.0, -1.0], log["gyro_z_radps"][150:300]
+        return np.polyfit(np.diff(rate), np.diff(yaw), 1)[0]
+
+    renewed, early, late, default = (answer(s) for s in ({"behind": 0.0}, {"behind": 0.004}, {"behind": 0.008}, {}))
+    assert renewed / early > 2.75
+    assert late / early == pytest.approx(1.0, abs=0.1)
+    assert default == early
+
+
 def test_packet_loss_has_its_share_and_bursts():
     table = 0.01 * np.arange(100_000)[:, None]
     out = radio.received(table, 0.0, 0.05, 4.0, np.random.default_rng(0))[:, 0]

@@ -32,6 +32,7 @@ class Controller:
     period_s: float = PERIOD_S
     lowpass_hz: float = 0.0
     on_error: bool = False  #: derivative acts on the error, angle loop included
+    kicked: bool = False  #: a row of the log holds the one run in which attitude and its set-point are renewed
     hold_s: float = 0.0  #: the estimator's attitude, velocity and height are renewed so often; 0: at every run
     chip_hz: float = 0.0  #: bandwidth of the gyro itself, 0 for all
     range_gains: tuple[float, float] = (0.0, 0.0)  #: of a reading of the down range, to height and (1/s) climb
@@ -79,14 +80,14 @@ def _firmware(row: Any, axis: str, slope: float) -> Controller:
                           range_gains=_range_gains(reading, float(release["range"]["std_m"]),
                                                    float(release["kalman"]["noise_acc_z_mps2"])), range_s=reading,
                           acc_hz=float(release["filters"]["acc_hz"]))
-    i = AXES.index(axis) - 1
+    i, attitude = AXES.index(axis) - 1, 0.001 * float(periods["attitude_ms"])
     rate, angle = loops[settings.RATE_ROLL + i], loops[settings.ROLL + i]
     speed = loops[settings.VELOCITY_Y if i == 0 else settings.VELOCITY_X]
     gain = 0.5 * float(rate["p"]) * DEGREES * float(row["rate_scale"]) * slope
     return Controller(gain, float(angle["p"]), float(speed["p"]) / DEGREES, _share(rate["d"], rate["p"]),
                       _share(rate["i"], rate["p"]), _share(angle["i"], angle["p"]), _share(speed["i"], speed["p"]),
-                      0.001 * float(periods["attitude_ms"]), float(row["gyro_lowpass"]),
-                      bool(release["controller"]["derivative_on_error"]), hold, float(row["gyro_bandwidth"]))
+                      attitude, float(row["gyro_lowpass"]), bool(release["controller"]["derivative_on_error"]),
+                      float(row["controller_ahead"]) % hold < 0.5 * attitude, hold, float(row["gyro_bandwidth"]))
 
 
 @lru_cache(16)

@@ -1,7 +1,8 @@
 """What a torque from outside leaves in a log: how the vehicle turns, and what the loop commands against it.
 
-The loop answers within milliseconds, and its answer is in the log as well: held over a sample of the log, and with the
-kicks of steps that fall onto the logged sample. A model that replays the log takes that for what turned the vehicle.
+The loop answers within milliseconds, and its answer is in the log as well: held over a sample of the log, with or
+without the kicks of steps, which are over in one run of the controller. A model that replays the log takes that for
+what turned the vehicle.
 """
 
 from collections.abc import Sequence
@@ -85,4 +86,4 @@ def _yaw(c: Controller, row: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray
     lever = float(row["yaw_torque_over_thrust"]) + s * float(row["rotor_inertia"]) / (
         2.0 * float(row["thrust_per_speed2"]) * speed)
     plant = plant_of(c, row, "roll", f) * lever / arm_of(row, 0) * float(row["inertia"][0]) / float(row["inertia"][2])
-    return plant, rate + angle((1.0 - np.exp(-s * c.period_s)) / c.period_s), rate + angle(fixed.outer)
+    return plant, rate + angle((1.0 - np.exp(-s * c.period_s)) / c.period_s), rate + angle(c.kicked * fixed.outer)

@@ -97,13 +97,14 @@ def paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray
 
 
 def kick_of(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | float:
-    """Angle path in the log over that in the loop: set-points of the outer loop and attitudes come as steps, and the
+    """Angle path in the log over that in the loop: set-points of the outer loop and attitudes come as steps, whose
 
-    log takes the sample on which they do. passed: share of that sample's derivative that the command's limits leave.
+    derivative is in the log only where its rows are of the sample on which they do (c.kicked). passed: share of that
+    sample's derivative that the command's limits leave.
     """
     if not c.on_error:
         return 1.0
-    return (fixed.integral + passed * c.derivative * fixed.outer) / fixed.whole
+    return (fixed.integral + c.kicked * passed * c.derivative * fixed.outer) / fixed.whole
 
 
 def _range_errors(c: Controller, row: Any, f: np.ndarray, size: np.ndarray) -> list[np.ndarray]:

@@ -154,7 +154,9 @@ def _stepped(c: Controller, row: Any, f: np.ndarray, parts: Parts, passed: Itera
     fixed = fixed_of(c, f)
     plant, rate, angle, velocity, whole = parts
     step = paths(c, row, fixed)[1] / np.maximum(f, 0.3)
-    turned = plant * step / (1.0 + plant * whole)
-    later, turning = (rate + kick_of(c, fixed) * (angle + velocity)) * turned, fixed.s * turned
+    per_step = plant / (1.0 + plant * whole)
+    answer = rate + kick_of(c, fixed) * (angle + velocity)
     for share in passed:
-        yield kick_of(c, fixed, share) * step - later, turning
+        acted = (fixed.integral + share * (fixed.whole - fixed.integral)) / fixed.whole if c.on_error else 1.0
+        turned = per_step * acted * step
+        yield kick_of(c, fixed, share) * step - answer * turned, fixed.s * turned

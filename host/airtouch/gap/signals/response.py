@@ -1,7 +1,7 @@
 """How the measured angular acceleration follows the logged commands in nominal flights.
 
-A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise and the kicks of
-the outer loop's steps fold into its band and never turned the vehicle. Of the torque
+A log at 100 Hz holds one command in five of a 500 Hz loop: fast noise folds into its band and never turned the
+vehicle, and the kicks of the outer loop's steps, which did, are mostly not in it. Of the torque
 that a model makes of logged commands only a share, by frequency and axis, is then to be
 expected in the gyro: E[y | w] = q w (Wiener; errors in variables). Taken as q = 1, every
 hypothesis that weakens the response (more inertia, slower motors) would fit.
@@ -26,12 +26,14 @@ FIRST_BIN = 2  #: below it lie the means, which the window spreads over two bins
 QUIET_BINS = slice(2, 31)  #: 0.8 to 12 Hz, in which a step of the set-point shows
 STEPPED = 2.0  #: times the usual power of the commanded torque, from which a set-point stepped
 CALM = 0.25  #: share of a flight's blocks that no step is in
+ROUNDS = 4  #: in which quiet blocks are found; the last two agree
 FEWEST = 8  #: blocks of nominal flights
 SMOOTH = 1.5  #: bins
 #: what the model may be wrong by, of that change of the share which the command's limits make: so far off are pairs of
 CUT_DOUBT = 0.3  #: simulated flights with attitude gains of 0.5, 1.4 and 2 (ten flights each)
 #: of the commands that answer a torque, by which the loop model is wrong: so far off are eight pairs of simulated
 ANSWER_DOUBT = 0.2  #: flights with thrust noise and without, where turning and answer all but cancel (yaw, 1 to 4 Hz)
+SHARE_DOUBT = 0.2  #: by which `seen` differs from the loop model in simulated flights of its own loop
 NOISE = 0.2  #: coherence up to which it is the noise of the gyro that both have, not believed
 
 
@@ -56,12 +58,13 @@ class Law:
         """By what effects that change the loop multiply `told`, (bins, 3).
 
         Of the commands a share follows the loop model, the rest turn the vehicle as they say; the share is the one that
-        makes `seen` of both. In yaw, mostly noise of the gyro, motors count where it is none.
+        makes `seen` of both, or all where the two hardly differ. In yaw, mostly noise of the gyro, motors count where
+        it is none.
         """
         before, after = change.before[which], change.motors * change.share[which] * change.before[which]
         away = before - 1.0
-        modelled = ((self.seen * change.logged - 1.0) * away.conj()).real / np.maximum(np.abs(away) ** 2, 1e-6)
-        modelled = np.clip(modelled, 0.0, 1.0)
+        follows = ((self.seen * change.logged - 1.0) * away.conj()).real
+        modelled = np.clip((follows + SHARE_DOUBT ** 2) / (np.abs(away) ** 2 + SHARE_DOUBT ** 2), 0.0, 1.0)
         out = (modelled * after + (1.0 - modelled) * change.motors) / (modelled * before + 1.0 - modelled)
         out[:, 2] = 1.0 + (out[:, 2] - 1.0) / np.maximum(np.abs(self.told[:, 2]), 1.0) ** 2
         return out
@@ -157,10 +160,12 @@ def response_of(measured: Sequence[np.ndarray], left: Sequence[np.ndarray], loop
     w = y - np.concatenate(left)
     if len(y) < FEWEST:
         return None
-    usual = np.median(np.abs(w) ** 2, axis=0) / np.log(2.0)
-    made = [m - rest for m, rest in zip(measured, left, strict=True)]
-    calm = np.median([np.quantile(_sizes(m, usual), CALM, axis=0) for m in made if len(m)], axis=0)
-    quiet = np.concatenate([_quiet(m, usual, calm) for m in made])
+    made, power = [m - rest for m, rest in zip(measured, left, strict=True)], np.abs(w) ** 2
+    quiet = np.ones((len(w), 3), bool)
+    for _ in range(ROUNDS):  # what is usual is so in blocks without a step
+        usual = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0) / np.log(2.0)
+        calm = np.median([np.quantile(_sizes(m, usual), CALM, axis=0) for m in made if len(m)], axis=0)
+        quiet = np.concatenate([_quiet(m, usual, calm) for m in made])
     steady, floor = _law(y, w, quiet, loop, None)
     stepped = None
     if (~quiet).any(axis=1).sum() >= FEWEST:

@@ -12,7 +12,7 @@ EFFECT = Effect(
     "time_jitter", "random error of the logged time",
     (Parameter("rms", "s", 0.003, 0.0, 0.2, 0.0, "independent from sample to sample",
                "host arrival times: bursts up to 350 ms"),
-     Parameter("behind", "s", 0.0, 0.0, 0.01, None,
-               "of a row behind the last run of the position controller, whole 2 ms",
+     Parameter("behind", "s", 0.004, 0.0, 0.01, None,
+               "of a row behind the last run of position controller and prediction, whole 2 ms",
                "authors' flights: the 2 ms kick of a set-point step is in the log in some flights only")),
     settings=settings)
