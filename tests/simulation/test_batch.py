@@ -58,10 +58,10 @@ def test_the_generator_flies_only_a_little_ahead(monkeypatch):
     started = []
     real = batch.fly
     monkeypatch.setattr(batch, "fly", lambda *a, **k: started.append(a[3]) or real(*a, **k))
-    stream = batch.flights(scenario.parse(QUICK, "quick"), 10_000, workers=2)
+    flying = batch.flights(scenario.parse(QUICK, "quick"), 10_000, workers=2)
     for _ in range(3):
-        next(stream)
-    stream.close()
+        next(flying)
+    flying.close()
     assert len(started) <= 3 + batch.AHEAD * 2 + 2
 
 

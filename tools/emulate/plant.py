@@ -65,9 +65,9 @@ class Plant:
 @jit(nogil=True)
 def _step(flight, out):
     """One physics step of a loop.Flight; readings (READINGS,) of its beginning into out. How it stands."""
-    plant, state, streams = flight.plant[0], flight.state[0], flight.streams[0]
+    plant, state, generators = flight.plant[0], flight.state[0], flight.generators[0]
     fixed, reading = loop.constants(plant), state.firmware.reading
-    imu.sense(plant, state, fixed.hover_speed, streams.imu[:])
+    imu.sense(plant, state, fixed.hover_speed, generators.imu[:])
     volts = battery.supply(plant, state.battery.volts)
     out[FLOW], out[FLOW + 1] = 0.0, 0.0
     for half in range(2):
@@ -77,8 +77,8 @@ def _step(flight, out):
             out[ACC + 3 * half + i] = state.imu.delay_line[row, i]
             out[GYRO + 3 * half + i] = state.imu.delay_line[row, 3 + i]
         if tick >= 0:
-            ranging.range_reading(plant, state, flight.world, tick, streams.ranging[:])
-            ranging.flow_reading(plant, state, tick, streams.ranging[:])
+            ranging.range_reading(plant, state, flight.world, tick, generators.ranging[:])
+            ranging.flow_reading(plant, state, tick, generators.ranging[:])
             if not math.isnan(reading.forward):
                 out[FLOW] += reading.forward
                 out[FLOW + 1] += reading.left

@@ -8,7 +8,7 @@ baseline    the comparison of the paper without a network
 evaluation  flights with conditions, folds, scores with intervals, cross-validation, ablations, maps
 shared      what both networks use: channels, sensors, pruning, TensorFlow, model files, C sources
 
-A stream is one sample in, one row of outputs out, with the past kept between; the word stands for the network of
-`best` (`reference.stream_int8`). The network of the paper runs over windows, or rolls over samples
-(`paper.rolling`, known to users by its older name, `paper-stream`).
+A stream is the samples of a flight as they come, one every 10 ms. A streaming network takes one sample at a time and
+keeps the past: that of `best` (`reference.networks.stream_int8`). The network of the paper takes whole windows, or
+rolls over a stream (`paper.rolling`, the detector `paper-stream`).
 """

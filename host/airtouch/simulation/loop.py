@@ -29,26 +29,26 @@ LEAST_UPRIGHT = 0.2  #: cosine of the tilt below which it has turned over
 FLOOR_DEPTH_M = 0.015  #: legs this far inside a surface: it struck it
 FAR_M, HIGH_M = 1000.0, 100.0  #: beyond them it flew away
 #: random numbers of the motors, the IMU, the other sensors and of the start
-STREAMS = np.dtype([(name, np.uint64, (1,)) for name in ("motors", "imu", "ranging", "start")])
+GENERATORS = np.dtype([(name, np.uint64, (1,)) for name in ("motors", "imu", "ranging", "start")])
 
 
 class Flight(NamedTuple):
     """All that one flight needs: what stays as it is, its random numbers, and its state.
 
     plant (1,): plant.DTYPE; world: World; room (4,): walls for the Multi-ranger; effects: EffectSlots;
-    streams (1,): STREAMS; state (1,): state.DTYPE, as `state.begin` leaves it.
+    generators (1,): GENERATORS; state (1,): state.DTYPE, as `state.begin` leaves it.
     """
 
     plant: np.ndarray
     world: World
     room: np.ndarray
     effects: EffectSlots
-    streams: np.ndarray
+    generators: np.ndarray
     state: np.ndarray
 
 
 FLIGHT = types.NamedTuple(
-    (PLANT, WORLD, float64[::1], EFFECT_SLOTS, from_dtype(STREAMS)[::1], STATE), Flight)  #: in compiled code
+    (PLANT, WORLD, float64[::1], EFFECT_SLOTS, from_dtype(GENERATORS)[::1], STATE), Flight)  #: in compiled code
 
 
 @typeof_impl.register(Flight)
@@ -80,12 +80,12 @@ def control(flight, fixed, row, volts):
 
     The command is in state.motors.pwm; fixed: Constants; volts: what the motors see.
     """
-    plant, state, stream = flight.plant[0], flight.state[0], flight.streams[0].ranging[:]
+    plant, state, generator = flight.plant[0], flight.state[0], flight.generators[0].ranging[:]
     k, ahead = state.step, 2 * fixed.ahead
     for tick in range(max(2 * k - 1, 0), 2 * k + 1):
         imu.reading(plant, state, tick)
-        ranging.range_reading(plant, state, flight.world, tick, stream)
-        ranging.flow_reading(plant, state, tick, stream)
+        ranging.range_reading(plant, state, flight.world, tick, generator)
+        ranging.flow_reading(plant, state, tick, generator)
         autopilot.estimate(plant, state, tick + ahead, volts)
     autopilot.steer(plant, state, row, 2 * k + ahead)
 
@@ -97,7 +97,7 @@ def move(flight, fixed, volts):
     fixed: Constants; volts: what the motors see.
     """
     plant, state = flight.plant[0], flight.state[0]
-    motors.drive(plant, state, fixed.noise, volts, flight.streams[0].motors[:])
+    motors.drive(plant, state, fixed.noise, volts, flight.generators[0].motors[:])
     forces.act(plant, state, flight.world, flight.effects, fixed.hover_speed)
     rigid_body.advance(plant, fixed.body, state.body)
     return _ending(state)
@@ -128,13 +128,13 @@ def fly(flight, setpoints, table):
     the same numbers as one long one. Returns how it ended (OK or a reason) and the number of rows of this call that
     are filled.
     """
-    plant, state, streams = flight.plant[0], flight.state[0], flight.streams[0]
+    plant, state, generators = flight.plant[0], flight.state[0], flight.generators[0]
     fixed, begun = constants(plant), state.step
     for n in range(table.shape[0] * LOG_STEPS):
         row = n // LOG_STEPS
         state.step = begun + n
         state.time_s = state.step * plant.step
-        imu.sense(plant, state, fixed.hover_speed, streams.imu[:])
+        imu.sense(plant, state, fixed.hover_speed, generators.imu[:])
         multi_ranger.read(state, flight.room)
         volts = battery.supply(plant, state.battery.volts)
         control(flight, fixed, setpoints[row], volts)

@@ -21,7 +21,7 @@ from airtouch.simulation.effects.effect import MEMORY
 from airtouch.simulation.effects.slots import EFFECT_SLOTS, SLOTS
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import PLANT, hover_speed
-from airtouch.simulation.random_stream import stream
+from airtouch.simulation.random_generator import generator
 from airtouch.simulation.sensors import filters
 from airtouch.vehicle import Vehicle
 
@@ -177,7 +177,7 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     volts = np.full(n, np.nan)
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
         volts = log["vbat_V"].copy()
-    effects = slots.slots(acting, [stream(seed, 0, a.effect.name) for a in acting])
+    effects = slots.slots(acting, [generator(seed, 0, a.effect.name) for a in acting])
     model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
     commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
     if not np.isfinite(commands).all():
@@ -198,7 +198,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def wrench_of(active: Active, signals: np.ndarray, seed: int = 0) -> np.ndarray:
     """Force and torque (n, 6), N and N m in body axes, of one effect on given signals (n, COUNT)."""
     out, memory = np.zeros((len(signals), 6)), np.zeros(MEMORY)
-    rng = stream(seed, 0, active.effect.name)
+    rng = generator(seed, 0, active.effect.name)
     parameters = active.effect.vector(active.values)
     for k in range(len(signals)):
         active.effect.wrench(parameters, signals[k], memory, rng, out[k])

@@ -16,7 +16,7 @@ from airtouch.simulation.firmware.setpoint import ROW
 from airtouch.simulation.flight_plan import world
 from airtouch.simulation.flight_plan.world import WORLD
 from airtouch.simulation.plant import PLANT
-from airtouch.simulation.random_stream import STREAM, normal
+from airtouch.simulation.random_generator import GENERATOR, normal
 from airtouch.simulation.sensors import imu, ranging
 
 _F = np.float64
@@ -40,8 +40,8 @@ def empty() -> np.ndarray:
     return np.zeros(1, DTYPE)
 
 
-@jit(types.void(PLANT, WORLD, ROW, STREAM, STATE))
-def begin(plants, ground, row, stream, states):
+@jit(types.void(PLANT, WORLD, ROW, GENERATOR, STATE))
+def begin(plants, ground, row, generator, states):
     """Stand the vehicle on the surface below the first set-point row (8,). The record (1,) must be all zero."""
     plant, state = plants[0], states[0]
     body, pose = state.body, state.body.state
@@ -52,12 +52,12 @@ def begin(plants, ground, row, stream, states):
     yaw = row[setpoint.YAW]
     pose[6], pose[9] = math.cos(yaw / 2), math.sin(yaw / 2)
     for i in range(4):
-        state.motors.phase[i] = 6.283185307179586 * i * 0.381966 + normal(stream)
+        state.motors.phase[i] = 6.283185307179586 * i * 0.381966 + normal(generator)
         body.gain[i] = plant.gain[i]
         state.walls[i] = np.nan
     body.wrench[2] = plant.mass * plant.gravity
     state.battery.charge, state.battery.volts = plant.battery_charge, plant.nominal_voltage
-    roll, pitch = 0.005 * normal(stream), 0.005 * normal(stream)
+    roll, pitch = 0.005 * normal(generator), 0.005 * normal(generator)
     imu.begin(plant, state)
     autopilot.begin(plant, state, roll, pitch, yaw)
     rigid_body.derivative(plant, body)

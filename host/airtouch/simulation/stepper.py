@@ -11,7 +11,7 @@ from airtouch.simulation import state as states
 from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.slots import slots
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
-from airtouch.simulation.random_stream import stream
+from airtouch.simulation.random_generator import generator
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.vehicle import Vehicle
 
@@ -49,16 +49,16 @@ class Stepper:
                                 f"{hover_pwm(vehicle):.0f}")
         self.plant, acting = prepare(vehicle, active)
         self.state = states.empty()
-        streams = np.zeros(1, loop.STREAMS)
-        for name in loop.STREAMS.names or ():
-            streams[0][name] = stream(seed, flight, name)
-        effects = slots(acting, [stream(seed, flight, key) for key in _keys(acting)])
-        self.flight = loop.Flight(self.plant, plan.world, plan.room, effects, streams, self.state)
+        generators = np.zeros(1, loop.GENERATORS)
+        for name in loop.GENERATORS.names or ():
+            generators[0][name] = generator(seed, flight, name)
+        effects = slots(acting, [generator(seed, flight, key) for key in _keys(acting)])
+        self.flight = loop.Flight(self.plant, plan.world, plan.room, effects, generators, self.state)
 
     def begin(self, setpoint: np.ndarray) -> None:
         """Stand on the surface below the set-point (8,), motors off."""
         self.state[:] = 0
-        states.begin(self.plant, self.flight.world, setpoint, self.flight.streams[0]["start"], self.state)
+        states.begin(self.plant, self.flight.world, setpoint, self.flight.generators[0]["start"], self.state)
 
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:
         """Fly len(table) rows of setpoints (rows, 8) into table (rows, 33). Returns OK or a reason, and rows filled."""
@@ -66,6 +66,6 @@ class Stepper:
 
 
 def _keys(acting: Sequence[Active]) -> list[str]:
-    """Names of the effects' random streams: an effect that comes twice draws other numbers the second time."""
+    """Names of the effects' random generators: an effect that comes twice draws other numbers the second time."""
     names = [a.effect.name for a in acting]
     return [f"{name}/{names[:i].count(name) + 1}" for i, name in enumerate(names)]

@@ -74,8 +74,8 @@ def seconds(text: str) -> float:
     return value
 
 
-def is_stream(packet: Packet) -> bool:
-    """True for a packet that is not answered or acknowledged."""
+def is_unacknowledged(packet: Packet) -> bool:
+    """True for a packet that is neither answered nor acknowledged."""
     return (packet.port in (crtp.CONSOLE, crtp.COMMANDER, crtp.GENERIC, crtp.LOCALIZATION)
             or packet.port == crtp.LOG and packet.channel == 2
             or packet.port == crtp.LINK and packet.channel == 0)
@@ -106,7 +106,7 @@ class Line:
 
     def put(self, packet: Packet, peer: Peer, now_s: float) -> None:
         """Send a packet to or from `peer`."""
-        if any(self._rng.random() < f.amount for f in self._loss if f.everything or is_stream(packet)):
+        if any(self._rng.random() < f.amount for f in self._loss if f.everything or is_unacknowledged(packet)):
             self.lost += 1
             return
         due = now_s

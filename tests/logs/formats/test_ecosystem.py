@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.logs import command
 from airtouch.errors import AirTouchError
-from airtouch.logs import streams
 from airtouch.logs.formats import mapped, ulog
 
 N, HZ = 1000, 250.0  #: samples of the IMU
@@ -186,15 +185,3 @@ def test_a_plain_csv_is_a_header_and_numbers(theirs, tmp_path):
     table = pandas.read_csv(tmp_path / "out/nano.csv")
     assert list(table.columns) == ["t_s", "acc_z_mps2", "gyro_x_radps", "m1_pwm"] and len(table) == 50
     assert "object" not in map(str, table.dtypes)
-
-
-def test_fast_imu_is_averaged_and_slow_values_are_held_only_so_long():
-    fast = np.arange(0.0, 1.0, 0.001)
-    log = streams.log_of({"acc_x_mps2": (fast, np.sin(2 * np.pi * 200.0 * fast)),
-                          "vbat_V": (np.array([0.2]), np.array([4.0]))},
-                         {"source": "x"})
-    assert np.abs(log["acc_x_mps2"][1:-1]).max() < 0.05  # 200 Hz would fold to 0 Hz and stand there
-    assert np.isnan(log["vbat_V"][:20]).all() and (log["vbat_V"][21:44] == 4.0).all()
-    assert np.isnan(log["vbat_V"][48:]).all()
-    with pytest.raises(AirTouchError, match="x: neither accelerations nor rates"):
-        streams.log_of({"vbat_V": (np.array([0.2]), np.array([4.0]))}, {"source": "x"})

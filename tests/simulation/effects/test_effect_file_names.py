@@ -11,7 +11,7 @@ from airtouch.simulation.effects import Effect, Parameter, wrench
 
 
 @wrench
-def push(p, s, memory, stream, out):
+def push(p, s, memory, generator, out):
     if s[at.TIME] > p[1]:
         out[2] -= p[0] * s[at.HEIGHT]
 

@@ -20,7 +20,7 @@ EFFECT = Effect("{name}", "made up", (SIZE,), settings=settings)
 '''
 FALLS = HEAD + '''
 @wrench
-def push(p, s, memory, stream, out):
+def push(p, s, memory, generator, out):
     if s[at.TIME] > p[1]:
         out[2] -= p[0]
 

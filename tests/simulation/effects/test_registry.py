@@ -116,7 +116,7 @@ from airtouch.simulation.effects import Effect, Parameter, wrench
 
 
 @wrench
-def pull(p, s, memory, stream, out):
+def pull(p, s, memory, generator, out):
     out[2] -= p[0] / (1.0 + (s[at.HEIGHT] / p[1]) ** 2)
 
 

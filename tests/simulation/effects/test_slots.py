@@ -8,7 +8,7 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import effects, replay
 from airtouch.simulation.effects import slots
 from airtouch.simulation.effects.effect import MEMORY
-from airtouch.simulation.random_stream import stream
+from airtouch.simulation.random_generator import generator
 
 CHOSEN = {"wind": {"x": 0.5, "y": -0.2}, "gust": {"rms": 0.4}, "slung_load": {"load": 0.004},
           "downwash": {"strength": 0.2}, "rotor_drag": {"horizontal": 0.02}}
@@ -25,7 +25,7 @@ def test_the_sum_is_that_of_each_alone(signals):
     active = effects.activate(CHOSEN)
     assert len(active) == len(CHOSEN)
     out = np.zeros((len(signals), 6))
-    all_of(slots.slots(active, [stream(3, 0, a.effect.name) for a in active]), signals,
+    all_of(slots.slots(active, [generator(3, 0, a.effect.name) for a in active]), signals,
            np.zeros((slots.SLOTS, MEMORY)), out)
     alone = sum(replay.wrench_of(a, signals, seed=3) for a in active)
     np.testing.assert_allclose(out, alone, rtol=1e-12, atol=1e-15)
@@ -35,4 +35,4 @@ def test_the_sum_is_that_of_each_alone(signals):
 def test_more_effects_than_slots_are_refused():
     active = effects.activate({"wind": {}}) * (slots.SLOTS + 1)
     with pytest.raises(AirTouchError, match="17 effects with a force at once; at most 16"):
-        slots.slots(active, [stream(0, 0, "wind")] * len(active))
+        slots.slots(active, [generator(0, 0, "wind")] * len(active))

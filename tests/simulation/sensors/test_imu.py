@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from airtouch.simulation import state as states
 from airtouch.simulation.body import rigid_body
 from airtouch.simulation.plant import from_vehicle, hover_speed
-from airtouch.simulation.random_stream import stream
+from airtouch.simulation.random_generator import generator
 from airtouch.simulation.sensors import imu
 
 STEP_S = 1e-4
@@ -28,7 +28,7 @@ def test_specific_force_is_the_second_derivative_of_the_sensors_place_plus_gravi
         turn = Rotation.from_quat([*q[1:], q[0]])
         places.append(body["state"][:3] + turn.apply(at_sensor))
         rigid_body.derivative(plant, body)
-        imu.sense(plant, record, speed, stream(1, 0, "imu"))
+        imu.sense(plant, record, speed, generator(1, 0, "imu"))
         forces.append(turn.apply(record["imu"]["motion"][:3]))
         rigid_body.step(plant, body)
     places, forces = np.array(places), np.array(forces)
@@ -42,7 +42,7 @@ def test_a_sensor_at_rest_reads_gravity_bias_and_its_noise(vehicle):
     plants = from_vehicle(vehicle)
     plants["acc_bias"], plants["gyro_bias"] = (0.1, -0.2, 0.3), (0.01, 0.02, -0.03)
     plant, record = plants[0], states.empty()[0]
-    speed, numbers = hover_speed(plants), stream(2, 0, "imu")
+    speed, numbers = hover_speed(plants), generator(2, 0, "imu")
     record["body"]["state"][6] = 1.0
     record["body"]["wrench"][2] = plant["mass"] * plant["gravity"]  # the floor's
     imu.begin(plant, record)

@@ -12,9 +12,9 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
+from airtouch.logs.alignment import aligned_log
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
 from airtouch.logs.quaternion import euler
-from airtouch.logs.streams import log_of
 
 METADATA = "metadata.yaml"
 MOTOR_NAMES = ("motor", "pwm", "actuator")
@@ -46,8 +46,8 @@ def read(path: str | Path) -> FlightLog:
         raise
     except Exception as error:  # a damaged bag makes the library raise any of many
         raise AirTouchError(f"{path}: not a whole ROS 2 bag: {type(error).__name__}: {error}") from None
-    streams = {name: tuple(np.array(some).T) for name, some in rows.items()}
-    return log_of(streams, {"source": str(path), "format": "rosbag2", "vehicle": "", "acc_frame": "body"})
+    signals = {name: tuple(np.array(pairs).T) for name, pairs in rows.items()}
+    return aligned_log(signals, {"source": str(path), "format": "rosbag2", "vehicle": "", "acc_frame": "body"})
 
 
 def _is_motor(topic: str) -> bool:

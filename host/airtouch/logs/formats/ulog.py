@@ -10,9 +10,9 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
+from airtouch.logs.alignment import Signal, aligned_log
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
 from airtouch.logs.quaternion import euler
-from airtouch.logs.streams import Stream, log_of
 
 MAGIC = b"ULog\x01\x12\x35"
 FLIP = (1.0, -1.0, -1.0)  #: signs from forward, right, down to forward, left, up
@@ -35,13 +35,13 @@ def read(data: bytes, source: str) -> FlightLog:
         topics = {d.name: d.data for d in reversed(ULog(io.BytesIO(data), list(TOPICS)).data_list)}
     except Exception as error:  # a damaged file makes the library raise any of many
         raise AirTouchError(f"{source}: not a whole ULog file: {type(error).__name__}: {error}") from None
-    streams: dict[str, Stream] = {}
+    signals: dict[str, Signal] = {}
 
     def add(topic: str, names: tuple[str, ...], fields: tuple[str, ...], signs: tuple[float, ...]) -> None:
         table = topics.get(topic, {})
         for name, field, sign in zip(names, fields, signs, strict=True):
             if field in table:
-                streams[name] = table["timestamp"] * 1e-6, sign * np.asarray(table[field], float)
+                signals[name] = table["timestamp"] * 1e-6, sign * np.asarray(table[field], float)
 
     add("sensor_combined", ACC, tuple(f"accelerometer_m_s2[{i}]" for i in range(3)), FLIP)
     add("sensor_combined", GYRO, tuple(f"gyro_rad[{i}]" for i in range(3)), FLIP)
@@ -53,12 +53,12 @@ def read(data: bytes, source: str) -> FlightLog:
         table = topics["vehicle_attitude"]
         w, x, y, z = (np.asarray(table[f"q[{i}]"], float) for i in range(4))
         turned = np.column_stack([x, -y, -z, w])  # both frames are turned by half a turn about x
-        streams |= {name: (table["timestamp"] * 1e-6, v) for name, v in zip(ATTITUDE, euler(turned), strict=True)}
-    streams |= _motors(topics)
-    return log_of(streams, {"source": source, "format": "ulog", "vehicle": "", "acc_frame": "body"})
+        signals |= {name: (table["timestamp"] * 1e-6, v) for name, v in zip(ATTITUDE, euler(turned), strict=True)}
+    signals |= _motors(topics)
+    return aligned_log(signals, {"source": source, "format": "ulog", "vehicle": "", "acc_frame": "body"})
 
 
-def _motors(topics: dict) -> dict[str, Stream]:
+def _motors(topics: dict) -> dict[str, Signal]:
     for topic, field, low, high in (("actuator_motors", "control", 0.0, 1.0),
                                     ("actuator_outputs", "output", 1000.0, 2000.0)):
         table = topics.get(topic, {})

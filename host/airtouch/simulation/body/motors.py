@@ -7,7 +7,7 @@ import numpy as np
 
 from airtouch.simulation.body import battery
 from airtouch.simulation.compiled import inlined, jit
-from airtouch.simulation.random_stream import normals
+from airtouch.simulation.random_generator import normals
 from airtouch.simulation.sensors import filters
 
 _F = np.float64
@@ -72,14 +72,14 @@ def compensated(plant, pwm, factor):
 
 
 @jit
-def drive(plant, state, shares, volts, stream):
+def drive(plant, state, shares, volts, generator):
     """The motors' stage of a physics step: target speeds and gains of the body's rotors, phases, battery.
 
-    shares: Noise; volts: what the motors see; stream: random numbers of the motors.
+    shares: Noise; volts: what the motors see; generator: random numbers of the motors.
     """
     s, body = state.motors, state.body
     _into_delay_line(s, state.step)
-    _draw_noise(plant, s, shares, stream)
+    _draw_noise(plant, s, shares, generator)
     factor, power = voltage_factor(plant, volts), 0.0
     power_per_speed3 = plant.power_per_thrust15 * plant.thrust_per_speed2 * math.sqrt(plant.thrust_per_speed2)
     for i in range(4):
@@ -105,13 +105,13 @@ def _into_delay_line(s, k):
 
 
 @jit
-def _draw_noise(plant, s, shares, stream):
+def _draw_noise(plant, s, shares, generator):
     """Noise of the thrust one step on."""
     if plant.motor_hiss > 0.0:
-        normals(stream, s.normals[:])
+        normals(generator, s.normals[:])
         for i in range(4):
             s.noise[4 + i] = shares.fast_left * s.noise[4 + i] + shares.fast_fresh * s.normals[i]
-    normals(stream, s.normals[:])
+    normals(generator, s.normals[:])
     for i in range(4):
         s.noise[i] = shares.slow_left * s.noise[i] + shares.slow_fresh * s.normals[i]
 

@@ -21,11 +21,11 @@ WrenchFunction = types.FunctionType(SIGNATURE)
 
 
 def wrench(function: Callable) -> Any:
-    """Compile `function(p, s, memory, stream, out)` so that simulator and diagnosis can call it.
+    """Compile `function(p, s, memory, generator, out)` so that simulator and diagnosis can call it.
 
     p: the effect's parameters in their declared order (10 at most). s: signals, by the places in
     `simulation.signals`. memory (12,): zero at the start of a flight, its own from then
-    on. stream: its random numbers, for `random_stream.normal(stream)`. out (6,): add force
+    on. generator: its random numbers, for `random_generator.normal`. out (6,): add force
     (N) and torque (N m) about the centre of mass, body axes. Called once a step.
     """
     if function.__module__.startswith("airtouch."):

@@ -19,13 +19,13 @@ SLOTS = 16  #: effects with a wrench that may be on at once
 class EffectSlots(NamedTuple):
     """Wrenches with their parameters and random numbers; `used` of the SLOTS act.
 
-    wrenches: compiled functions; parameters (SLOTS, PARAMETERS); streams (SLOTS, 1): random numbers of each.
+    wrenches: compiled functions; parameters (SLOTS, PARAMETERS); generators (SLOTS, 1): random numbers of each.
     """
 
     wrenches: tuple
     used: int
     parameters: np.ndarray
-    streams: np.ndarray
+    generators: np.ndarray
 
 
 EFFECT_SLOTS = types.NamedTuple(
@@ -51,7 +51,7 @@ def _address(function: Any) -> _Address:
 
 
 @wrench
-def _nothing(p, s, memory, stream, out):
+def _nothing(p, s, memory, generator, out):
     pass
 
 
@@ -61,8 +61,8 @@ def _type_of_slots(value: EffectSlots, _context: Any) -> types.NamedTuple:
     return EFFECT_SLOTS
 
 
-def slots(active: Sequence[Active], streams: Sequence[np.ndarray]) -> EffectSlots:
-    """Slots of effects that have a wrench, each with its stream (1,) of random numbers.
+def slots(active: Sequence[Active], generators: Sequence[np.ndarray]) -> EffectSlots:
+    """Slots of effects that have a wrench, each with its generator (1,) of random numbers.
 
     Raises AirTouchError for more effects than slots.
     """
@@ -70,8 +70,8 @@ def slots(active: Sequence[Active], streams: Sequence[np.ndarray]) -> EffectSlot
         raise AirTouchError(f"{len(active)} effects with a force at once; at most {SLOTS}")
     wrenches = [a.effect.wrench for a in active] + [_nothing] * (SLOTS - len(active))
     parameters, numbers = np.zeros((SLOTS, PARAMETERS)), np.zeros((SLOTS, 1), np.uint64)
-    for i, (a, stream) in enumerate(zip(active, streams, strict=True)):
-        parameters[i], numbers[i] = a.effect.vector(a.values), stream
+    for i, (a, generator) in enumerate(zip(active, generators, strict=True)):
+        parameters[i], numbers[i] = a.effect.vector(a.values), generator
     return EffectSlots(tuple(map(_address, wrenches)), len(active), parameters, numbers)
 
 
@@ -82,4 +82,4 @@ def add(effects, s, memory, force):
     effects: EffectSlots; s (COUNT,): signals; memory (SLOTS, MEMORY): what the effects keep.
     """
     for i in range(effects.used):
-        effects.wrenches[i](effects.parameters[i], s, memory[i], effects.streams[i], force)
+        effects.wrenches[i](effects.parameters[i], s, memory[i], effects.generators[i], force)

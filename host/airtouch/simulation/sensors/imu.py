@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.simulation.body.rotation import sine_and_cosine
 from airtouch.simulation.compiled import inlined, jit
-from airtouch.simulation.random_stream import normals
+from airtouch.simulation.random_generator import normals
 from airtouch.simulation.sensors import filters
 
 _F = np.float64
@@ -80,17 +80,17 @@ def _shake(plant, state, hover_speed, before_s):
 
 
 @jit
-def sense(plant, state, hover_speed, stream):
+def sense(plant, state, hover_speed, generator):
     """The IMU's stage of physics step k: samples of ticks 2 k - 1 (half-way from the last step) and 2 k.
 
-    hover_speed: rad/s of a rotor in hover; stream: random numbers of the IMU. acc, gyro of state.imu are the later
+    hover_speed: rad/s of a rotor in hover; generator: random numbers of the IMU. acc, gyro of state.imu are the later
     one as logged; its delay line holds both as the firmware filters them.
     """
     s = state.imu
     _motion(plant, state.body, s.motion)
     for half in range(2):
         row = (2 * state.step - 1 + half) & (DELAY_ROWS - 1)
-        normals(stream, s.normals[:])
+        normals(generator, s.normals[:])
         shake_x, shake_y, shake_z = _shake(plant, state, hover_speed, (1 - half) * 0.001)
         for i in range(3):
             shake = shake_x if i == 0 else (shake_y if i == 1 else shake_z)

@@ -8,7 +8,7 @@ from airtouch.simulation.body.rotation import rotate_back
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.firmware import measurement, range_module
 from airtouch.simulation.flight_plan import world
-from airtouch.simulation.random_stream import normals
+from airtouch.simulation.random_generator import normals
 from airtouch.simulation.sensors import filters
 
 _F = np.float64
@@ -94,13 +94,13 @@ def _error(plant, s, now, true):
 
 
 @jit
-def measure(plant, state, ground, stream):
+def measure(plant, state, ground, generator):
     """One measurement of the down range: distance along the beam, its surface and its kick into the delay lines.
 
     ground: a World. The surface that it saw stays in state.ranging.seen_top.
     """
     s, pose, now = state.ranging, state.body.state, state.time_s
-    normals(stream, s.normals[:])
+    normals(generator, s.normals[:])
     eye = pose[2] - plant.range_below_rotors
     top = s.below_top = _below(s, ground, pose[0], pose[1], eye)
     if plant.range_reach > 0.0:
@@ -126,7 +126,7 @@ def measure(plant, state, ground, stream):
 
 
 @jit
-def range_reading(plant, state, ground, tick, stream):
+def range_reading(plant, state, ground, tick, generator):
     """The down range at a tick (ms): measures when due and fills distance and distance_std of the firmware's reading.
 
     A reading (NaN: none) reaches log and estimator plant.range_delay after it was measured, by way of the firmware's
@@ -136,7 +136,7 @@ def range_reading(plant, state, ground, tick, stream):
     period, late = release.periods.range_ms, int(1000.0 * plant.range_delay + 0.5)
     reading.distance = np.nan
     if tick >= RANGE_MS and (tick - RANGE_MS) % period == 0:
-        measure(plant, state, ground, stream)
+        measure(plant, state, ground, generator)
     since = tick - RANGE_MS - late
     if since < 0 or since % period != 0:
         return
@@ -153,7 +153,7 @@ def range_reading(plant, state, ground, tick, stream):
 
 
 @jit
-def flow_reading(plant, state, tick, stream):
+def flow_reading(plant, state, tick, generator):
     """Optical flow at a tick (ms): counts forward and left of the firmware's reading (NaN: none)."""
     s, model, reading = state.ranging, plant.firmware.flow, state.firmware.reading
     period = plant.firmware.periods.flow_ms
@@ -161,7 +161,7 @@ def flow_reading(plant, state, tick, stream):
     if tick < FLOW_MS or (tick - FLOW_MS) % period != 0:
         return
     dt, number = 0.001 * period, (tick - FLOW_MS) // period
-    normals(stream, s.normals[:])
+    normals(generator, s.normals[:])
     decay = math.exp(-dt / plant.flow_noise_time)
     fresh = math.sqrt(1.0 - decay * decay)
     for i in range(2):

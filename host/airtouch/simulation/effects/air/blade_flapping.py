@@ -7,7 +7,7 @@ TILT, HUB, ABOVE = range(3)
 
 
 @wrench
-def blade_flapping(p, s, memory, stream, out):
+def blade_flapping(p, s, memory, generator, out):
     thrust = s[at.THRUST] + s[at.THRUST + 1] + s[at.THRUST + 2] + s[at.THRUST + 3]
     back_x, back_y = p[TILT] * s[at.VELOCITY], p[TILT] * s[at.VELOCITY + 1]
     out[0] -= thrust * back_x

@@ -9,14 +9,14 @@ import math
 
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
-from airtouch.simulation.random_stream import normal
+from airtouch.simulation.random_generator import normal
 
 STRENGTH, X, Y, WIDTH, TURBULENCE, TURBULENCE_TIME, SWIRL = range(7)
 STEP, DECAY, FRESH = range(8, 11)  #: of the memory: what follows from the step's length
 
 
 @wrench
-def downwash(p, s, memory, stream, out):
+def downwash(p, s, memory, generator, out):
     if memory[STEP] != s[at.STEP]:
         memory[STEP], memory[DECAY] = s[at.STEP], math.exp(-s[at.STEP] / p[TURBULENCE_TIME])
         memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
@@ -25,7 +25,7 @@ def downwash(p, s, memory, stream, out):
     spin = -1.0
     for i in range(4):
         spin = -spin  # front right turns as rear left, against the two others
-        memory[i] = memory[DECAY] * memory[i] + memory[FRESH] * normal(stream)
+        memory[i] = memory[DECAY] * memory[i] + memory[FRESH] * normal(generator)
         share = 1.0
         if p[WIDTH] > 0.0:
             forward, left = s[at.ROTOR_X + i], s[at.ROTOR_Y + i]

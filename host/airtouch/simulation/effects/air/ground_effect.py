@@ -5,7 +5,7 @@ import math
 from airtouch.simulation import signals as at
 from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
-from airtouch.simulation.random_stream import normal
+from airtouch.simulation.random_generator import normal
 
 STRENGTH, FOUNTAIN, FADE, TURBULENCE, TURBULENCE_TIME, HEAVE, PITCH, SWIRL, EVEN, LEAVING = range(10)
 LIFT = 4  #: 4, of the memory: mean lift of each rotor over its thrust
@@ -62,13 +62,13 @@ def leaving(s, memory):
 
 
 @wrench
-def ground_effect(p, s, memory, stream, out):
+def ground_effect(p, s, memory, generator, out):
     if memory[STEP] != s[at.STEP]:
         memory[STEP], memory[DECAY] = s[at.STEP], math.exp(-s[at.STEP] / p[TURBULENCE_TIME])
         memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
     decay, fresh = memory[DECAY], memory[FRESH]
     for i in range(4):
-        memory[i] = decay * memory[i] + fresh * normal(stream)
+        memory[i] = decay * memory[i] + fresh * normal(generator)
     # the four draws as modes: all alike, left against right, rear against front, one diagonal against the other
     alike = p[HEAVE] * 0.25 * (memory[0] + memory[1] + memory[2] + memory[3])
     left = 0.25 * (memory[2] + memory[3] - memory[0] - memory[1])

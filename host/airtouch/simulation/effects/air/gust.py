@@ -9,7 +9,7 @@ import math
 
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
-from airtouch.simulation.random_stream import normal
+from airtouch.simulation.random_generator import normal
 
 RMS, LENGTH, AIRSPEED, DRAG, LEVER, SHEAR = range(6)
 SLOW = 5  #: of the memory: the sideways air over the vehicle's length
@@ -18,7 +18,7 @@ ROOT_3 = math.sqrt(3.0)
 
 
 @wrench
-def gust(p, s, memory, stream, out):
+def gust(p, s, memory, generator, out):
     # memory: world x through one lag of tau; world y and z each through two; y through one more
     h = s[at.STEP]
     if memory[STEP] != h:
@@ -27,10 +27,10 @@ def gust(p, s, memory, stream, out):
         memory[FRESH] = math.sqrt(1.0 - memory[DECAY] ** 2)
         memory[WHITE] = math.sqrt(tau / h)  # held white noise of density tau: gives both shapes unit variance
     decay, white = memory[DECAY], memory[WHITE]
-    memory[0] = decay * memory[0] + memory[FRESH] * normal(stream)
+    memory[0] = decay * memory[0] + memory[FRESH] * normal(generator)
     for axis in range(2):
         first, second = 1 + 2 * axis, 2 + 2 * axis
-        memory[first] = decay * memory[first] + (1.0 - decay) * white * normal(stream)
+        memory[first] = decay * memory[first] + (1.0 - decay) * white * normal(generator)
         memory[second] = decay * memory[second] + (1.0 - decay) * memory[first]
     # (1 + sqrt(3) tau s) / (1 + tau s)^2 in partial fractions
     x = memory[0]

@@ -7,7 +7,7 @@ HORIZONTAL, VERTICAL = range(2)
 
 
 @wrench
-def rotor_drag(p, s, memory, stream, out):
+def rotor_drag(p, s, memory, generator, out):
     total = s[at.ROTOR_SPEED] + s[at.ROTOR_SPEED + 1] + s[at.ROTOR_SPEED + 2] + s[at.ROTOR_SPEED + 3]
     spin = total / (4.0 * s[at.HOVER_SPEED])
     out[0] -= p[HORIZONTAL] * spin * s[at.VELOCITY]

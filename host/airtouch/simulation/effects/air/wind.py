@@ -11,7 +11,7 @@ X, Y, Z, DRAG, LEVER = range(5)
 
 
 @wrench
-def wind(p, s, memory, stream, out):
+def wind(p, s, memory, generator, out):
     total = s[at.ROTOR_SPEED] + s[at.ROTOR_SPEED + 1] + s[at.ROTOR_SPEED + 2] + s[at.ROTOR_SPEED + 3]
     drag = p[DRAG] * total / (4.0 * s[at.HOVER_SPEED])
     r = at.ROTATION

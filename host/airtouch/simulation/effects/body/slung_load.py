@@ -10,7 +10,7 @@ STRETCH = 60.0  #: rad/s, bounce of the load on its thread: stiff against the sw
 
 
 @wrench
-def slung_load(p, s, memory, stream, out):
+def slung_load(p, s, memory, generator, out):
     # memory: position and velocity of the load from the vehicle, world axes, in a falling
     # frame that moves with the vehicle, so that neither pose nor speed must be known
     length, h = p[LENGTH], s[at.STEP]

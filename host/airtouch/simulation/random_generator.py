@@ -1,6 +1,6 @@
-"""Random numbers of one flight: counter-based streams that depend on nothing but their key.
+"""Random numbers of one flight: counter-based generators that depend on nothing but their key.
 
-Each consumer (a sensor, an effect) owns a stream, so that switching one effect on or
+Each consumer (a sensor, an effect) owns a generator, so that switching one effect on or
 off does not change what any other draws. Source: Steele, Lea, Flood, Fast Splittable
 Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64); Marsaglia, Tsang, The Ziggurat Method
 for Generating Random Variables, 2000.
@@ -15,7 +15,7 @@ from numba import float64, types, uint64
 
 from airtouch.simulation.compiled import jit
 
-STREAM = uint64[::1]  #: type of a stream's state, one 64-bit counter
+GENERATOR = uint64[::1]  #: type of a generator's state, one 64-bit counter
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
@@ -38,8 +38,8 @@ _EDGE = _edges()
 _HEIGHT = np.exp(-0.5 * _EDGE**2)
 
 
-def stream(seed: int, flight: int, name: str) -> np.ndarray:
-    """The state (1,) uint64 of the stream `name` of a flight."""
+def generator(seed: int, flight: int, name: str) -> np.ndarray:
+    """The state (1,) uint64 of the generator `name` of a flight."""
     return np.array([_begin(seed, flight, name)])
 
 
@@ -48,7 +48,7 @@ def _begin(seed: int, flight: int, name: str) -> np.uint64:
     return np.random.SeedSequence([seed, flight, zlib.crc32(name.encode())]).generate_state(1, np.uint64)[0]
 
 
-@jit(float64(STREAM))
+@jit(float64(GENERATOR))
 def uniform(state):
     """One number in (0, 1]."""
     state[0] += _GOLDEN
@@ -59,7 +59,7 @@ def uniform(state):
     return (float(z >> _S11) + 1.0) * _TO_UNIT
 
 
-@jit(float64(STREAM))
+@jit(float64(GENERATOR))
 def normal(state):
     """One number of the standard normal distribution (ziggurat of 128 strips)."""
     while True:
@@ -83,7 +83,7 @@ def normal(state):
             return sign * x
 
 
-@jit(types.void(STREAM, float64[::1]))
+@jit(types.void(GENERATOR, float64[::1]))
 def normals(state, out):
     """Fill `out` with standard normal numbers."""
     for i in range(len(out)):

@@ -3,11 +3,11 @@
 import numpy as np
 from scipy import stats
 
-from airtouch.simulation.random_stream import normal, normals, stream, uniform
+from airtouch.simulation.random_generator import generator, normal, normals, uniform
 
 
 def test_distributions():
-    state = stream(1, 2, "imu")
+    state = generator(1, 2, "imu")
     u = np.array([uniform(state) for _ in range(50_000)])
     assert u.min() > 0.0 and u.max() <= 1.0
     assert stats.kstest(u, "uniform").pvalue > 0.01
@@ -22,11 +22,11 @@ def test_distributions():
 
 
 def test_a_stream_depends_on_its_key_only():
-    first = [normal(stream(3, 4, "imu")) for _ in range(2)]
+    first = [normal(generator(3, 4, "imu")) for _ in range(2)]
     assert first[0] == first[1]
-    others = [normal(stream(*key)) for key in ((4, 3, "imu"), (3, 5, "imu"), (3, 4, "motors"))]
+    others = [normal(generator(*key)) for key in ((4, 3, "imu"), (3, 5, "imu"), (3, 4, "motors"))]
     assert len({first[0], *others}) == 4
     a, b = np.empty(50_000), np.empty(50_000)
-    normals(stream(3, 4, "imu"), a)
-    normals(stream(3, 5, "imu"), b)
+    normals(generator(3, 4, "imu"), a)
+    normals(generator(3, 5, "imu"), b)
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.015
