@@ -39,8 +39,7 @@ GROUPS = {
         "band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
         "finite", "floor_height", "fr_cfar", "motion_channels")), ("reference",)),
     "int8": Group(tuple(f"reference/networks/{name}.py" for name in ("int8_network", "stream_graph", "stream_int8")), (
-        "reference/test_multiplications.py", "kernels/test_network.py", "kernels/test_stream.py",
-        "gap8/kernels/test_requantise.py")),
+        "reference/networks", "kernels/test_network.py", "kernels/test_stream.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
     "selection": Group(("gap/naming/select.py", "gap/naming/judging.py", "gap/naming/rounds.py"),
                        ("gap/naming/test_select.py", "gap/naming/test_select_beside.py")),
