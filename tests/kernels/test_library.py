@@ -9,6 +9,7 @@ import pytest
 import airtouch.kernels as kernels
 import airtouch.reference as reference
 from airtouch.errors import AirTouchError
+from airtouch.kernels.library import lib
 from airtouch.vehicle import load
 
 
@@ -19,6 +20,12 @@ def test_a_missing_library_is_one_line_with_its_remedy():
             "try:\n    import airtouch.kernels\nexcept AirTouchError as error:\n    print(error)\n")
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert "make setup" in out and len(out.splitlines()) == 1
+
+
+def test_a_function_that_an_older_build_lacks_is_one_line_with_its_remedy():
+    with pytest.raises(AirTouchError, match="the built C kernels have no bandPowerTwice: run `make setup`"):
+        lib.bandPowerTwice(1)
+    assert lib.edgePipelineSize() == lib.edgePipelineSize() > 1000
 
 
 def test_names_mirror_the_reference():

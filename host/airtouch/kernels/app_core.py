@@ -17,7 +17,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import vehicle_struct
-from airtouch.kernels.library import call, ffi
+from airtouch.kernels.library import ffi, lib
 from airtouch.vehicle import Vehicle
 
 DETECTORS = ("cfar", "best", "best-gap8", "paper-gap8", "paper-stream-gap8")  #: values of the parameter `detector`
@@ -41,17 +41,17 @@ class AppCore:
                  vehicle: Vehicle | None = None) -> None:
         """params: fields of appParams_t that differ from the shipped ones. vehicle: what the app is built for, the one
         that the networks were trained for if left out."""
-        self._memory = ffi.new("double[]", call("appHostBytes")() // 8 + 1)  # doubles, for their alignment
+        self._memory = ffi.new("double[]", lib.appHostBytes() // 8 + 1)  # doubles, for their alignment
         self._params = ffi.new("appParams_t *")
         self._sample = ffi.new("appSample_t *")
-        self._packet = ffi.new("uint8_t[]", call("appHostPacketBytes")())
+        self._packet = ffi.new("uint8_t[]", lib.appHostPacketBytes())
         self.log = ffi.new("appLog_t *")  #: appLog_t after the last step
-        call("appHostDefaults")(self._params)
+        lib.appHostDefaults(self._params)
         self._assign(params or {})
-        call("appHostInit")(self._memory, self._params, have_gap8, nonce)
+        lib.appHostInit(self._memory, self._params, have_gap8, nonce)
         if vehicle is not None:
-            call("appHostSetVehicle")(self._memory, vehicle_struct(vehicle), vehicle.arm_pwm)
-        call("appHostClamp")(self._params)
+            lib.appHostSetVehicle(self._memory, vehicle_struct(vehicle), vehicle.arm_pwm)
+        lib.appHostClamp(self._params)
 
     def step(self, acc: Numbers, gyro: Numbers, pwm: Numbers, *,
              vbat_v: float = np.nan, attitude: Numbers = UNKNOWN, acc_in_body: bool = False) -> str:
@@ -63,22 +63,22 @@ class AppCore:
         sample = self._sample
         sample.acc, sample.gyro, sample.pwm = list(acc), list(gyro), list(pwm)
         sample.vbat, sample.attitude, sample.accInBody = vbat_v, list(attitude), acc_in_body
-        edge = call("appHostStep")(self._memory, sample, self.log)
+        edge = lib.appHostStep(self._memory, sample, self.log)
         return EDGES[self.log.edge] if edge else EDGES[0]
 
     def packets(self, taken: bool = True) -> Iterator[bytes]:
         """The packets for the GAP8 after a step. taken: whether the transport takes them."""
         for _ in range(PACKETS):
-            length = call("appHostOutgoing")(self._memory, self._packet)
+            length = lib.appHostOutgoing(self._memory, self._packet)
             if length == 0:
                 return
-            call("appHostSent")(self._memory, taken)
+            lib.appHostSent(self._memory, taken)
             if taken:
                 yield bytes(ffi.buffer(self._packet, length))
 
     def receive(self, packet: bytes) -> None:
         """What came from the GAP8: any bytes."""
-        call("appHostReceive")(self._memory, packet, min(len(packet), 0xFFFF))
+        lib.appHostReceive(self._memory, packet, min(len(packet), 0xFFFF))
 
     def params(self) -> dict[str, float]:
         """The settings in force."""
@@ -87,11 +87,11 @@ class AppCore:
     def set_params(self, **changes: float) -> int:
         """Change settings; those out of range are put right. Returns how many were."""
         self._assign(changes)
-        return int(call("appHostSetParams")(self._memory, self._params))
+        return int(lib.appHostSetParams(self._memory, self._params))
 
     def time(self, microseconds: int, late: bool = False) -> None:
         """How long the last step took, for the log."""
-        call("appHostTime")(self._memory, microseconds, late)
+        lib.appHostTime(self._memory, microseconds, late)
 
     def _assign(self, changes: dict[str, float]) -> None:
         for name, value in changes.items():
@@ -105,22 +105,22 @@ class Gap8Core:
     """The GAP8 app's core (gap8/app/src/gap8_core.h) with the networks of gap8/model."""
 
     def __init__(self) -> None:
-        self._memory = ffi.new("double[]", call("gap8HostBytes")() // 8 + 1)
-        self._packet = ffi.new("uint8_t[]", call("appHostPacketBytes")())
+        self._memory = ffi.new("double[]", lib.gap8HostBytes() // 8 + 1)
+        self._packet = ffi.new("uint8_t[]", lib.appHostPacketBytes())
         self.reset()
 
     def reset(self) -> None:
         """As the chip does when it loses power."""
-        call("gap8HostInit")(self._memory)
+        lib.gap8HostInit(self._memory)
 
     def take(self, packet: bytes) -> bytes:
         """The reply to what came from the STM32: any bytes; empty for none."""
-        length = call("gap8HostTake")(self._memory, packet, min(len(packet), 0xFFFF), self._packet)
+        length = lib.gap8HostTake(self._memory, packet, min(len(packet), 0xFFFF), self._packet)
         return bytes(ffi.buffer(self._packet, length))
 
     def heartbeat(self, uptime_ms: int) -> bytes:
         """A heartbeat; empty where nobody has spoken to it for 20 of them."""
-        length = call("gap8HostHeartbeat")(self._memory, uptime_ms, self._packet)
+        length = lib.gap8HostHeartbeat(self._memory, uptime_ms, self._packet)
         return bytes(ffi.buffer(self._packet, length))
 
 

@@ -14,9 +14,13 @@ def float32(x: Any) -> np.ndarray:
         return np.ascontiguousarray(x, dtype=np.float32)
 
 
-def pointer(x: np.ndarray, kind: str = "float *") -> Any:
-    """The address of a contiguous array; the array must outlive the call."""
-    return ffi.cast(kind, x.ctypes.data)
+C_TYPES = {np.dtype(np.float32): "float *", np.dtype(np.int8): "int8_t *", np.dtype(np.uint8): "uint8_t *",
+           np.dtype(np.uint16): "uint16_t *", np.dtype(np.int32): "int32_t *"}
+
+
+def pointer(x: np.ndarray, c_type: str | None = None) -> Any:
+    """The address of a contiguous array, as a pointer to its own type or to c_type; the array must outlive the call."""
+    return ffi.cast(c_type or C_TYPES[x.dtype], x.ctypes.data)
 
 
 def vehicle_struct(vehicle: Vehicle) -> Any:

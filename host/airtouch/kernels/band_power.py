@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import float32, pointer
-from airtouch.kernels.library import call, ffi
+from airtouch.kernels.library import ffi, lib
 from airtouch.parameters import DEFAULT
 from airtouch.reference import band_bins, window_ends
 
@@ -19,9 +19,9 @@ class BandPowerBank:
             raise AirTouchError(f"band power: the hop must be at least 1 sample, not {hop}")
         self.channels = channels
         self._settings = (float(sample_rate_hz), int(window), float(band_hz[0]), float(band_hz[1]), int(hop))
-        floats = call("bandPowerWork")(*self._settings[:4], channels)
+        floats = lib.bandPowerWork(*self._settings[:4], channels)
         self._work = np.zeros(max(floats, 1), dtype=np.float32)
-        self._state = ffi.new("char[]", call("bandPowerStateSize")())
+        self._state = ffi.new("char[]", lib.bandPowerStateSize())
         if not self._run(np.empty((0, channels), np.float32), reset=True)[1]:
             raise AirTouchError(f"band power: the kernel takes windows of 4 to 16384 samples and hops to 65535, "
                                 f"not {window} and {hop}")
@@ -34,8 +34,8 @@ class BandPowerBank:
         """Powers, and whether the kernel takes these settings."""
         rate, window, low, high, hop = self._settings
         out = np.empty((len(x) // hop + 1, self.channels), dtype=np.float32)
-        rows = call("bandPowerBatch")(pointer(x), len(x), self.channels, rate, window, low, high, hop, self._state,
-                                      pointer(self._work), self._work.size, reset, pointer(out))
+        rows = lib.bandPowerBatch(pointer(x), len(x), self.channels, rate, window, low, high, hop, self._state,
+                                  pointer(self._work), self._work.size, reset, pointer(out))
         return out[:max(rows, 0)], rows >= 0
 
 

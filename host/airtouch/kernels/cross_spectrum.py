@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import float32, pointer
-from airtouch.kernels.library import call
+from airtouch.kernels.library import lib
 
 
 def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)) -> np.ndarray:
@@ -17,6 +17,6 @@ def cascaded_cross_spectrum(power: np.ndarray, groups: Sequence[int] = (3, 3, 3)
         raise AirTouchError(f"cross-spectrum: groups {tuple(groups)} do not add up to powers of shape {powers.shape}")
     out = np.empty((len(powers), len(sizes)), dtype=np.float32)
     axes = sizes.astype(np.uint16)
-    call("crossSpectrumBatch")(pointer(powers), len(powers), powers.shape[1], pointer(axes, "uint16_t *"), len(axes),
-                               pointer(out))
+    lib.crossSpectrumBatch(pointer(powers), len(powers), powers.shape[1], pointer(axes), len(axes),
+                           pointer(out))
     return out

@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import axes, column, float32, pointer, vehicle_struct
-from airtouch.kernels.library import call
+from airtouch.kernels.library import lib
 from airtouch.vehicle import Vehicle
 
 
@@ -23,8 +23,8 @@ def disturbance_force(
         raise AirTouchError(f"disturbance force: needs (n, 3) accelerations and (n, 4) PWM, "
                             f"not {acc.shape} and {motors.shape}")
     volts, axis, out = column(vbat_v, n), axes(thrust_axis, n), np.empty((n, 3), dtype=np.float32)
-    call("disturbanceForceBatch")(pointer(acc), pointer(motors), pointer(volts), pointer(axis), n,
-                                  vehicle_struct(vehicle), pointer(out))
+    lib.disturbanceForceBatch(pointer(acc), pointer(motors), pointer(volts), pointer(axis), n,
+                              vehicle_struct(vehicle), pointer(out))
     return out
 
 
@@ -35,7 +35,7 @@ def total_thrust(pwm: np.ndarray, vehicle: Vehicle, vbat_v: np.ndarray | float |
     if motors.shape != (n, 4):
         raise AirTouchError(f"thrust: needs (n, 4) PWM, not {motors.shape}")
     volts, out = column(vbat_v, n), np.empty(n, dtype=np.float32)
-    call("totalThrustBatch")(pointer(motors), pointer(volts), n, vehicle_struct(vehicle), pointer(out))
+    lib.totalThrustBatch(pointer(motors), pointer(volts), n, vehicle_struct(vehicle), pointer(out))
     return out
 
 
@@ -45,5 +45,5 @@ def force_norm(force: np.ndarray) -> np.ndarray:
     if forces.shape != (len(forces), 3):
         raise AirTouchError(f"force norm: needs (n, 3) forces, not {forces.shape}")
     out = np.empty(len(forces), dtype=np.float32)
-    call("forceNormBatch")(pointer(forces), len(forces), pointer(out))
+    lib.forceNormBatch(pointer(forces), len(forces), pointer(out))
     return out

@@ -6,7 +6,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import axes, column, float32, pointer, vehicle_struct
-from airtouch.kernels.library import call, ffi
+from airtouch.kernels.library import ffi, lib
 from airtouch.reference.band_power import band_bins
 from airtouch.reference.edge_pipeline import EdgeEvents, EdgePipelineConfig, check_signals
 from airtouch.reference.fr_cfar import check_settings
@@ -45,7 +45,7 @@ def edge_pipeline(
     ]))
     events = np.zeros(n, dtype=_event_dtype())
     state = ffi.new("double[]", pipeline_ram_bytes() // 8 + 1)  # doubles, for their alignment
-    result = call("edgePipelineBatch")(
+    result = lib.edgePipelineBatch(
         config_struct(config, vehicle), pointer(samples, "edgeSample_t *"), n, state, pointer(events, "edgeEvent_t *"))
     if result < 0:
         raise AirTouchError(
@@ -62,7 +62,7 @@ def edge_pipeline(
 
 def pipeline_ram_bytes() -> int:
     """RAM of the whole pipeline struct on this machine; a little less where pointers are four bytes."""
-    return int(call("edgePipelineSize")())
+    return int(lib.edgePipelineSize())
 
 
 def config_struct(config: EdgePipelineConfig, vehicle: Vehicle) -> Any:

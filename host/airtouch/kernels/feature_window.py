@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import float32, pointer
-from airtouch.kernels.library import call
+from airtouch.kernels.library import lib
 
 
 def z_score_window(features: np.ndarray) -> np.ndarray:
@@ -15,7 +15,7 @@ def z_score_window(features: np.ndarray) -> np.ndarray:
     length, columns = windows.shape[-2:]
     out = np.empty_like(windows)
     count = windows.size // (length * columns) if columns else 0
-    if call("zScoreWindowBatch")(pointer(windows), count, length, columns, pointer(out)) < 0:
+    if lib.zScoreWindowBatch(pointer(windows), count, length, columns, pointer(out)) < 0:
         raise AirTouchError(f"z-score: the kernel takes windows of at most 65535 samples, not {length}")
     return out
 
@@ -28,5 +28,5 @@ def streaming_z_score(features: np.ndarray, time_constant: float) -> np.ndarray:
     if samples.ndim != 2:
         raise AirTouchError(f"z-score: needs (n, columns), not {samples.shape}")
     out = np.empty_like(samples)
-    call("streamingZScoreBatch")(pointer(samples), *samples.shape, time_constant, pointer(out))
+    lib.streamingZScoreBatch(pointer(samples), *samples.shape, time_constant, pointer(out))
     return out

@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import float32, pointer
-from airtouch.kernels.library import call
+from airtouch.kernels.library import lib
 from airtouch.parameters import DEFAULT
 from airtouch.reference.fr_cfar import check_settings
 
@@ -25,8 +25,8 @@ def fr_cfar(
         raise AirTouchError(f"FR-CFAR: power must be (n,), not {cells.shape}")
     threshold, alert = np.empty(len(cells), np.float32), np.empty(len(cells), np.uint8)
     ring = np.empty(guard_cells + leading_window, np.float32)
-    if call("frCfarBatch")(pointer(cells), len(cells), leading_window, guard_cells, p_fa, pointer(ring),
-                           pointer(threshold), pointer(alert, "uint8_t *")) < 0:
+    if lib.frCfarBatch(pointer(cells), len(cells), leading_window, guard_cells, p_fa, pointer(ring),
+                       pointer(threshold), pointer(alert)) < 0:
         raise AirTouchError(_TOO_LARGE)
     return threshold, alert.astype(bool)
 
@@ -34,7 +34,7 @@ def fr_cfar(
 def threshold_factor(leading_window: int, p_fa: float) -> float:
     """alpha = N (P_FA^(-1/N) - 1) as the kernel has it."""
     check_settings(0, leading_window, p_fa)
-    factor = call("frCfarFactor")(leading_window, 0, p_fa, pointer(np.empty(leading_window, np.float32)))
+    factor = lib.frCfarFactor(leading_window, 0, p_fa, pointer(np.empty(leading_window, np.float32)))
     if not np.isfinite(factor):
         raise AirTouchError(_TOO_LARGE)
     return factor

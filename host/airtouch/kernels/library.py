@@ -28,14 +28,21 @@ def _open(ffi: FFI) -> Any:
         raise AirTouchError(f"{spec.origin}: cannot be opened ({error}): {REMEDY}") from None
 
 
+class Library:
+    """The C functions and constants by name. Raises AirTouchError for one that an older build does not have."""
+
+    def __init__(self, opened: Any) -> None:
+        self._opened = opened
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            found = getattr(self._opened, name)
+        except AttributeError:
+            raise AirTouchError(f"the built C kernels have no {name}: {REMEDY}") from None
+        setattr(self, name, found)  # the next call finds it at once
+        return found
+
+
 ffi = FFI()
 ffi.cdef(_declarations(Path(__file__).parent / "batch"))
-lib = _open(ffi)
-
-
-def call(name: str):
-    """A function of the library by its C name; AirTouchError when the library is too old to have it."""
-    try:
-        return getattr(lib, name)
-    except AttributeError:
-        raise AirTouchError(f"the built C kernels have no {name}: {REMEDY}") from None
+lib = Library(_open(ffi))

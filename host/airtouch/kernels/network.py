@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import ffi, lib
 from airtouch.reference.networks.int8_network import CONV, Int8Layer, Int8Network, LayerKind, runs_sparse, sparse_blocks
 from airtouch.reference.networks.stream_int8 import StreamNetwork
@@ -46,7 +47,7 @@ def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
     flat, keep = _flat_int8(model.int8)
     x = np.ascontiguousarray(_windows(model.int8.input_shape, windows), dtype=np.float32)
     quantised = np.empty(x.shape, dtype=np.int8)
-    lib.networkInt8BatchQuantise(flat, pointer("float", x), x.size, pointer("int8_t", quantised))
+    lib.networkInt8BatchQuantise(flat, pointer(x), x.size, pointer(quantised))
     return run_int8(model.int8, quantised)
 
 
@@ -55,7 +56,7 @@ def run_int8(network: Int8Network, quantised: np.ndarray) -> np.ndarray:
     flat, keep = _flat_int8(network)
     x = np.ascontiguousarray(_windows(network.input_shape, quantised), dtype=np.int8)
     outputs = np.empty((len(x), network.outputs), dtype=np.int8)
-    lib.networkInt8Batch(flat, pointer("int8_t", x), len(x), _arena(flat), pointer("int8_t", outputs))
+    lib.networkInt8Batch(flat, pointer(x), len(x), _arena(flat), pointer(outputs))
     return outputs
 
 
@@ -72,12 +73,10 @@ def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray
     bias = _joined([layer.bias for layer in weighted], np.float32)
     flat = ffi.new("flatNetworkFloat_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
-        "shapes": pointer("int32_t", shapes), "weights": pointer("float", weights),
-        "bias": pointer("float", bias)})
+        "shapes": pointer(shapes), "weights": pointer(weights), "bias": pointer(bias)})
     size = checked(lib.networkFloatBatchArena(flat))
     outputs = np.empty((len(x), int(np.prod(layers[-1].output_shape))), dtype=np.float32)
-    lib.networkFloatBatch(flat, pointer("float", x), len(x), ffi.new("float[]", size),
-                          pointer("float", outputs))
+    lib.networkFloatBatch(flat, pointer(x), len(x), ffi.new("float[]", size), pointer(outputs))
     return outputs
 
 
@@ -100,9 +99,8 @@ def probability_of_flight(model: Model, features: np.ndarray) -> np.ndarray:
     flat, keep = _flat_int8(network)
     window, quantised = np.empty(rows * x.shape[1], np.float32), np.empty(rows * x.shape[1], np.int8)
     logits, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
-    lib.networkInt8Flight(flat, pointer("float", x), len(x), x.shape[1], rows, pointer("float", window),
-                          pointer("int8_t", quantised), _arena(flat), pointer("int8_t", logits),
-                          pointer("uint8_t", valid))
+    lib.networkInt8Flight(flat, pointer(x), len(x), x.shape[1], rows, pointer(window), pointer(quantised), _arena(flat),
+                          pointer(logits), pointer(valid))
     return np.where(valid, _softmax(network, logits), np.nan)
 
 
@@ -162,15 +160,15 @@ def flat_layers(layers: Sequence[Int8Layer]) -> tuple[Any, list[np.ndarray]]:
     shapes = np.array([layer_shape(layer) for layer in layers], dtype=np.int32)
     flat = ffi.new("flatNetworkInt8_t *", {
         "layerCount": len(layers), "weightCount": weights.size, "channelCount": bias.size,
-        "blockCount": skips.size, "shapes": pointer("int32_t", shapes), "weights": pointer("int8_t", weights),
-        "bias": pointer("int32_t", bias), "multiplier": pointer("int32_t", multiplier),
-        "shift": pointer("int8_t", shift), "blockCounts": pointer("uint16_t", counts),
-        "blockSkips": pointer("uint8_t", skips), "inputScale": layers[0].input_scale,
-        "inputZeroPoint": layers[0].input_zero_point})
+        "blockCount": skips.size, "shapes": pointer(shapes), "weights": pointer(weights),
+        "bias": pointer(bias), "multiplier": pointer(multiplier), "shift": pointer(shift),
+        "blockCounts": pointer(counts), "blockSkips": pointer(skips),
+        "inputScale": layers[0].input_scale, "inputZeroPoint": layers[0].input_zero_point})
     return flat, [shapes, weights, bias, multiplier, shift, counts, skips]
 
 
 def checked(size: int) -> int:
+    """The size that the library returned. Raises AirTouchError where it is -1 less the number of a wrong layer."""
     if size < 0:
         raise AirTouchError(f"network: layer {-size - 1} does not fit its weights or its neighbours")
     return size
@@ -193,10 +191,6 @@ def _softmax(network: Int8Network, logits: np.ndarray) -> np.ndarray:
 
 def _arena(flat: Any) -> Any:
     return ffi.new("int8_t[]", lib.networkInt8BatchArena(flat))
-
-
-def pointer(kind: str, array: np.ndarray) -> Any:
-    return ffi.cast(f"{kind} *", array.ctypes.data)
 
 
 def _joined(parts: list[np.ndarray], dtype: type) -> np.ndarray:

@@ -5,8 +5,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import ffi, lib
-from airtouch.kernels.network import Model, flat_layers, pointer
+from airtouch.kernels.network import Model, flat_layers
 from airtouch.reference.networks.int8_network import Int8Network, quantise
 
 
@@ -51,8 +52,8 @@ def run_rolling(network: Int8Network, quantised: np.ndarray, stride: int = 1,
     flat, keep = flat_layers(network.layers)
     good = np.ones(len(x), np.uint8) if usable is None else np.ascontiguousarray(usable, dtype=np.uint8)
     outputs, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
-    lib.rollingInt8Flight(flat, pointer("int8_t", x), pointer("uint8_t", good), len(x), stride,
-                          ffi.new("int8_t[]", size.arena_bytes), pointer("int8_t", outputs), pointer("uint8_t", valid))
+    lib.rollingInt8Flight(flat, pointer(x), pointer(good), len(x), stride, ffi.new("int8_t[]", size.arena_bytes),
+                          pointer(outputs), pointer(valid))
     return outputs, valid.astype(bool)
 
 
@@ -63,8 +64,7 @@ def fixed_scale(mean: np.ndarray, deviation: np.ndarray, features: np.ndarray) -
         raise AirTouchError(f"fixed scale: needs features (n, {len(mean)}), not {x.shape}")
     mean, inverse = np.asarray(mean, np.float32), (1.0 / np.asarray(deviation, np.float64)).astype(np.float32)
     out = np.empty_like(x)
-    lib.fixedScaleBatch(pointer("float", mean), pointer("float", inverse), pointer("float", x), *x.shape,
-                        pointer("float", out))
+    lib.fixedScaleBatch(pointer(mean), pointer(inverse), pointer(x), *x.shape, pointer(out))
     return out
 
 

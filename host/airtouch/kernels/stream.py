@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.kernels.arrays import pointer
 from airtouch.kernels.library import ffi, lib
-from airtouch.kernels.network import checked, flat_layers, pointer
+from airtouch.kernels.network import checked, flat_layers
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 
 
@@ -22,7 +23,7 @@ def run_stream(network: StreamNetwork, quantised: np.ndarray) -> np.ndarray:
     flat, keep = flat_stream(network)
     arena = ffi.new("int8_t[]", arena_bytes(network))
     outputs = np.empty((-(-len(x) // network.stride), network.outputs), dtype=np.int8)
-    lib.streamInt8Flight(flat, pointer("int8_t", x), len(x), arena, pointer("int8_t", outputs))
+    lib.streamInt8Flight(flat, pointer(x), len(x), arena, pointer(outputs))
     return outputs
 
 
@@ -47,7 +48,6 @@ def flat_stream(network: StreamNetwork) -> tuple[Any, list]:
     dilations = np.array([layer.dilation for layer in convs], dtype=np.int32)
     zero_points = np.array([layer.input_zero_point for layer in network.layers[:-1]], dtype=np.int32)
     flat = ffi.new("flatStreamInt8_t *", {
-        "layers": layers, "dilations": pointer("int32_t", dilations),
-        "zeroPoints": pointer("int32_t", zero_points), "stride": network.stride,
-        "firstSkip": head.reads[0]})
+        "layers": layers, "dilations": pointer(dilations), "zeroPoints": pointer(zero_points),
+        "stride": network.stride, "firstSkip": head.reads[0]})
     return flat, [layers, dilations, zero_points, *keep]

@@ -13,7 +13,7 @@ from airtouch.reference.edge_decoder import LOGITS, DecoderConfig
 from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 
-#: what is said of a network that the detector cannot run
+#: error text for a network that the detector cannot run
 OTHER_NETWORK = f"stream detector: the network must take {len(NAMES)} channels and give {len(LOGITS)} logits or more"
 
 
@@ -36,8 +36,7 @@ def motion_channels(
     channels = np.empty((len(acc), len(NAMES)), dtype=np.float32)
     airborne = np.empty(len(acc), dtype=np.uint8)
     lib.motionChannelsBatch(pointer(acc), pointer(rate), pointer(motors), len(acc),
-                            motion_struct(config or MotionConfig()), pointer(channels),
-                            pointer(airborne, "uint8_t *"))
+                            motion_struct(config or MotionConfig()), pointer(channels), pointer(airborne))
     return channels, airborne.astype(bool)
 
 
@@ -48,8 +47,7 @@ def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig
         raise AirTouchError(f"edge decoder: needs logits (n, {len(LOGITS)}) and airborne (n,), "
                             f"not {values.shape}, {flags.shape}")
     edges = np.empty(len(flags), dtype=np.uint8)
-    lib.edgeDecoderBatch(pointer(values), pointer(flags, "uint8_t *"), len(flags), decoder_struct(config),
-                         pointer(edges, "uint8_t *"))
+    lib.edgeDecoderBatch(pointer(values), pointer(flags), len(flags), decoder_struct(config), pointer(edges))
     return edges
 
 
@@ -65,13 +63,9 @@ def stream_detector(
     flat, keep = flat_stream(network)
     arena = ffi.new("int8_t[]", arena_bytes(network))
     events = ffi.new("streamEvent_t[]", max(len(acc), 1))
-    first = network.layers[0]
-    quantisation = ffi.new("streamQuantisation_t *", {
-        "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
-        "outputScale": network.head.output_scale, "outputZeroPoint": network.head.output_zero_point})
     fits = lib.streamDetectorFlight(
         pointer(acc), pointer(rate), pointer(motors), len(acc), motion_struct(motion or MotionConfig()), flat,
-        quantisation, decoder_struct(decoder), arena, events)
+        quantisation_struct(network), decoder_struct(decoder), arena, events)
     if not fits:
         raise AirTouchError(OTHER_NETWORK)
     table = np.frombuffer(ffi.buffer(events), dtype=EVENT)[:len(acc)]
@@ -92,6 +86,14 @@ def motion_struct(config: MotionConfig) -> Any:
         "limit": config.limit, "armPwm": config.arm_pwm, "slowGain": 1.0 / config.slow_samples,
         "lagGain": 1.0 / config.lag_samples, "leastThrust": config.least_thrust_n,
         "settleSamples": config.settle_samples})
+
+
+def quantisation_struct(network: StreamNetwork) -> Any:
+    """A streamQuantisation_t: scales and zero points of the network's input and output."""
+    first, head = network.layers[0], network.head
+    return ffi.new("streamQuantisation_t *", {
+        "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
+        "outputScale": head.output_scale, "outputZeroPoint": head.output_zero_point})
 
 
 def decoder_struct(config: DecoderConfig) -> Any:

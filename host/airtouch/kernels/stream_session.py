@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.kernels.arrays import pointer
-from airtouch.kernels.library import call, ffi
+from airtouch.kernels.library import ffi, lib
 from airtouch.kernels.stream import arena_bytes, flat_stream
 from airtouch.kernels.stream_detector import (
     EVENT,
@@ -13,6 +13,7 @@ from airtouch.kernels.stream_detector import (
     check_signals,
     decoder_struct,
     motion_struct,
+    quantisation_struct,
 )
 from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.motion_channels import MotionConfig
@@ -28,16 +29,12 @@ class StreamSession:
     def __init__(self, network: StreamNetwork, motion: MotionConfig | None = None,
                  decoder: DecoderConfig = DecoderConfig()) -> None:
         flat, keep = flat_stream(network)
-        first = network.layers[0]
-        quantisation = ffi.new("streamQuantisation_t *", {
-            "inputScale": first.input_scale, "inputZeroPoint": first.input_zero_point,
-            "outputScale": network.head.output_scale, "outputZeroPoint": network.head.output_zero_point})
         arena = ffi.new("int8_t[]", arena_bytes(network))
-        doubles = call("streamSessionBytes")() // 8 + 1  # for their alignment
+        doubles = lib.streamSessionBytes() // 8 + 1  # for their alignment
         self._state = ffi.new("double[]", doubles)
         self._keep = (flat, keep, arena)  # the session points into these
-        fits = call("streamSessionOpen")(self._state, motion_struct(motion or MotionConfig()), flat,
-                                         quantisation, decoder_struct(decoder), arena)
+        fits = lib.streamSessionOpen(self._state, motion_struct(motion or MotionConfig()), flat,
+                                     quantisation_struct(network), decoder_struct(decoder), arena)
         if not fits:
             raise AirTouchError(OTHER_NETWORK)
 
@@ -48,6 +45,6 @@ class StreamSession:
         """
         acc, rate, motors = check_signals(acc_level, gyro, pwm)
         events = np.empty(len(acc), dtype=EVENT)
-        call("streamSessionNext")(self._state, pointer(acc), pointer(rate), pointer(motors), len(acc),
-                                  pointer(events, "streamEvent_t *"))
+        lib.streamSessionNext(self._state, pointer(acc), pointer(rate), pointer(motors), len(acc),
+                              pointer(events, "streamEvent_t *"))
         return StreamEvents(events["logits"], events["ready"] > 0, events["edge"], events["airborne"] > 0)

@@ -8,7 +8,7 @@ from airtouch.detector import paper
 from airtouch.detector.paper import rolling
 from airtouch.detector.paper.features import pipeline
 from airtouch.kernels.app_core import DETECTORS, HEALTH, LINK, AppCore, Gap8Core
-from airtouch.kernels.library import call
+from airtouch.kernels.library import lib
 from firmware.drone import Drone
 
 
@@ -173,7 +173,7 @@ def test_recorded_flights_give_the_same_edges_on_both_processors(recorded):
     (20, 2**32 - 30, 0), (21, 2**32 - 30, 1), (2**32 - 1, 3, 0),  # ticks wrap
     (40, 0, 0), (60, 0, 1)])  # no step yet
 def test_an_old_tick_is_no_stalled_app(now, last, stalled):
-    assert call("appHostStalled")(now, last, 50) == stalled
+    assert lib.appHostStalled(now, last, 50) == stalled
 
 
 def test_load_and_late_steps_are_logged():

@@ -17,7 +17,7 @@ from airtouch.crazyflie import flash
 from airtouch.detector.shared import vehicle_header
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.kernels.app_core import DETECTORS, PARAMS, AppCore, Gap8Core
-from airtouch.kernels.library import call, ffi
+from airtouch.kernels.library import ffi, lib
 from airtouch.logs.flight_log import GYRO, PWM
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
@@ -224,7 +224,7 @@ def fields(data):
 def defaults():
     """Field -> value as appParamsDefaults() gives them."""
     params = ffi.new("appParams_t *")
-    call("appHostDefaults")(params)
+    lib.appHostDefaults(params)
     return {name: getattr(params, name) for name in PARAMS}
 
 

@@ -10,7 +10,7 @@ from airtouch.detector.paper import rolling
 from airtouch.detector.paper.features import pipeline
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import LINK, PARAM_TYPES, PARAMS, AppCore
-from airtouch.kernels.library import call, ffi
+from airtouch.kernels.library import ffi, lib
 from firmware.drone import Drone, said
 
 OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 4), "filter": (3, 2), "bandMid": (1e9, 48.0),
@@ -74,17 +74,17 @@ def test_settings_are_compared_field_by_field_and_nothing_between_them_counts():
     for name in PARAMS:
         setattr(one, name, 1)
         setattr(other, name, 1)
-    assert call("appHostSame")(one, other)
+    assert lib.appHostSame(one, other)
     for name, kind in PARAM_TYPES.items():
         setattr(other, name, 2)
-        assert not call("appHostSame")(one, other), name
+        assert not lib.appHostSame(one, other), name
         setattr(other, name, 1)
         if kind == "float":  # else what was put right is never written back, and counts again each step
             setattr(one, name, np.nan)
             setattr(other, name, np.nan)
-            assert call("appHostSame")(one, other), name
+            assert lib.appHostSame(one, other), name
             setattr(one, name, 1)
-            assert not call("appHostSame")(one, other), name
+            assert not lib.appHostSame(one, other), name
             setattr(other, name, 1)
 
 

@@ -19,55 +19,71 @@ static int32_t floatWeights(const int32_t *shape) {
   return shape[0] == LAYER_DENSE ? shape[6] * inputs(shape) : 0;
 }
 
+// How far the layers before one have used the flat arrays.
+typedef struct {
+  int32_t weight;
+  int32_t channel;
+  int32_t sparseChannel;
+  int32_t block;
+} place_t;
+
+static int sparse(const int32_t *shape) { return shape[0] == LAYER_SPARSE_DENSE || shape[0] == LAYER_SPARSE_CONV; }
+
+// One layer, with pointers to where its arrays begin.
+static layerInt8_t layerAt(const flatNetworkInt8_t *flat, const int32_t *shape, const place_t *at) {
+  return (layerInt8_t){.kind = shape[0],
+                       .inRows = shape[1],
+                       .inColumns = shape[2],
+                       .inChannels = shape[3],
+                       .outRows = shape[4],
+                       .outColumns = shape[5],
+                       .outChannels = shape[6],
+                       .kernelRows = shape[7],
+                       .kernelColumns = shape[8],
+                       .outputZeroPoint = shape[9],
+                       .outputMin = shape[10],
+                       .outputMax = shape[11],
+                       .weights = flat->weights + at->weight,
+                       .bias = flat->bias + at->channel,
+                       .multiplier = flat->multiplier + at->channel,
+                       .shift = flat->shift + at->channel,
+                       .blockCounts = flat->blockCounts + at->sparseChannel,
+                       .blockSkips = flat->blockSkips + at->block};
+}
+
+// Moves past the blocks of a sparse layer; 0 where one lies outside the arrays or the layer's input.
+static int passBlocks(const flatNetworkInt8_t *flat, const int32_t *shape, place_t *at) {
+  const int32_t filter = shape[0] == LAYER_SPARSE_CONV ? shape[7] * shape[8] * shape[3] : inputs(shape);
+  for (int32_t output = 0; output < shape[6]; output++) {
+    int32_t reached = 0;  // blocks of input passed over or used
+    for (int32_t blocks = flat->blockCounts[at->sparseChannel++]; blocks > 0; blocks--) {
+      if (at->block >= flat->blockCount) {
+        return 0;
+      }
+      reached += flat->blockSkips[at->block++] + 1;
+      at->weight += 4;
+    }
+    if (4 * reached > filter) {
+      return 0;
+    }
+  }
+  return 1;
+}
+
 int32_t unpackLayersInt8(const flatNetworkInt8_t *flat, layerInt8_t *layers) {
-  int32_t weight = 0, channel = 0, sparseChannel = 0, block = 0;
+  place_t at = {0, 0, 0, 0};
   if (flat->layerCount < 1 || flat->layerCount > MAX_LAYERS) {
     return 0;
   }
   for (int32_t i = 0; i < flat->layerCount; i++) {
-    const int32_t *s = flat->shapes + i * SHAPE_COLUMNS;
-    layers[i] = (layerInt8_t){.kind = s[0],
-                              .inRows = s[1],
-                              .inColumns = s[2],
-                              .inChannels = s[3],
-                              .outRows = s[4],
-                              .outColumns = s[5],
-                              .outChannels = s[6],
-                              .kernelRows = s[7],
-                              .kernelColumns = s[8],
-                              .outputZeroPoint = s[9],
-                              .outputMin = s[10],
-                              .outputMax = s[11],
-                              .weights = flat->weights + weight,
-                              .bias = flat->bias + channel,
-                              .multiplier = flat->multiplier + channel,
-                              .shift = flat->shift + channel,
-                              .blockCounts = flat->blockCounts + sparseChannel,
-                              .blockSkips = flat->blockSkips + block};
-    if (s[0] != LAYER_MAX_POOL) {
-      channel += s[6];
-    }
-    if (channel > flat->channelCount) {
+    const int32_t *shape = flat->shapes + i * SHAPE_COLUMNS;
+    layers[i] = layerAt(flat, shape, &at);
+    at.channel += shape[0] == LAYER_MAX_POOL ? 0 : shape[6];
+    if (at.channel > flat->channelCount || (sparse(shape) && !passBlocks(flat, shape, &at))) {
       return i;
     }
-    if (s[0] == LAYER_SPARSE_DENSE || s[0] == LAYER_SPARSE_CONV) {
-      const int32_t filter = s[0] == LAYER_SPARSE_CONV ? s[7] * s[8] * s[3] : inputs(s);
-      for (int32_t o = 0; o < s[6]; o++) {
-        int32_t reached = 0;  // blocks of input passed over or used
-        for (int32_t b = flat->blockCounts[sparseChannel++]; b > 0; b--) {
-          if (block >= flat->blockCount) {
-            return i;
-          }
-          reached += flat->blockSkips[block++] + 1;
-          weight += 4;
-        }
-        if (4 * reached > filter) {
-          return i;
-        }
-      }
-    }
-    weight = (weight + layerWeights(&layers[i]) + 3) & ~3;  // each layer's weights are aligned to 4
-    if (weight > flat->weightCount) {
+    at.weight = (at.weight + layerWeights(&layers[i]) + 3) & ~3;  // each layer's weights are aligned to 4
+    if (at.weight > flat->weightCount) {
       return i;
     }
   }
