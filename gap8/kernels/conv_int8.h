@@ -1,8 +1,13 @@
-// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
-//   (extensions.h), same bits.
-// Threads: each core of a team writes its own outputs and nothing else.
-// Memory: 256 bytes of stack.
-// Cost: kernelRows * kernelColumns * inChannels multiplications an output, or those of the kept blocks.
+/**
+ * @file conv_int8.h
+ * Two-dimensional convolution of int8 activations, with the max pool that may follow it.
+ *
+ * Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+ *   (extensions.h), same bits.
+ * Threads: each core of a team writes its own outputs and nothing else.
+ * Memory: 256 bytes of stack.
+ * Cost: kernelRows * kernelColumns * inChannels multiplications an output, or those of the kept blocks.
+ */
 #pragma once
 
 #include "job_int8.h"

@@ -1,7 +1,10 @@
-// What every inner loop here is made of: a unit of inputs times a unit of weights. With
-// XPULP a unit is four int8 in a register and their dot product one instruction; on a
-// Cortex-M4 it is the same four, their product two instructions and two to spread each
-// factor; elsewhere it is a single value.
+/**
+ * @file dot_int8.h
+ * What every inner loop here is made of: a unit of inputs times a unit of weights. With
+ * XPULP a unit is four int8 in a register and their dot product one instruction; on a
+ * Cortex-M4 it is the same four, their product two instructions and two to spread each
+ * factor; elsewhere it is a single value.
+ */
 #pragma once
 
 #include <stdint.h>
@@ -29,21 +32,21 @@ ALWAYS_INLINE int32_t loadUnit(const int8_t *p) {
   return four;
 }
 
-// Bytes 0 and 2 as two int16 in a register.
+/** Bytes 0 and 2 as two int16 in a register. */
 ALWAYS_INLINE int32_t evenBytes(int32_t four) {
   int32_t two;
   __asm__("sxtb16 %0, %1" : "=r"(two) : "r"(four));
   return two;
 }
 
-// Bytes 1 and 3.
+/** Bytes 1 and 3. */
 ALWAYS_INLINE int32_t oddBytes(int32_t four) {
   int32_t two;
   __asm__("sxtb16 %0, %1, ror #8" : "=r"(two) : "r"(four));
   return two;
 }
 
-// sum + a[0] b[0] + a[1] b[1], of int16
+/** sum + a[0] b[0] + a[1] b[1], of int16 */
 ALWAYS_INLINE int32_t multiplyAddTwo(int32_t a, int32_t b, int32_t sum) {
   int32_t more;
   __asm__("smlad %0, %1, %2, %3" : "=r"(more) : "r"(a), "r"(b), "r"(sum));

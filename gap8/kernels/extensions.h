@@ -1,5 +1,8 @@
-// What the kernels use beyond C11, in one place. GCC and clang have it; with another compiler, or with
-// -DAIRTOUCH_PLAIN_C, plain C stands in its place. The results are the same to the last bit, only slower.
+/**
+ * @file extensions.h
+ * What the kernels use beyond C11, in one place. GCC and clang have it; with another compiler, or with
+ * -DAIRTOUCH_PLAIN_C, plain C stands in its place. The results are the same to the last bit, only slower.
+ */
 #pragma once
 
 #if defined(__GNUC__) && !defined(AIRTOUCH_PLAIN_C)

@@ -1,8 +1,13 @@
-// Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
-//   desktop's bits.
-// Threads: pure functions without state: any number at once.
-// Memory: none.
-// Cost: one division and a short series a column.
+/**
+ * @file fixed_scale.h
+ * Fused features as inputs that do not depend on other samples.
+ *
+ * Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
+ *   desktop's bits.
+ * Threads: pure functions without state: any number at once.
+ * Memory: none.
+ * Cost: one division and a short series a column.
+ */
 #pragma once
 
 #include <stdint.h>
@@ -13,8 +18,10 @@ extern "C" {
 
 enum { FIXED_SCALE_MAX_COLUMNS = 8 };
 
-// How the fused features of a sample become inputs that do not depend on other samples:
-// x = clip((log2(feature) - mean) * inverseDeviation), column by column.
+/**
+ * How the fused features of a sample become inputs that do not depend on other samples:
+ * x = clip((log2(feature) - mean) * inverseDeviation), column by column.
+ */
 typedef struct {
   int32_t columns;
   float mean[FIXED_SCALE_MAX_COLUMNS];

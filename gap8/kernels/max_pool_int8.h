@@ -1,8 +1,13 @@
-// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
-//   (extensions.h), same bits.
-// Threads: each core of a team writes its own outputs and nothing else.
-// Memory: none.
-// Cost: kernelRows * kernelColumns comparisons an output.
+/**
+ * @file max_pool_int8.h
+ * Maximum over blocks of int8 activations.
+ *
+ * Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+ *   (extensions.h), same bits.
+ * Threads: each core of a team writes its own outputs and nothing else.
+ * Memory: none.
+ * Cost: kernelRows * kernelColumns comparisons an output.
+ */
 #pragma once
 
 #include "job_int8.h"

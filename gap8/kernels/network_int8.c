@@ -12,9 +12,6 @@ static int32_t inputSize(const layerInt8_t *layer) { return layer->inRows * laye
 
 static int32_t outputSize(const layerInt8_t *layer) { return layer->outRows * layer->outColumns * layer->outChannels; }
 
-// Room that so many activations take in the arena, where each tensor is aligned to 4 bytes.
-static int32_t aligned(int32_t bytes) { return (bytes + 3) & ~3; }
-
 // Layers that step i takes: two where a pool is done with the convolution before it.
 static int32_t layersOfStep(const networkInt8_t *network, int32_t i) {
   const int32_t kind = network->layers[i].kind;
@@ -26,7 +23,7 @@ int32_t networkInt8ArenaBytes(const networkInt8_t *network) {
   int32_t largest = 0;
   for (int32_t i = 0; i < network->layerCount; i += layersOfStep(network, i)) {
     const layerInt8_t *last = &network->layers[i + layersOfStep(network, i) - 1];
-    const int32_t bytes = (i > 0 ? aligned(inputSize(&network->layers[i])) : 0) + aligned(outputSize(last));
+    const int32_t bytes = (i > 0 ? alignedBytes(inputSize(&network->layers[i])) : 0) + alignedBytes(outputSize(last));
     largest = bytes > largest ? bytes : largest;
   }
   return largest;
@@ -96,7 +93,7 @@ const int8_t *networkInt8RunTeam(const networkInt8_t *network, const int8_t *inp
   for (int32_t i = 0; i < network->layerCount; i += layersOfStep(network, i)) {
     const int32_t pooled = layersOfStep(network, i) > 1;
     const layerInt8_t *last = &network->layers[i + pooled];
-    int8_t *y = atEnd ? arena + bytes - aligned(outputSize(last)) : arena;
+    int8_t *y = atEnd ? arena + bytes - alignedBytes(outputSize(last)) : arena;
     layerInt8Run(&(jobInt8_t){.layer = &network->layers[i],
                               .pool = pooled ? last : NULL,
                               .input = x,

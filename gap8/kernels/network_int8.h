@@ -1,8 +1,13 @@
-// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
-//   (extensions.h), same bits.
-// Threads: the arena is one caller's, or one team's of cores; networks are constants.
-// Memory: networkInt8ArenaBytes of the caller's, 4,560 for the paper's network.
-// Cost: 262 k multiplications for the paper's network, 233 k pruned.
+/**
+ * @file network_int8.h
+ * The int8 network over a whole window, on one core or several.
+ *
+ * Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+ *   (extensions.h), same bits.
+ * Threads: the arena is one caller's, or one team's of cores; networks are constants.
+ * Memory: networkInt8ArenaBytes of the caller's, 4,560 for the paper's network.
+ * Cost: 262 k multiplications for the paper's network, 233 k pruned.
+ */
 #pragma once
 
 #include "job_int8.h"
@@ -11,13 +16,13 @@
 extern "C" {
 #endif
 
-// A network: layers in order, each reading what the one before wrote.
+/** A network: layers in order, each reading what the one before wrote. */
 typedef struct {
   const layerInt8_t *layers;
   int32_t layerCount;
-  float inputScale;  // q = floor(x / inputScale + 0.5) + inputZeroPoint
+  float inputScale;  ///< q = floor(x / inputScale + 0.5) + inputZeroPoint
   int32_t inputZeroPoint;
-  float outputScale;  // logit = outputScale * (q - outputZeroPoint)
+  float outputScale;  ///< logit = outputScale * (q - outputZeroPoint)
   int32_t outputZeroPoint;
 } networkInt8_t;
 

@@ -1,9 +1,12 @@
-// From an int32 accumulator to an int8 activation: the one rounding of this project.
-//
-// gemmlowp's double rounding, as TensorFlow Lite Micro does it: a rounding, doubling
-// high multiplication (ties up), then a rounding shift to the right (ties away from
-// zero). Equal to tflite-micro to the last bit. Right shifts of negative numbers must be
-// arithmetic, as they are on every target here.
+/**
+ * @file requantise.h
+ * From an int32 accumulator to an int8 activation: the one rounding of this project.
+ *
+ * gemmlowp's double rounding, as TensorFlow Lite Micro does it: a rounding, doubling
+ * high multiplication (ties up), then a rounding shift to the right (ties away from
+ * zero). Equal to tflite-micro to the last bit. Right shifts of negative numbers must be
+ * arithmetic, as they are on every target here.
+ */
 #pragma once
 
 #include <stdint.h>
@@ -12,7 +15,7 @@
 #include "layer_int8.h"
 #include "xpulp.h"
 
-// round(a * b / 2^31), ties up, for |a| < 2^29 and b >= 0.
+/** round(a * b / 2^31), ties up, for |a| < 2^29 and b >= 0. */
 static inline int32_t roundingDoublingHighMultiply(int32_t a, int32_t b) {
   const int32_t halves = (int32_t)(((int64_t)(int32_t)((uint32_t)a << 2) * (int64_t)b) >> 32);  // one instruction
 #if AIRTOUCH_XPULP
@@ -22,7 +25,7 @@ static inline int32_t roundingDoublingHighMultiply(int32_t a, int32_t b) {
 #endif
 }
 
-// round(x / 2^exponent), ties away from zero, for exponent 1 to 31 and |x| < 2^30.
+/** round(x / 2^exponent), ties away from zero, for exponent 1 to 31 and |x| < 2^30. */
 static inline int32_t roundingShiftRight(int32_t x, int32_t exponent) {
   const int32_t towardsZero = x >> 31;  // -1 where x is negative: its ties go down
 #if AIRTOUCH_XPULP
@@ -32,7 +35,7 @@ static inline int32_t roundingShiftRight(int32_t x, int32_t exponent) {
 #endif
 }
 
-// Zero point and clamp of a layer's output, read once: bytes that a kernel writes might alias the layer.
+/** Zero point and clamp of a layer's output, read once: bytes that a kernel writes might alias the layer. */
 typedef struct {
   int32_t zeroPoint;
   int32_t min;
@@ -43,10 +46,10 @@ static inline outputRange_t outputRange(const layerInt8_t *layer) {
   return (outputRange_t){.zeroPoint = layer->outputZeroPoint, .min = layer->outputMin, .max = layer->outputMax};
 }
 
-// What one output channel needs.
+/** What one output channel needs. */
 typedef struct {
   int32_t multiplier;
-  int32_t right;  // shift to the right
+  int32_t right;  ///< shift to the right
   outputRange_t range;
 } requantiser_t;
 
@@ -54,9 +57,11 @@ static inline requantiser_t requantiser(const layerInt8_t *layer, int32_t channe
   return (requantiser_t){.multiplier = layer->multiplier[channel], .right = -layer->shift[channel], .range = range};
 }
 
-// The activation of an accumulator. |accumulator|, and its product with a scale above one,
-// must be below 2^28, as in every layer that training makes and loading accepts. Never
-// falls with a rising accumulator, so that the largest of several may be taken before it.
+/**
+ * The activation of an accumulator. |accumulator|, and its product with a scale above one,
+ * must be below 2^28, as in every layer that training makes and loading accepts. Never
+ * falls with a rising accumulator, so that the largest of several may be taken before it.
+ */
 static inline int8_t requantise(requantiser_t r, int32_t accumulator) {
   int32_t value;
   if (LIKELY(r.right > 0)) {

@@ -5,16 +5,24 @@
 
 #include "conv_int8.h"
 
-static int32_t aligned(int32_t bytes) { return (bytes + 3) & ~3; }
-
 static int32_t isConv(const layerInt8_t *layer) {
   return layer->kind == LAYER_CONV || layer->kind == LAYER_SPARSE_CONV;
 }
 
+// Whether a layer slides over the rows of its input.
+static int32_t slides(const layerInt8_t *layer) { return isConv(layer) || layer->kind == LAYER_MAX_POOL; }
+
+// How far apart neighbouring rows of a layer's input lie, in samples: in the window, and as the rolling network
+// computes them. A pool multiplies both, until the second reaches the stride.
+typedef struct {
+  int32_t window;
+  int32_t rolling;
+} spacing_t;
+
 // A step of one layer, for one row of output: as many rows of input as it reads for that.
 static void beginStep(rollingStep_t *step, const layerInt8_t *layer) {
   step->layer = *layer;
-  if (isConv(layer) || layer->kind == LAYER_MAX_POOL) {
+  if (slides(layer)) {
     step->layer.inRows = layer->kernelRows;
     step->layer.outRows = 1;
   }
@@ -23,69 +31,89 @@ static void beginStep(rollingStep_t *step, const layerInt8_t *layer) {
   step->period = 1;
 }
 
-// Rows of a layer's input are `period` samples apart; in the window neighbouring rows are
-// `apart` samples apart. A pool multiplies `apart`; `period` follows until it reaches the stride.
+// A convolution whose rows only the pool reads: both at once, the rows never stored.
+static void joinPool(rollingStep_t *step, const layerInt8_t *conv, const layerInt8_t *pool) {
+  step->pool = *pool;
+  step->pool.inRows = pool->kernelRows;
+  step->pool.outRows = 1;
+  step->layer.outRows = pool->kernelRows;
+  step->layer.inRows = conv->kernelRows + pool->kernelRows - 1;
+  step->taps = step->layer.inRows;
+  step->period = pool->kernelRows;
+}
+
+static void passPool(rollingInt8_t *self, const layerInt8_t *pool, spacing_t *spacing) {
+  self->ahead += pool->inRows % pool->kernelRows * spacing->window;  // the rows that it drops are the window's newest
+  spacing->window *= pool->kernelRows;
+}
+
+// Plans a convolution or a pool, and the pool behind a convolution where both are one step. @return layers planned
+static int32_t planSliding(rollingInt8_t *self, rollingStep_t *step, const layerInt8_t *layer, const layerInt8_t *next,
+                           spacing_t *spacing) {
+  const int32_t joined = isConv(layer) && next != NULL && convCanPool(next) && spacing->rolling == spacing->window &&
+                         spacing->rolling * next->kernelRows <= self->stride;
+  step->dilation = spacing->window / spacing->rolling;
+  step->taps = layer->kernelRows;
+  step->rowBytes = layer->inColumns * layer->inChannels;
+  self->receptive += (layer->kernelRows - 1) * spacing->window;
+  if (layer->kind == LAYER_MAX_POOL) {
+    step->period = spacing->rolling * layer->kernelRows <= self->stride ? layer->kernelRows : 1;
+    passPool(self, layer, spacing);
+  } else if (joined) {
+    joinPool(step, layer, next);
+    self->receptive += (next->kernelRows - 1) * spacing->window;
+    passPool(self, next, spacing);
+  }
+  spacing->rolling *= step->period;
+  return joined ? 2 : 1;
+}
+
+// Plans the first dense layer, which reads the rows of the layer before it.
+static void planFirstDense(rollingInt8_t *self, rollingStep_t *step, const layerInt8_t *layer,
+                           const spacing_t *spacing) {
+  step->dilation = spacing->window / spacing->rolling;
+  step->taps = layer->inRows;
+  step->rowBytes = layer->inColumns * layer->inChannels;
+  self->receptive += (layer->inRows - 1) * spacing->window;
+}
+
 int32_t rollingInt8Plan(rollingInt8_t *self, const networkInt8_t *network, int32_t stride) {
-  int32_t apart = 1, period = 1, dense = 0;
+  spacing_t spacing = {1, 1};
+  int32_t dense = 0;
   if (networkInt8Check(network) >= 0 || network->layerCount < 1 || stride < 1 || stride > ROLLING_MAX_STRIDE) {
     return 0;
   }
   memset(self, 0, sizeof(*self));
   self->stride = stride;
   self->receptive = 1;
-  for (int32_t i = 0; i < network->layerCount; i++) {
+  for (int32_t i = 0; i < network->layerCount;) {
     const layerInt8_t *layer = &network->layers[i];
-    const layerInt8_t *pool = i + 1 < network->layerCount ? &network->layers[i + 1] : NULL;
-    if (self->stepCount == ROLLING_MAX_STEPS || (dense && (isConv(layer) || layer->kind == LAYER_MAX_POOL))) {
+    if (self->stepCount == ROLLING_MAX_STEPS || (dense && slides(layer))) {
       return 0;
     }
     rollingStep_t *step = &self->steps[self->stepCount++];
     beginStep(step, layer);
-    if (isConv(layer) || layer->kind == LAYER_MAX_POOL) {
-      step->dilation = apart / period;
-      step->taps = layer->kernelRows;
-      step->rowBytes = layer->inColumns * layer->inChannels;
-      self->receptive += (layer->kernelRows - 1) * apart;
-      if (layer->kind == LAYER_MAX_POOL) {
-        step->period = period * layer->kernelRows <= stride ? layer->kernelRows : 1;
-      } else if (pool && convCanPool(pool) && period == apart && period * pool->kernelRows <= stride) {
-        // Rows of the convolution that only the pool reads: both at once, never stored.
-        step->pool = *pool;
-        step->pool.inRows = pool->kernelRows;
-        step->pool.outRows = 1;
-        step->layer.outRows = pool->kernelRows;
-        step->layer.inRows = layer->kernelRows + pool->kernelRows - 1;
-        step->taps = step->layer.inRows;
-        step->period = pool->kernelRows;
-        self->receptive += (pool->kernelRows - 1) * apart;
-        layer = pool;
-        i++;
-      }
-      if (layer->kind == LAYER_MAX_POOL) {
-        // Rows that the window's pool drops are its newest.
-        self->ahead += layer->inRows % layer->kernelRows * apart;
-        apart *= layer->kernelRows;
-      }
-      period *= step->period;
-    } else if (!dense) {
-      dense = 1;
-      step->dilation = apart / period;
-      step->taps = layer->inRows;
-      step->rowBytes = layer->inColumns * layer->inChannels;
-      self->receptive += (layer->inRows - 1) * apart;
-    } else {
-      step->rowBytes = layer->inRows * layer->inColumns * layer->inChannels;
+    if (slides(layer)) {
+      i += planSliding(self, step, layer, i + 1 < network->layerCount ? layer + 1 : NULL, &spacing);
+      continue;
     }
+    if (dense) {
+      step->rowBytes = layer->inRows * layer->inColumns * layer->inChannels;
+    } else {
+      planFirstDense(self, step, layer, &spacing);
+    }
+    dense = 1;
+    i++;
   }
-  return dense && period == stride;
+  return dense && spacing.rolling == stride;
 }
 
 static int32_t ringBytes(const rollingStep_t *step) {
-  return aligned(2 * step->taps * step->rowBytes) * step->dilation;
+  return alignedBytes(2 * step->taps * step->rowBytes) * step->dilation;
 }
 
 int32_t rollingInt8PlanBytes(const rollingInt8_t *planned) {
-  int32_t bytes = aligned(planned->steps[planned->stepCount - 1].layer.outChannels);
+  int32_t bytes = alignedBytes(planned->steps[planned->stepCount - 1].layer.outChannels);
   for (int32_t i = 0; i < planned->stepCount; i++) {
     bytes += ringBytes(&planned->steps[i]);
   }
@@ -124,7 +152,7 @@ void rollingInt8Reset(rollingInt8_t *self) {
 // Where the next input row goes; it is copied `taps` rows further on when it is complete, so that
 // the newest taps rows of its phase always lie one after the other.
 static int8_t *nextRow(const rollingStep_t *step) {
-  return step->ring + step->phase * aligned(2 * step->taps * step->rowBytes) + step->place * step->rowBytes;
+  return step->ring + step->phase * alignedBytes(2 * step->taps * step->rowBytes) + step->place * step->rowBytes;
 }
 
 // The row at nextRow is complete. Returns the oldest of the newest taps rows of its phase.

@@ -1,8 +1,13 @@
-// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
-//   (extensions.h), same bits.
-// Threads: no globals: different objects may be used at once; one object by one thread at a time.
-// Memory: rollingInt8_t, 1.5 kB, and rollingInt8ArenaBytes of the caller's.
-// Cost: 40 k multiplications a sample for the paper's network at stride 1, 11 k at stride 4.
+/**
+ * @file rolling_int8.h
+ * The network of windows, a sample at a time: each step computes only what the new sample changes.
+ *
+ * Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+ *   (extensions.h), same bits.
+ * Threads: no globals: different objects may be used at once; one object by one thread at a time.
+ * Memory: rollingInt8_t, 1.5 kB, and rollingInt8ArenaBytes of the caller's.
+ * Cost: 40 k multiplications a sample for the paper's network at stride 1, 11 k at stride 4.
+ */
 #pragma once
 
 #include "network_int8.h"
@@ -13,30 +18,32 @@ extern "C" {
 
 enum { ROLLING_MAX_STEPS = 8, ROLLING_MAX_STRIDE = 16 };
 
-// One step of a rolling network: a layer, or a convolution with its pool, that makes one
-// row out of the newest `taps` rows of its input which lie `dilation` rows apart.
+/**
+ * One step of a rolling network: a layer, or a convolution with its pool, that makes one
+ * row out of the newest `taps` rows of its input which lie `dilation` rows apart.
+ */
 typedef struct {
-  layerInt8_t layer;  // as in the windowed network, for one row of output
-  layerInt8_t pool;   // kind LAYER_MAX_POOL where one is done on the way
-  int8_t *ring;       // rows of input: for each of `dilation` phases 2 * taps rows, each row kept twice
+  layerInt8_t layer;  ///< as in the windowed network, for one row of output
+  layerInt8_t pool;   ///< kind LAYER_MAX_POOL where one is done on the way
+  int8_t *ring;       ///< rows of input: for each of `dilation` phases 2 * taps rows, each row kept twice
   int32_t taps;
   int32_t dilation;
-  int32_t rowBytes;  // of the input
-  int32_t period;    // input rows to one row of output
-  int32_t phase;     // dilation phase of the next input row
-  int32_t place;     // its row within the phase, below taps
-  int32_t wait;      // input rows until the next row of output
+  int32_t rowBytes;  ///< of the input
+  int32_t period;    ///< input rows to one row of output
+  int32_t phase;     ///< dilation phase of the next input row
+  int32_t place;     ///< its row within the phase, below taps
+  int32_t wait;      ///< input rows until the next row of output
 } rollingStep_t;
 
-// A windowed network that rolls over a stream. The caller owns it and the arena behind it.
+/** A windowed network that rolls over a stream. The caller owns it and the arena behind it. */
 typedef struct {
   rollingStep_t steps[ROLLING_MAX_STEPS];
-  int8_t *output;  // of the last step
+  int8_t *output;  ///< of the last step
   int32_t stepCount;
-  int32_t stride;     // samples to one output
-  int32_t ahead;      // samples by which an output is earlier than its window's end
-  int32_t receptive;  // samples that an output depends on
-  int32_t seen;       // samples since the reset, at most receptive
+  int32_t stride;     ///< samples to one output
+  int32_t ahead;      ///< samples by which an output is earlier than its window's end
+  int32_t receptive;  ///< samples that an output depends on
+  int32_t seen;       ///< samples since the reset, at most receptive
 } rollingInt8_t;
 
 /**

@@ -1,8 +1,13 @@
-// Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
-//   (extensions.h), same bits.
-// Threads: each core of a team writes its own outputs and nothing else.
-// Memory: none.
-// Cost: 4 multiplications a block.
+/**
+ * @file sparse_dense_int8.h
+ * Fully connected layer whose weights are blocks of four.
+ *
+ * Target: C11, any processor, no FPU; GAP8's XPULP and a Cortex-M4's SIMD where the compiler has them
+ *   (extensions.h), same bits.
+ * Threads: each core of a team writes its own outputs and nothing else.
+ * Memory: none.
+ * Cost: 4 multiplications a block.
+ */
 #pragma once
 
 #include "job_int8.h"

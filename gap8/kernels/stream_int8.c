@@ -6,15 +6,13 @@
 #include "dense_int8.h"
 #include "sparse_dense_int8.h"
 
-static int32_t aligned(int32_t bytes) { return (bytes + 3) & ~3; }
-
 static int32_t ringRows(const streamConv_t *conv) { return (conv->layer.inRows - 1) * conv->dilation + 1; }
 
-static int32_t patchBytes(const layerInt8_t *layer) { return aligned(layer->inRows * layer->inChannels); }
+static int32_t patchBytes(const layerInt8_t *layer) { return alignedBytes(layer->inRows * layer->inChannels); }
 
 // The widest of what the patch holds: the taps of a conv, then the head's output.
 static int32_t widestPatch(const streamInt8_t *network) {
-  int32_t widest = aligned(network->head->outChannels);
+  int32_t widest = alignedBytes(network->head->outChannels);
   for (int32_t i = 0; i < network->convCount; i++) {
     const int32_t bytes = patchBytes(&network->convs[i].layer);
     widest = bytes > widest ? bytes : widest;
@@ -29,14 +27,14 @@ static int32_t skipBytes(const streamInt8_t *network) {
     const int32_t channels = network->convs[i].layer.outChannels;
     widest = channels > widest ? channels : widest;
   }
-  return aligned(widest);
+  return alignedBytes(widest);
 }
 
 int32_t streamInt8ArenaBytes(const streamInt8_t *network) {
   int32_t bytes = widestPatch(network) + skipBytes(network);
   for (int32_t i = 0; i < network->convCount; i++) {
     const streamConv_t *conv = &network->convs[i];
-    bytes += aligned(ringRows(conv) * conv->layer.inChannels);
+    bytes += alignedBytes(ringRows(conv) * conv->layer.inChannels);
   }
   return bytes;
 }
@@ -77,7 +75,7 @@ void streamInt8Reset(const streamInt8_t *network, streamState_t *state, int8_t *
     const int32_t bytes = ringRows(conv) * conv->layer.inChannels;
     state->rings[i] = place;
     memset(place, conv->zeroPoint, (size_t)bytes);
-    place += aligned(bytes);
+    place += alignedBytes(bytes);
   }
 }
 

@@ -1,11 +1,14 @@
-// The few instructions of GAP8's XPULP extension that the kernels use, under names of their own.
-//
-// On the chip (AIRTOUCH_PULP_BUILTINS) they are its compiler's builtins, one instruction each. With
-// `__riscv_xcvsimd` they are CORE-V's instructions, which are XPULP's under another
-// encoding: upstream compilers have those, so that the path can be compiled, run and
-// counted on a desktop. With AIRTOUCH_XPULP_EMULATION they are plain C, for every little-endian machine.
-// Elsewhere AIRTOUCH_XPULP is 0 and the kernels multiply byte by byte. All give the same bits.
-// A vector of four int8 is one int32 here, the first in its lowest byte.
+/**
+ * @file xpulp.h
+ * The few instructions of GAP8's XPULP extension that the kernels use, under names of their own.
+ *
+ * On the chip (AIRTOUCH_PULP_BUILTINS) they are its compiler's builtins, one instruction each. With
+ * `__riscv_xcvsimd` they are CORE-V's instructions, which are XPULP's under another
+ * encoding: upstream compilers have those, so that the path can be compiled, run and
+ * counted on a desktop. With AIRTOUCH_XPULP_EMULATION they are plain C, for every little-endian machine.
+ * Elsewhere AIRTOUCH_XPULP is 0 and the kernels multiply byte by byte. All give the same bits.
+ * A vector of four int8 is one int32 here, the first in its lowest byte.
+ */
 #pragma once
 
 #include <stdint.h>
@@ -17,30 +20,30 @@
 
 typedef signed char xpulpVector_t __attribute__((vector_size(4)));
 
-// Four bytes of memory: one load, a second one where they straddle two words.
+/** Four bytes of memory: one load, a second one where they straddle two words. */
 static inline int32_t xpulpLoad4(const int8_t *p) { return *(const int32_t __attribute__((may_alias)) *)p; }
 
 static inline void xpulpStore4(int8_t *p, int32_t four) { *(int32_t __attribute__((may_alias)) *)p = four; }
 
-// sum + a[0] b[0] + a[1] b[1] + a[2] b[2] + a[3] b[3]
+/** sum + a[0] b[0] + a[1] b[1] + a[2] b[2] + a[3] b[3] */
 static inline int32_t xpulpDot4(int32_t a, int32_t b, int32_t sum) {
   return __builtin_pulp_sdotsp4((xpulpVector_t)a, (xpulpVector_t)b, sum);
 }
 
-// The larger of each pair of bytes.
+/** The larger of each pair of bytes. */
 static inline int32_t xpulpMax4(int32_t a, int32_t b) {
   return (int32_t)__builtin_pulp_max4((xpulpVector_t)a, (xpulpVector_t)b);
 }
 
-// Four bytes, the first one lowest.
+/** Four bytes, the first one lowest. */
 static inline int32_t xpulpPack4(int8_t a, int8_t b, int8_t c, int8_t d) {
   return (int32_t)__builtin_pulp_pack4(a, b, c, d);
 }
 
-// (a + 1) >> 1; the sum must fit in int32.
+/** (a + 1) >> 1; the sum must fit in int32. */
 static inline int32_t xpulpHalve(int32_t a) { return __builtin_pulp_addRN(a, 0, 1, 1); }
 
-// (a + b + 2^(shift - 1)) >> shift for shift 1 to 31; the sum must fit in int32.
+/** (a + b + 2^(shift - 1)) >> shift for shift 1 to 31; the sum must fit in int32. */
 static inline int32_t xpulpAddRoundShift(int32_t a, int32_t b, int32_t shift) {
   return __builtin_pulp_addRN_r(a, b, shift);
 }

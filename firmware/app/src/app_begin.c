@@ -7,7 +7,6 @@
 #include "app_edges.h"
 #include "app_log.h"
 #include "app_paper.h"
-#include "stream_window.h"
 
 static uint8_t detectorInForce(const appCore_t *core) {
   if (!core->networksFit) {
@@ -47,7 +46,8 @@ static void beginLink(appCore_t *core) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
   const appPaper_t *paper = appPaperOf(core->detector);
   edgeLinkDigest(paper ? paper->sha256 : AIRTOUCH_STREAM_SHA256, digest);
-  const uint16_t refill = paper ? paper->refill : (uint16_t)(streamWindow(&airtouchStream) + airtouchStream.stride - 1);
+  const uint16_t refill =
+      paper ? paper->refill : (uint16_t)(streamInt8Window(&airtouchStream) + airtouchStream.stride - 1);
   const uint8_t session = (uint8_t)(core->link.session == 255 ? 1 : core->link.session + 1);
   const linkCounters_t counters = core->link.counters;
   linkSenderInit(&core->link, paper ? paper->algorithm : EDGE_LINK_BEST, digest, refill, core->nonce, session);

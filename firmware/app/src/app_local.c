@@ -2,8 +2,6 @@
 
 #include <string.h>
 
-#include "stream_window.h"
-
 void appLocalBegin(appLocal_t *local, const linkSender_t *link, streamDetector_t *best, int8_t *arena) {
   if (link->state == LINK_UP && link->silent < APP_LOCAL_AFTER) {
     local->missing = 0;
@@ -33,7 +31,7 @@ bool appLocalStep(appLocal_t *local, const linkSender_t *link, streamDetector_t 
   const int8_t *output = streamInt8Step(best->network, &best->state, sample);
   answer->sequence = local->next++;
   local->filled += local->filled < UINT32_MAX ? 1 : 0;
-  if (output != NULL && local->filled >= streamWindow(best->network)) {
+  if (output != NULL && local->filled >= streamInt8Window(best->network)) {
     memcpy(answer->output, output, EDGE_LINK_OUTPUTS);
     *answered = true;
   }

@@ -4,7 +4,6 @@
 #include <string.h>
 
 #include "feature_window.h"
-#include "stream_window.h"
 
 _Static_assert(AIRTOUCH_MODEL_COLUMNS * sizeof(float) == EDGE_LINK_SAMPLE_BYTES, "a sample is a row of features");
 _Static_assert(AIRTOUCH_ROLLING_COLUMNS * sizeof(float) == EDGE_LINK_SAMPLE_BYTES, "a sample is a row of features");
@@ -182,7 +181,7 @@ int32_t gap8CoreInit(gap8Core_t *core, const gap8Models_t *models, const gap8Tea
     addNetwork(core, &count, AIRTOUCH_STREAM_SHA256,
                (linkNetwork_t){.reset = resetBest,
                                .step = stepBest,
-                               .window = streamWindow(models->best),
+                               .window = streamInt8Window(models->best),
                                .stride = (uint16_t)models->best->stride,
                                .algorithm = EDGE_LINK_BEST});
   }

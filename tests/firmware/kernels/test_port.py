@@ -38,7 +38,7 @@ def test_the_page_lists_every_kernel_once_or_more():
     listed = {source for sources in LISTS.values() for source in sources}
     there = {str(path.relative_to(ROOT)) for tree in TREES for path in (ROOT / tree).glob("*.c")}
     assert len(LISTS) == 4
-    assert there - listed == {"gap8/kernels/network_float.c"}, "for tests, not for a drone"
+    assert there <= listed
     assert listed - there == {"gap8/model/airtouch_stream.c"}
 
 

@@ -10,7 +10,7 @@
 #include "gap8_core.h"
 #include "link_pipe.h"
 #include "link_sender.h"
-#include "stream_window.h"
+#include "stream_int8.h"
 
 #define MAX_STEPS 1400
 #define CLEAN_STEPS 320  // before the faults, so that answers come
@@ -166,7 +166,7 @@ static void runScript(const uint8_t *data, size_t length, int *slowest) {
     uint8_t algorithm;
   } detectors[] =
       {
-          {&best, AIRTOUCH_STREAM_SHA256, streamWindow(&airtouchStream), (uint16_t)airtouchStream.stride,
+          {&best, AIRTOUCH_STREAM_SHA256, streamInt8Window(&airtouchStream), (uint16_t)airtouchStream.stride,
            EDGE_LINK_BEST},
           {&paper, AIRTOUCH_MODEL_SHA256, AIRTOUCH_MODEL_ROWS, 1, EDGE_LINK_PAPER},
           {&paperStream, AIRTOUCH_ROLLING_SHA256, AIRTOUCH_ROLLING_ROWS, AIRTOUCH_ROLLING_STRIDE,

@@ -6,7 +6,7 @@
 #include "airtouch_rolling.h"
 #include "forge.h"
 #include "packet_table.h"
-#include "stream_window.h"
+#include "stream_int8.h"
 #include "toy_network.h"
 
 // Steps of an input before the quiet flight, at most: few in most, and a window of samples and more in an eighth.
@@ -26,7 +26,7 @@ static uint32_t seed, steps;
 
 static void makeGap8(void) {
   uint8_t digest[EDGE_LINK_DIGEST_BYTES];
-  toys[0] = toyMake(streamWindow(&airtouchStream), (uint16_t)airtouchStream.stride);
+  toys[0] = toyMake(streamInt8Window(&airtouchStream), (uint16_t)airtouchStream.stride);
   toys[1] = toyMake(AIRTOUCH_MODEL_ROWS, 1);
   edgeLinkDigest(AIRTOUCH_STREAM_SHA256, digest);
   networks[0] = toyAsNetwork(&toys[0], EDGE_LINK_BEST, digest);

@@ -5,7 +5,7 @@
 #include "forge.h"
 #include "gap8_core.h"
 #include "packet_table.h"
-#include "stream_window.h"
+#include "stream_int8.h"
 
 // Samples of an input, at most: each costs a whole network, and most inputs need no full window.
 #define FEW_SAMPLES 30
@@ -37,7 +37,7 @@ static void sampleOf(uint32_t sequence, uint8_t sample[EDGE_LINK_SAMPLE_BYTES]) 
 
 static void bestSays(uint32_t sequence, int8_t *output) {
   static _Alignas(4) int8_t arena[AIRTOUCH_STREAM_ARENA_BYTES];
-  const uint32_t window = streamWindow(&airtouchStream);
+  const uint32_t window = streamInt8Window(&airtouchStream);
   streamState_t state;
   streamInt8Reset(&airtouchStream, &state, arena);
   for (uint32_t i = 0; i < window; i++) {

@@ -8,7 +8,7 @@
 
 #include "gap8_core.h"
 #include "promise.h"
-#include "stream_window.h"
+#include "stream_int8.h"
 
 #define STEPS 300  // of a session without faults: longer than any window
 

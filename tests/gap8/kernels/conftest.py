@@ -50,7 +50,7 @@ def compiler() -> Compiler:
 def xpulp_library(compiler: Compiler, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The kernels' XPULP path, its builtins emulated, behind the same calls as the package's library."""
     sources = [*sorted(KERNELS.glob("*.c")), *(BATCH / f"{n}_batch.c" for n in ("network", "rolling", "stream")),
-               FIRMWARE / "feature_window.c"]
+               BATCH / "network_float.c", FIRMWARE / "feature_window.c"]
     return compiler(sources, tmp_path_factory.mktemp("xpulp") / "kernels.so", "-shared", "-fPIC", EMULATION)
 
 

@@ -1,10 +1,13 @@
-// The same network in float: what the int8 one is checked against. Not for the drone.
-//
-// Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
-//   desktop's bits.
-// Threads: pure functions without state: any number at once.
-// Memory: networkFloatArenaSize floats of the caller's.
-// Cost: one multiplication a weight and position, in float: for tests, not for the drone.
+/**
+ * @file network_float.h
+ * The same network in float: what the int8 one is checked against. Not for the drone.
+ *
+ * Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
+ *   desktop's bits.
+ * Threads: pure functions without state: any number at once.
+ * Memory: networkFloatArenaSize floats of the caller's.
+ * Cost: one multiplication a weight and position, in float: for tests, not for the drone.
+ */
 #pragma once
 
 #include "layer_int8.h"
@@ -14,7 +17,7 @@ extern "C" {
 #endif
 
 typedef struct {
-  int32_t kind;  // LAYER_CONV, LAYER_MAX_POOL or LAYER_DENSE; shapes as in layerInt8_t
+  int32_t kind;  ///< LAYER_CONV, LAYER_MAX_POOL or LAYER_DENSE; shapes as in layerInt8_t
   int32_t inRows;
   int32_t inColumns;
   int32_t inChannels;
@@ -23,9 +26,9 @@ typedef struct {
   int32_t outChannels;
   int32_t kernelRows;
   int32_t kernelColumns;
-  int32_t relu;          // whether negative outputs become 0
-  const float *weights;  // laid out as in layerInt8_t
-  const float *bias;     // [out]
+  int32_t relu;          ///< whether negative outputs become 0
+  const float *weights;  ///< laid out as in layerInt8_t
+  const float *bias;     ///< [out]
 } layerFloat_t;
 
 typedef struct {
