@@ -1,13 +1,13 @@
 # AirTouch. `make demo` and `make test` do all the set-up they need.
 PYTHON ?= python3
 BIN := .venv/bin
-SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/src/*.[ch] \
-  gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] host/airtouch/kernels/batch/*.[ch])
+SOURCES := $(wildcard firmware/kernels/*.[ch] firmware/link/*.[ch] firmware/app/core/*.[ch] \
+  firmware/app/src/*.[ch] gap8/kernels/*.[ch] gap8/app/src/*.[ch] gap8/model/*.[ch] \
+  host/airtouch/kernels/batch/*.[ch])
 #: C that needs neither the firmware's headers nor the GAP8's SDK
-FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c gap8/kernels/*.c) gap8/app/src/gap8_core.c \
-  $(addprefix firmware/app/src/,app_begin.c app_core.c app_edges.c app_gap8.c app_level.c app_local.c app_log.c \
-  app_paper.c app_params.c floor_height.c)
-FLIES_INCLUDES = -Ifirmware/kernels -Ifirmware/link -Ifirmware/app/src -Igap8/kernels -Igap8/model -Igap8/app/src
+FLIES = $(wildcard firmware/kernels/*.c firmware/link/*.c firmware/app/core/*.c gap8/kernels/*.c) \
+  gap8/app/src/gap8_core.c
+FLIES_INCLUDES = -Ifirmware/kernels -Ifirmware/link -Ifirmware/app/core -Igap8/kernels -Igap8/model -Igap8/app/src
 
 .PHONY: help setup demo test lint tidy docs fuzz fuzz-logs mutate repeat bench firmware emulate gap8 flash clean
 

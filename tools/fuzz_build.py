@@ -18,7 +18,7 @@ BUILD = ROOT / "build" / "fuzz"
 SANITIZERS = "address,undefined,float-cast-overflow,float-divide-by-zero"
 FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-fno-sanitize-recover=all"]
 INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link",
-            "firmware/app/src", "gap8/kernels", "gap8/model", "gap8/app/src"]
+            "firmware/app/core", "gap8/kernels", "gap8/model", "gap8/app/src"]
 XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
 #: A target's own flags, for its harness and the sources below gap8/, and whose source it is.
 VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}

@@ -9,4 +9,5 @@ ROOT = Path(__file__).parents[2]
 
 def make(*arguments):
     environment = {k: v for k, v in os.environ.items() if k not in ("CRAZYFLIE_BASE", "PLATFORM", "VEHICLE", "CONFIG")}
-    return subprocess.run(["make", "-C", ROOT, *map(str, arguments)], capture_output=True, text=True, env=environment)
+    # In the folder, not with -C: `make -C` adds a last line of its own.
+    return subprocess.run(["make", *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, env=environment)

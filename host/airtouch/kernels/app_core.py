@@ -35,7 +35,7 @@ MOST = {"uint8_t": 255, "uint16_t": 65_535}  #: of the integer parameters
 
 
 class AppCore:
-    """The STM32 app's core (firmware/app/src/app_core.h)."""
+    """The STM32 app's core (firmware/app/core/app_core.h)."""
 
     def __init__(self, params: dict[str, float] | None = None, have_gap8: bool = False, nonce: int = 1,
                  vehicle: Vehicle | None = None) -> None:

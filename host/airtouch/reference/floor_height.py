@@ -1,7 +1,7 @@
 """Height over a platform: what the estimator gets of the down range, and by how much optical flow is scaled.
 
 The firmware takes a shorter down range for lost height. `FloorHeight` tells a step of the floor from a climb: what a
-reading changed by beyond the vertical velocity is the floor's. See firmware/app/src/floor_height.h, which flies.
+reading changed by beyond the vertical velocity is the floor's. See firmware/app/core/floor_height.h, which flies.
 """
 
 import math

@@ -8,11 +8,11 @@ import pytest
 from airtouch.crazyflie.connection import app_log, blocks
 from airtouch.kernels.app_core import HEALTH
 
-APP = Path(__file__).parents[3] / "firmware" / "app" / "src"
+APP = Path(__file__).parents[3] / "firmware" / "app"
 
 
 def test_names_and_types_are_those_of_the_log_group():
-    source = (APP / "airtouch_app.c").read_text()
+    source = (APP / "src" / "airtouch_app.c").read_text()
     assert f"LOG_GROUP_START({app_log.GROUP})" in source
     logged = set(re.findall(r"LOG_ADD(?:_BY_FUNCTION)?\(LOG_\w+, (\w+),", source))
     assert {name.split(".")[1] for name in app_log.WANTED.names} <= logged
@@ -21,7 +21,7 @@ def test_names_and_types_are_those_of_the_log_group():
 
 def test_health_flags_are_those_of_the_header():
     flags = re.findall(r"APP_\w+ =\s+(\d+),\s*///<", re.search(r"0 is good\. \*/\ntypedef enum \{(.*?)\}",
-                                                            (APP / "app_core.h").read_text(), re.DOTALL)[1])
+                                                            (APP / "core" / "app_core.h").read_text(), re.DOTALL)[1])
     assert sorted(app_log.HEALTH) == sorted(HEALTH.values()) == sorted(int(flag) for flag in flags)
 
 

@@ -29,17 +29,17 @@ from tools.emulator.cores import CORTEX_M4
 from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 
-APP = ROOT / "firmware" / "app" / "src"
+CORE, APP = ROOT / "firmware" / "app" / "core", ROOT / "firmware" / "app" / "src"
 GLUE = (APP / "airtouch_app.c").read_text()
 KERNELS = ("band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
            "fr_cfar", "motion_channels", "stream_detector")
-CORE = ("begin", "core", "edges", "gap8", "level", "local", "log", "paper", "params")
-SOURCES = [*(APP / f"app_{name}.c" for name in CORE),
+SOURCES = [*sorted(CORE.glob("app_*.c")),
            *(ROOT / "firmware" / "link" / f"{name}.c" for name in ("edge_link", "link_sender")),
            *(ROOT / "firmware" / "kernels" / f"{name}.c" for name in KERNELS),
            *(ROOT / "gap8" / "kernels" / f"{name}.c" for name in ("dense_int8", "sparse_dense_int8", "stream_int8")),
            *(ROOT / "gap8" / "model" / f"airtouch_{name}.c" for name in ("stream",))]
-INCLUDES = [APP, *(ROOT / folder for folder in ("firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model"))]
+INCLUDES = [APP, CORE, *(ROOT / folder for folder in (
+    "firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model"))]
 RAM_BUDGET = 20_480  # bytes of appCore_t
 STACK_BUDGET = 1_000  # bytes below appMain's own
 #: instructions of a step on average, link included: 16800 are 1 % of the 168 MHz core at 100 Hz

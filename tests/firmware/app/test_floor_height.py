@@ -11,7 +11,7 @@ import pytest
 
 from airtouch.reference.floor_height import FloorHeight
 
-SOURCE = Path(__file__).parents[3] / "firmware/app/src/floor_height.c"
+SOURCE = Path(__file__).parents[3] / "firmware/app/core/floor_height.c"
 MS = 25
 TOP = 0.72
 

@@ -18,9 +18,9 @@ from patience import HANG_S
 
 ROOT, HERE = Path(__file__).parents[3], Path(__file__).parent
 APP, HOST = ROOT / "firmware" / "app" / "src", ROOT / "host" / "airtouch" / "kernels" / "batch"
-INCLUDES = [APP, HERE / "crazyflie", *(ROOT / folder for folder in (
+INCLUDES = [APP, APP.parent / "core", HERE / "crazyflie", *(ROOT / folder for folder in (
     "firmware/link", "firmware/kernels", "gap8/kernels", "gap8/model", "gap8/app/src"))]
-CORE = [*sorted(set(APP.glob("app_*.c")) - {APP / "app_sensors.c"}),
+CORE = [*sorted((APP.parent / "core").glob("app_*.c")),
         *sorted((ROOT / "firmware/kernels").glob("*.c")), *sorted((ROOT / "firmware/link").glob("*.c")),
         *sorted((ROOT / "gap8/kernels").glob("*.c")), *sorted((ROOT / "gap8/model").glob("*.c"))]
 #: configuration -> what the compiler is told, sources beside the core's

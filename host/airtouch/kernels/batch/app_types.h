@@ -1,1 +1,1 @@
-../../../../firmware/app/src/app_types.h
+../../../../firmware/app/core/app_types.h
