@@ -10,10 +10,10 @@
 #define HALF_PI 1.57079632679489662f
 #define MAX_WINDOW 16384
 #define RECENT_SAMPLES 16u  // in which the latest sums are kept apart
-#define USUAL_BINS 7        // those of 6 to 8 Hz in 2 s: the loops over them unroll
+#define COMMON_BINS 7       // those of 6 to 8 Hz in 2 s: the loops over them unroll
 
-// Inlined whatever the compiler thinks of it, so that USUAL_BINS is a constant there. With -DAIRTOUCH_PLAIN_C it is C11
-// alone, as gap8/kernels/extensions.h: the same bits, only slower.
+// Inlined whatever the compiler thinks of it, so that COMMON_BINS is a constant there. With -DAIRTOUCH_PLAIN_C it is
+// C11 alone, as gap8/kernels/extensions.h: the same bits, only slower.
 #if defined(__GNUC__) && !defined(AIRTOUCH_PLAIN_C)
 #define INLINED static inline __attribute__((always_inline))
 #define UNROLLED _Pragma("GCC unroll 7")
@@ -235,9 +235,9 @@ INLINED void findPowers(const bandPower_t *self, float *power, uint16_t bins) {
 }
 
 bool bandPowerStep(bandPower_t *self, const float *sample, float *power) {
-  const bool usual = self->bins == USUAL_BINS;
-  if (usual) {
-    takeSample(self, sample, USUAL_BINS);
+  const bool fixedBins = self->bins == COMMON_BINS;
+  if (fixedBins) {
+    takeSample(self, sample, COMMON_BINS);
   } else {
     takeSample(self, sample, self->bins);
   }
@@ -250,8 +250,8 @@ bool bandPowerStep(bandPower_t *self, const float *sample, float *power) {
     return false;
   }
   self->wait = (uint16_t)(self->hop - 1);
-  if (usual) {
-    findPowers(self, power, USUAL_BINS);
+  if (fixedBins) {
+    findPowers(self, power, COMMON_BINS);
   } else {
     findPowers(self, power, self->bins);
   }

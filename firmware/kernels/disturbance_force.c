@@ -4,6 +4,7 @@
 
 #include "sample_guard.h"
 
+// Of thrust: half and twice the nominal voltage. A battery beyond that is a fault of the sensor.
 #define LEAST_FACTOR 0.25f
 #define MOST_FACTOR 4.0f
 

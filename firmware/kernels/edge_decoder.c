@@ -2,8 +2,10 @@
 
 #include "sample_guard.h"
 
-#define LOGIT_LIMIT 8.0f       // logits are clamped to this magnitude
-#define SLOW_AT_START (-3.0f)  // the smoothed logit before anything is known: off a platform
+// A magnitude: probabilities of 0.0003 and 0.9997. One wild logit moves the smoothed one no further than that.
+#define LOGIT_LIMIT 8.0f
+// The smoothed logit before anything is known: over a platform with a probability of 0.05.
+#define SLOW_AT_START (-3.0f)
 #define LONG_AGO 0x3fffffffu
 
 static void forget(edgeDecoder_t *decoder) {

@@ -10,15 +10,16 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define FLOOR_STEP_M 0.06f       ///< least jump of a reading that is the floor's; slower is a ramp, which is followed
-#define FLOOR_TILT_SHARE 0.5f    ///< of the range times (1 - cosine of the tilt), by which that grows
-#define FLOOR_TILT_COSINE 0.87f  ///< tilted more than 30 degrees no step is learnt
-#define FLOOR_GAP_MS 150u        ///< after a longer gap a reading is compared with the height instead
-#define FLOOR_TRUST_M 0.15f      ///< and the floor kept where it explains it so closely
-#define FLOOR_HOME_M 0.08f       ///< the first floor again; what is left of the sum of steps fades
-#define FLOOR_FADE_MPS 0.05f
-#define FLOOR_MOST_M 2.5f           ///< beyond it nothing is believed
-#define FLOOR_FLOW_NEAREST_M 0.08f  ///< the flow sensor's picture scales no further
+// Chosen in the virtual drone, never flown; host/docs/height.md has what each choice costs.
+#define FLOOR_STEP_M 0.06f          ///< least step of the floor: a climb of 1 m/s makes 0.025 m between two readings
+#define FLOOR_TILT_SHARE 0.5f       ///< of the range times (1 - cosine of the tilt), by which that grows
+#define FLOOR_TILT_COSINE 0.87f     ///< of 30 degrees: with more tilt no step is learnt
+#define FLOOR_GAP_MS 150u           ///< six readings; after a longer gap a reading is compared with the height instead
+#define FLOOR_TRUST_M 0.15f         ///< the floor is kept after a gap where the height agrees with it so closely
+#define FLOOR_HOME_M 0.08f          ///< a smaller sum of steps is the first floor; the sum then fades
+#define FLOOR_FADE_MPS 0.05f        ///< so fast: the height moves by 1.25 mm a reading
+#define FLOOR_MOST_M 2.5f           ///< no floor is further from the first one: the sum of steps starts again
+#define FLOOR_FLOW_NEAREST_M 0.08f  ///< least range of the flow sensor, PMW3901: its picture does not scale below
 
 /** All zero at the start, and while the drone does not fly. */
 typedef struct {
