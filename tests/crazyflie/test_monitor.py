@@ -77,11 +77,11 @@ def as_sent(log):
 def test_edges_are_felt_where_the_log_feels_them(flight):
     monitor = watch(flight)
     expected = best.run(as_sent(flight)).edges
-    assert [f.kind for f in monitor.board.felt] == [e.kind for e in expected] and len(expected) == 2
-    for felt, edge in zip(monitor.board.felt, expected, strict=True):
-        assert felt.at_s == pytest.approx(edge.sample / 100, abs=0.1)  # roundings move a slow exit
-        at = int(round(100 * (felt.at_s - monitor.board.lag_s)))
-        assert felt.x_m == pytest.approx(flight["x_m"][at], abs=0.06)
+    assert [f.kind for f in monitor.board.edges] == [e.kind for e in expected] and len(expected) == 2
+    for reported, edge in zip(monitor.board.edges, expected, strict=True):
+        assert reported.at_s == pytest.approx(edge.sample / 100, abs=0.1)  # roundings move a slow exit
+        at = int(round(100 * (reported.at_s - monitor.board.lag_s)))
+        assert reported.x_m == pytest.approx(flight["x_m"][at], abs=0.06)
     assert monitor.intake.lost == 0 and monitor.detector.taken == len(flight)
 
 
@@ -89,9 +89,9 @@ def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
     monkeypatch.setattr("airtouch.crazyflie.monitor.time", SimpleNamespace(monotonic=lambda: 5.0))
     whole, holed = watch(flight), watch(flight, loss=0.3)
     assert holed.detector.taken == pytest.approx(len(flight), abs=8)
-    assert [f.kind for f in holed.board.felt] == [f.kind for f in whole.board.felt]
-    for felt, expected in zip(holed.board.felt, whole.board.felt, strict=True):
-        assert felt.at_s == pytest.approx(expected.at_s, abs=0.5)  # a slow entry moves with what is lost
+    assert [f.kind for f in holed.board.edges] == [f.kind for f in whole.board.edges]
+    for reported, expected in zip(holed.board.edges, whole.board.edges, strict=True):
+        assert reported.at_s == pytest.approx(expected.at_s, abs=0.5)  # a slow entry moves with what is lost
     holed.intake.last_arrival_s = 5.0
     holed.refresh(0.004)
     assert holed.board.link.lost == pytest.approx(0.3, abs=0.03)

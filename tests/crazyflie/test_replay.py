@@ -28,14 +28,14 @@ def assert_equal(path, speed):
     (file,) = dataset.collect([path], speed)
     log = evaluate.read_flight(file)
     whole = evaluate.evaluate_flight(file, log, best, best.load(None))
-    detector, board, felt = HostDetector(), Board("f", "best"), []
-    assert replay.run(log, board, detector, stop=threading.Event(), felt=felt.append) == len(log)
+    detector, board, edges = HostDetector(), Board("f", "best"), []
+    assert replay.run(log, board, detector, stop=threading.Event(), on_edge=edges.append) == len(log)
     stepwise = replay.result(file, log, detector)
     np.testing.assert_array_equal(stepwise.trace.probability, whole.trace.probability)
-    assert stepwise.trace.edges == whole.trace.edges and len(felt) == len(board.felt) == len(whole.trace.edges)
-    assert [f.kind for f in felt] == [e.kind for e in whole.trace.edges]
-    np.testing.assert_allclose([f.probability for f in felt], [e.probability for e in whole.trace.edges])
-    np.testing.assert_allclose([f.at_s for f in felt], [e.sample / 100 for e in whole.trace.edges])
+    assert stepwise.trace.edges == whole.trace.edges and len(edges) == len(board.edges) == len(whole.trace.edges)
+    assert [f.kind for f in edges] == [e.kind for e in whole.trace.edges]
+    np.testing.assert_allclose([f.probability for f in edges], [e.probability for e in whole.trace.edges])
+    np.testing.assert_allclose([f.at_s for f in edges], [e.sample / 100 for e in whole.trace.edges])
     assert str(stepwise.score.as_dict()) == str(whole.score.as_dict())
     return whole
 

@@ -143,7 +143,7 @@ def test_the_brushless_drone_alone_is_armed(monkeypatch, name, armed):
 
 def test_reports_belong_to_crossings_of_their_kind_one_to_one():
     crossed = [(5.0, "entry"), (8.0, "exit"), (12.0, "entry")]
-    late = height.felt(crossed, [(6.0, "entry"), (6.5, "entry"), (8.5, "entry"), (12.3, "exit"), (14.6, "entry")])
+    late = height.delays(crossed, [(6.0, "entry"), (6.5, "entry"), (8.5, "entry"), (12.3, "exit"), (14.6, "entry")])
     assert late == pytest.approx([1.0]), "an entry for an exit, a second report and one too late are false"
 
 

@@ -33,7 +33,7 @@ def figures(monkeypatch):
     def bad(job):
         raise AirTouchError("log.csv:7: current is 'x', a number is needed")
 
-    module = types.ModuleType("airtouch.paper_figures.made_up")
+    module = types.ModuleType("airtouch.paper_figures.figures.made_up")
     module.works, module.lacks, module.bad = works, lacks, bad
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(run, "FIGURES", {"fig8d": ("made_up", "works"), "fig8e": ("made_up", "lacks"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.paper_figures import sensing_range
+from airtouch.paper_figures.figures import sensing_range
 
 
 def test_curves_are_the_published_ones():

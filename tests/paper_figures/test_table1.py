@@ -2,9 +2,9 @@
 
 import pytest
 
-from airtouch.paper_figures import table1
 from airtouch.paper_figures.claims import REPRODUCED, UNTESTABLE
 from airtouch.paper_figures.figure import Job
+from airtouch.paper_figures.figures import table1
 
 
 def test_a_log_of_a_meter_is_judged_by_its_total(tmp_path):
@@ -18,5 +18,5 @@ def test_a_log_of_a_meter_is_judged_by_its_total(tmp_path):
     path.write_text("\n".join(lines) + "\n")
     made = table1.power(Job(None, tmp_path, power_log=path))
     assert [r["mw"] for r in made.rows] == pytest.approx([78.0, 2.0, 1.0, 1.0, 8.0], abs=0.05)
-    assert made.verdicts["power"].verdict == REPRODUCED and "90.0 mW" in made.verdicts["power"].found
+    assert made.verdicts["power"].verdict == REPRODUCED and "90.0 mW" in made.verdicts["power"].evidence
     assert table1.power(Job(None, tmp_path)).verdicts["power"].verdict == UNTESTABLE

@@ -8,20 +8,10 @@ from matplotlib.figure import Figure as Canvas
 
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
-from airtouch.paper_figures import (
-    components,
-    conditions,
-    films,
-    materials,
-    overall,
-    recorded,
-    resources,
-    simulated,
-    sizes,
-    vision_figures,
-)
+from airtouch.paper_figures import recorded, simulated
 from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, UNTESTABLE, of
 from airtouch.paper_figures.figure import Job, table_csv
+from airtouch.paper_figures.figures import components, conditions, films, materials, overall, resources, sizes, vision
 
 
 def flights(error_m, missed=0.0, count=20, seed=0, balanced=0.9, **condition):
@@ -73,7 +63,7 @@ def test_overall_errors(job, monkeypatch, paper_m, missed, answer):
 
 def test_errors_by_height(job, monkeypatch):
     near, far = flights(0.03), flights(0.03, missed=0.9)
-    monkeypatch.setattr(simulated, "flown", lambda scene, count: scene)
+    monkeypatch.setattr(simulated, "flights", lambda scene, count: scene)
     monkeypatch.setattr(simulated, "scores", lambda scene, name: near if scene == "paper-4cm" else far)
     monkeypatch.setattr(recorded, "scores", lambda _, name: (flights(0.02, height="low"), folds()))
     figure = conditions.by_height(job)
@@ -98,7 +88,7 @@ def test_errors_by_angle(job, monkeypatch, at_20, left, trend, sides):
                                                        ((0.03, 0.0), (0.09, 0.0), NOT_REPRODUCED),
                                                        ((0.03, 0.0), (0.03, 0.5), NOT_REPRODUCED)])
 def test_wind(job, monkeypatch, calm, windy, answer):
-    monkeypatch.setattr(simulated, "flown", lambda scene, count, blown=(): ["windy" if blown else "calm"] * count)
+    monkeypatch.setattr(simulated, "flights", lambda scene, count, blown=(): ["windy" if blown else "calm"] * count)
     monkeypatch.setattr(simulated, "scores", lambda some, name: flights(*(windy if some[0] == "windy" else calm)))
     assert verdict(conditions.wind(job), "wind") == answer
 
@@ -115,12 +105,12 @@ def test_materials_are_shown_and_never_judged(job, monkeypatch):
 @pytest.mark.parametrize(("without", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
                                                                   (0.10, 3, NOT_REPRODUCED, NOT_REPRODUCED)])
 def test_the_loss(job, monkeypatch, without, epochs, loss, sooner):
-    def varied(_, name, *__):
+    def variant_scores(_, name, *__):
         bare = "no-df" in name
         return flights(without if bare else 0.10), folds(converged_after_epochs=epochs if bare else 3)
 
     monkeypatch.setattr(recorded, "files", lambda _: [])
-    monkeypatch.setattr(recorded, "varied", varied)
+    monkeypatch.setattr(recorded, "variant_scores", variant_scores)
     figure = components.df_loss(job)
     assert (verdict(figure, "df-loss"), verdict(figure, "df-epochs")) == (loss, sooner)
 
@@ -128,11 +118,11 @@ def test_the_loss(job, monkeypatch, without, epochs, loss, sooner):
 def test_a_quick_run_does_not_judge_what_it_trains_too_briefly_for(tmp_path, monkeypatch):
     quick = Job(tmp_path, tmp_path / "work", quick=True)
     monkeypatch.setattr(recorded, "files", lambda _: [])
-    monkeypatch.setattr(recorded, "varied", lambda *_: (flights(0.1), folds()))
-    seen(monkeypatch, lambda way, lux: 0.012, 0.033)
+    monkeypatch.setattr(recorded, "variant_scores", lambda *_: (flights(0.1), folds()))
+    crossings(monkeypatch, lambda way, lux: 0.012, 0.033)
     assert verdict(components.df_loss(quick), "df-epochs") == UNTESTABLE
-    monkeypatch.setattr(recorded, "varied", None)
-    assert verdict(vision_figures.network_size(quick), "network-airtouch") == UNTESTABLE
+    monkeypatch.setattr(recorded, "variant_scores", None)
+    assert verdict(vision.network_size(quick), "network-airtouch") == UNTESTABLE
 
 
 def test_a_caption_names_the_flights_that_are_missing(tmp_path):
@@ -157,7 +147,7 @@ def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
                          [(0.05, REPRODUCED), (0.10, NOT_REPRODUCED), (0.2, NOT_REPRODUCED)])
 def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
     monkeypatch.setattr(recorded, "files", lambda _: [])
-    monkeypatch.setattr(recorded, "varied", lambda _, name, *__: (
+    monkeypatch.setattr(recorded, "variant_scores", lambda _, name, *__: (
         flights(shortest if name == "stft-50" else 0.10, missed=0.5 if name in ("input-50", "input-250") else 0.2),
                                                                   folds()))
     assert verdict(components.time_resolution(job), "resolution") == resolution
@@ -166,7 +156,7 @@ def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
 
 @pytest.mark.parametrize(("exact", "int8", "answer"), [(0.97, 0.86, REPRODUCED), (0.71, 0.70, NOT_REPRODUCED)])
 def test_sizes(job, monkeypatch, exact, int8, answer):
-    monkeypatch.setattr(recorded, "varied", lambda *_: (flights(0.05, balanced=int8), folds()))
+    monkeypatch.setattr(recorded, "variant_scores", lambda *_: (flights(0.05, balanced=int8), folds()))
     monkeypatch.setattr(recorded, "in_float", lambda *_: flights(0.05, balanced=exact))
     figure = sizes.sizes(job)
     assert verdict(figure, "accuracy") == answer and verdict(figure, "speed") == UNTESTABLE
@@ -182,7 +172,7 @@ def test_resources(job, monkeypatch):
     assert verdict(figure, "memory") == REPRODUCED and verdict(figure, "training") == REPRODUCED
 
 
-def seen(monkeypatch, camera_m, felt_m):
+def crossings(monkeypatch, camera_m, airtouch_m):
     """The camera and AirTouch with errors of 0.01 s a 3 mm, at every light, instead of what is rendered."""
     rng = np.random.default_rng(3)
     edges = (SimpleNamespace(sample=300, kind="entry"), SimpleNamespace(sample=600, kind="exit"))
@@ -195,11 +185,11 @@ def seen(monkeypatch, camera_m, felt_m):
         return [[Detection(e.sample + round(rng.choice([-1, 1]) * error_m / 0.003), "edge") for e in edges]
                 for _ in shots]
 
-    ways = ("classical", "fusion", *vision_figures.weights.SIZES)
+    ways = ("classical", "fusion", *vision.weights.SIZES)
     there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in films.LUX}
-    monkeypatch.setattr(vision_figures, "everything",
-                        lambda _: (shots, there, {n: crossed(felt_m) for n in ("best", "paper")}))
-    monkeypatch.setattr(vision_figures, "film_scores", lambda shots, found: [
+    monkeypatch.setattr(vision, "crossings", lambda _: films.Crossings(
+        shots, there, {n: crossed(airtouch_m) for n in ("best", "paper")}))
+    monkeypatch.setattr(vision, "film_scores", lambda shots, found: [
         FlightScore("f", Condition(speed_mps=0.3), tuple(EdgeScore(
             e.kind, e.sample, d.sample, "edge", (e.sample - d.sample) * 0.01, (e.sample - d.sample) * 0.003)
             for e, d in zip(film.edges, some, strict=True)), (), 2, 10.0) for film,
@@ -207,31 +197,31 @@ def seen(monkeypatch, camera_m, felt_m):
 
 
 def test_light_as_in_the_paper(job, monkeypatch):
-    seen(monkeypatch, lambda way, lux: 0.012 if lux >= 100 else 0.06, 0.033)
-    figure = vision_figures.light(job)
+    crossings(monkeypatch, lambda way, lux: 0.012 if lux >= 100 else 0.06, 0.033)
+    figure = vision.light(job)
     assert {verdict(figure, claim) for claim in of("fig11b")} == {REPRODUCED}
-    assert "cross between 100 and 50 lux" in figure.verdicts["light-dark"].found
+    assert "cross between 100 and 50 lux" in figure.verdicts["light-dark"].evidence
 
 
 def test_light_where_the_camera_is_better_throughout(job, monkeypatch):
-    seen(monkeypatch, lambda way, lux: 0.009, 0.06)
-    figure = vision_figures.light(job)
+    crossings(monkeypatch, lambda way, lux: 0.009, 0.06)
+    figure = vision.light(job)
     assert verdict(figure, "light-dark") == verdict(figure, "light-airtouch") == NOT_REPRODUCED
-    assert "the camera is the better one throughout" in figure.verdicts["light-dark"].found
+    assert "the camera is the better one throughout" in figure.verdicts["light-dark"].evidence
 
 
 @pytest.mark.parametrize(("small_m", "answer"), [(0.06, REPRODUCED), (0.012, NOT_REPRODUCED)])
 def test_size_of_the_networks(job, monkeypatch, small_m, answer):
-    seen(monkeypatch, lambda way, lux: small_m if way == "eighth" else 0.012, 0.033)
-    monkeypatch.setattr(recorded, "varied", lambda _, name, __, options: (
+    crossings(monkeypatch, lambda way, lux: small_m if way == "eighth" else 0.012, 0.033)
+    monkeypatch.setattr(recorded, "variant_scores", lambda _, name, __, options: (
         flights(0.02), folds(parameter_bytes=round(13000 * (1 - options["sparsity"])))))
-    figure = vision_figures.network_size(job)
+    figure = vision.network_size(job)
     assert verdict(figure, "network-vision") == answer and verdict(figure, "network-airtouch") == REPRODUCED
 
 
 @pytest.mark.parametrize(("joined_m", "answer"), [(0.012, REPRODUCED), (0.2, NOT_REPRODUCED)])
 def test_both_together(job, monkeypatch, joined_m, answer):
-    seen(monkeypatch, lambda way, lux: joined_m if way == "fusion" else 0.015, 0.033)
-    figure = vision_figures.fusion(job)
+    crossings(monkeypatch, lambda way, lux: joined_m if way == "fusion" else 0.015, 0.033)
+    figure = vision.fusion(job)
     assert verdict(figure, "backup") == answer
-    assert ("at no light below the better one" in figure.verdicts["backup"].found) == (answer == REPRODUCED)
+    assert ("at no light below the better one" in figure.verdicts["backup"].evidence) == (answer == REPRODUCED)

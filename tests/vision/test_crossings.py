@@ -81,10 +81,11 @@ def test_a_line_ahead_is_crossed_after_its_distance_over_the_speed():
 def test_a_fusion_weighs_pairs_and_drops_or_keeps_single_edges():
     from airtouch.vision.compare import Fusion, fused
 
-    seen, felt = [Detection(100, "edge"), Detection(400, "edge")], [Detection(140, "entry"), Detection(700, "exit")]
-    assert [d.sample for d in fused(seen, felt, Fusion(0.25, True, True))] == [130, 400, 700]
-    assert [d.sample for d in fused(seen, felt, Fusion(1.0, False, True))] == [100, 700]
-    assert [d.sample for d in fused(seen, felt, Fusion(0.0, True, False))] == [140, 400]
+    camera = [Detection(100, "edge"), Detection(400, "edge")]
+    airtouch = [Detection(140, "entry"), Detection(700, "exit")]
+    assert [d.sample for d in fused(camera, airtouch, Fusion(0.25, True, True))] == [130, 400, 700]
+    assert [d.sample for d in fused(camera, airtouch, Fusion(1.0, False, True))] == [100, 700]
+    assert [d.sample for d in fused(camera, airtouch, Fusion(0.0, True, False))] == [140, 400]
 
 
 @pytest.mark.parametrize(("camera_off", "airtouch_off"), [(1, 20), (20, 1)])

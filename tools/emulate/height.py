@@ -20,7 +20,7 @@ from tools.emulate.flight import TRUE_X, X, fly
 #: of there-and-back: height; how far it flies to land on the platform
 CRUISE_M, LAND_AT_M = 0.8, 1.5
 SETTINGS = ("as it ships", "atHeight.enable 1")
-FELT_S = 2.5  #: a report further than this from every crossing of its kind is false
+MOST_DELAY_S = 2.5  #: a report further than this from every crossing of its kind is false
 _PLATFORM = """[[platform]]
 shape = "rectangle"
 size_m = [{size}, 4.0]
@@ -85,12 +85,12 @@ def mission(case: Case) -> Scenario:
     return scenario.parse(head + platforms + "\n[mission]" + steps, case.name)
 
 
-def felt(crossed: Sequence[tuple[float, str]], reported: Sequence[tuple[float, str]]) -> np.ndarray:
-    """Seconds by which reports follow the crossings (s, kind) they belong to: same kind, one to one, within FELT_S."""
+def delays(crossed: Sequence[tuple[float, str]], reported: Sequence[tuple[float, str]]) -> np.ndarray:
+    """Seconds by which reports follow the crossings (s, kind) they belong to: same kind, one to one, within MOST_DELAY_S."""
     late = []
     for kind in ("entry", "exit"):
         true, said = ([t for t, k in edges if k == kind] for edges in (crossed, reported))
-        late += [said[j] - true[i] for i, j in match(true, said, FELT_S)]
+        late += [said[j] - true[i] for i, j in match(true, said, MOST_DELAY_S)]
     return np.array(late)
 
 
@@ -114,7 +114,7 @@ class Leg:
 
 def summary(legs: Sequence[Leg]) -> str:
     """All flights of a case with one setting."""
-    late = [felt(leg.crossed, leg.reported) for leg in legs]
+    late = [delays(leg.crossed, leg.reported) for leg in legs]
     every, crossed = np.concatenate(late), sum(len(leg.crossed) for leg in legs)
     false = sum(len(leg.reported) for leg in legs) - len(every)
     text = (f"{sum(leg.ending == 'ok' for leg in legs)} of {len(legs)} ended well, "

@@ -45,7 +45,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
     edge_map.track(log, speed or file.condition.speed_mps)  # raises if both are missing, before the detector runs
-    source = edge_map.true(log) if truth else edge_map.felt(log, detector, model)
+    source = edge_map.true_edges_of(log) if truth else edge_map.detected_edges(log, detector, model)
     plane = edge_map.edge_map(log, source.edges, lag_s=source.lag_s, sigma_s=sigma or source.sigma_s,
                               speed_mps=speed or file.condition.speed_mps, heading_deg=heading)
     content = edge_map.geojson(plane.points, plane.platforms, {

@@ -14,7 +14,7 @@ from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.connection.log_blocks import Sample
 from airtouch.crazyflie.connection.ticks import Restarted
 from airtouch.crazyflie.flight import FORGOTTEN_S
-from airtouch.crazyflie.view.board import Board, Felt, Link
+from airtouch.crazyflie.view.board import Board, Link, ReportedEdge
 from airtouch.crazyflie.view.host_detector import HostDetector, with_gaps
 from airtouch.errors import AirTouchError
 
@@ -41,12 +41,12 @@ def start(drone: Drone, host_detector: bool) -> tuple[blocks.Block | None, HostD
 
 @dataclass
 class Monitor:
-    """Updates a board from packets. felt: called with every edge."""
+    """Updates a board from packets. on_edge: called with every edge."""
 
     board: Board
     intake: Intake
     detector: HostDetector | None
-    felt: Callable[[Felt], None] = lambda _: None
+    on_edge: Callable[[ReportedEdge], None] = lambda _: None
     app: app_log.AppState | None = None
     _before_ms: int | None = None
     _edges: int | None = None
@@ -75,7 +75,7 @@ class Monitor:
             probability = np.full(len(clock), self.app.probability if self.app else np.nan)
         self.board.add(seconds, filled, probability)
         for edge in edges:
-            self.felt(self.board.feel(edge.kind, float(seconds[edge.sample - begin]), edge.probability))
+            self.on_edge(self.board.add_edge(edge.kind, float(seconds[edge.sample - begin]), edge.probability))
 
     def _take_app(self, sample: Sample) -> None:
         self.app = app_log.state(sample.values)
@@ -83,7 +83,7 @@ class Monitor:
             self.board.detector = self.app.detector
             if self._edges is not None and self.app.edges != self._edges and self.intake.first_ms is not None:
                 at = (self.intake.ticks.unwrap(sample.stamp) - self.intake.first_ms) / 1000.0 - self.app.age_s
-                self.felt(self.board.feel(self.app.kind, at, self.app.probability))
+                self.on_edge(self.board.add_edge(self.app.kind, at, self.app.probability))
             self._edges = self.app.edges
         load = [f"app {self.app.load_us:.0f} us"] if self.app.load_us else []
         self.board.status = "; ".join([*load, *self.app.faults])

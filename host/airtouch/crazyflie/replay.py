@@ -6,7 +6,7 @@ from threading import Event
 
 import numpy as np
 
-from airtouch.crazyflie.view.board import Board, Felt
+from airtouch.crazyflie.view.board import Board, ReportedEdge
 from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate
@@ -31,7 +31,7 @@ def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
 
 def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 0.0,
         speed_mps: float | None = None, stop: Event, show: Callable[[Board], None] = lambda _: None,
-        felt: Callable[[Felt], None] = lambda _: None) -> int:
+        on_edge: Callable[[ReportedEdge], None] = lambda _: None) -> int:
     """Feed a log to the detector and the board in steps of 50 ms. Returns the number of rows.
 
     speed: multiple of real time, 0 for as fast as possible. speed_mps: flight speed for logs without a position.
@@ -46,7 +46,7 @@ def run(log: FlightLog, board: Board, detector: HostDetector, *, speed: float = 
         probability, edges = detector.next(rows)
         board.add((first + np.arange(count)) * SAMPLE_PERIOD_S, rows, probability)
         for edge in edges:
-            felt(board.feel(edge.kind, edge.sample * SAMPLE_PERIOD_S, edge.probability))
+            on_edge(board.add_edge(edge.kind, edge.sample * SAMPLE_PERIOD_S, edge.probability))
         show(board)
         if speed > 0.0:
             ahead = (first + count) * SAMPLE_PERIOD_S / speed - (time.monotonic() - began)

@@ -35,7 +35,7 @@ class Verdict:
     """A verdict (reproduced, not reproduced, cannot be tested here) and the figures behind it, with n and interval."""
 
     verdict: str
-    found: str
+    evidence: str
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,8 @@ def signed_errors(axes: Any, errors: Mapping[str, Sequence[float | None]], paper
 def hit_curves(axes: Any, scores: Mapping[str, Sequence[FlightScore]], styles: Mapping[str, Any] | None = None,
                legend: bool = True) -> None:
     """Draw the hit curve of each group of flights, name -> its scores. styles: name -> keywords of its line."""
-    for name, some in scores.items():
-        curve = hit_curve(some)
+    for name, group in scores.items():
+        curve = hit_curve(group)
         if curve.edges:
             axes.step(curve.distance_m, curve.share, where="post", label=f"{name} ({curve.edges})",
                       **((styles or {}).get(name, {})))

@@ -17,7 +17,7 @@ QUICK: dict[str, dict[str, Any]] = {"best": {"steps": 300}, "paper": {"epochs": 
 QUICK_FOLD = 0  #: the only fold that a quick run holds out
 QUICK_SCORED, QUICK_TRAINED = 2, 3  #: a quick run scores every second flight of it, and trains on every third other one
 ABLATION_FOLDS = (0, 1)  #: folds that ablations hold out in turn
-SHOWN = 3  #: flights left out that a caption names
+NAMED = 3  #: flights left out that a caption names
 AIR = ("neuralswarm/flights", "crazypad", "imrclab")  #: folders, beside the flights, of flights without edges
 
 
@@ -41,29 +41,29 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[dict[str, Any]]
     flights = files(job)
     options = (QUICK if job.quick else FULL)[name]
     air = free_air.read(_air(job.flights)) if job.flights and name == "best" and not job.quick else []
-    held = folds.by_fold(flights)
+    held_out = folds.by_fold(flights)
     if job.quick:
-        held = {QUICK_FOLD: held[QUICK_FOLD]} if QUICK_FOLD in held else dict(list(held.items())[:1])
-    result, entries, _ = crossval.crossval(name, flights, job.work / "folds", folds=held, options=options, free_air=air,
-                                           tell=lambda line: job.tell(f"{name}, {line}"))
+        held_out = {QUICK_FOLD: held_out[QUICK_FOLD]} if QUICK_FOLD in held_out else dict(list(held_out.items())[:1])
+    result, entries, _ = crossval.crossval(name, flights, job.work / "folds", folds=held_out, options=options,
+                                           free_air=air, tell=lambda line: job.tell(f"{name}, {line}"))
     return result, entries
 
 
-def varied(job: Job, name: str, detector: Detector | None, options: dict[str, Any],
+def variant_scores(job: Job, name: str, detector: Detector | None, options: dict[str, Any],
            ) -> tuple[list[FlightScore], list[dict[str, Any]]]:
     """As `scores`, of a variant of a detector, over ABLATION_FOLDS (in a quick run over QUICK_FOLD)."""
     flights = files(job)
     by_fold = folds.by_fold(flights)
     numbers = (QUICK_FOLD,) if job.quick else ABLATION_FOLDS
-    held = {k: by_fold[k] for k in numbers if k in by_fold} or dict(list(by_fold.items())[:1])
-    shown = name if detector is None else f"variant-{name}"
-    result, entries, _ = crossval.crossval(shown, flights, job.work / "folds", folds=held, options=options,
+    held_out = {k: by_fold[k] for k in numbers if k in by_fold} or dict(list(by_fold.items())[:1])
+    study = name if detector is None else f"variant-{name}"
+    result, entries, _ = crossval.crossval(study, flights, job.work / "folds", folds=held_out, options=options,
                                            detector=detector, tell=lambda line: job.tell(f"{name}, {line}"))
     return result, entries
 
 
 def in_float(job: Job, name: str, entries: list[dict[str, Any]]) -> list[FlightScore]:
-    """Scores of the float networks of a variant, on the folds and with the models of `varied`."""
+    """Scores of the float networks of a variant, on the folds and with the models of `variant_scores`."""
     numbers = {entry["fold"] for entry in entries}
     return ablation.in_float(get(name), [f for f in files(job) if f.condition.fold in numbers], entries,
                              job.work / "folds")
@@ -88,5 +88,5 @@ def left_out(job: Job) -> str:
     _, unread = crossval.readable_flights(files(job))
     if not unread:
         return ""
-    more = f"; and {len(unread) - SHOWN} more" if len(unread) > SHOWN else ""
-    return f" Left out: {'; '.join(reason for _, reason in unread[:SHOWN])}{more}."
+    more = f"; and {len(unread) - NAMED} more" if len(unread) > NAMED else ""
+    return f" Left out: {'; '.join(reason for _, reason in unread[:NAMED])}{more}."

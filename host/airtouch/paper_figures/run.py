@@ -25,9 +25,9 @@ FIGURES = {
     "fig8g": ("components", "df_loss"), "fig8h": ("components", "time_resolution"),
     "fig8i": ("components", "input_size"),
     "sizes": ("sizes", "sizes"), "table1": ("table1", "power"), "wind": ("conditions", "wind"),
-    "table2": ("resources", "resources"), "fig11b": ("vision_figures", "light"),
-    "fig11c": ("vision_figures", "network_size"),
-    "fusion": ("vision_figures", "fusion"), "range": ("sensing_range", "sensing_range"),
+    "table2": ("resources", "resources"), "fig11b": ("vision", "light"),
+    "fig11c": ("vision", "network_size"),
+    "fusion": ("vision", "fusion"), "range": ("sensing_range", "sensing_range"),
 }
 #: figures that share trainings or films: one process makes each group; the longest first
 GROUPS = (("fig8a", "fig8c", "fig8d", "fig8e", "sizes", "table2"), ("fig8g", "fig8h", "fig8i"),
@@ -71,7 +71,7 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     if workers == 1 or len(groups) < 2:
         make_all(undone, job, out, key, command)
     else:
-        _side_by_side(groups, job, out, key, command, workers)
+        _make_in_processes(groups, job, out, key, command, workers)
     all_records = records(out)
     page.write(out, all_records, command)
     return all_records
@@ -91,7 +91,8 @@ def make_all(chosen: Sequence[str], job: Job, out: Path, key: str, command: str)
                  "of processor time)")
 
 
-def _side_by_side(groups: Sequence[Sequence[str]], job: Job, out: Path, key: str, command: str, workers: int) -> None:
+def _make_in_processes(groups: Sequence[Sequence[str]], job: Job, out: Path, key: str, command: str,
+                       workers: int) -> None:
     """`make_all` for each group, in processes."""
     for variable in ONE_THREAD:
         os.environ.setdefault(variable, "1")
@@ -114,7 +115,7 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     verdicts: dict[str, dict[str, Any]] = {
         claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
     try:
-        figure: Figure = getattr(importlib.import_module(f"airtouch.paper_figures.{module}"), function)(job)
+        figure: Figure = getattr(importlib.import_module(f"airtouch.paper_figures.figures.{module}"), function)(job)
     except AirTouchError as error:
         reason = str(error) if isinstance(error, Missing) else f"it could not be made: {error}"
         for record in verdicts.values():
@@ -123,7 +124,7 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     if set(figure.verdicts) != set(verdicts):
         raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(verdicts)}")
     for claim, verdict in figure.verdicts.items():
-        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.found}
+        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.evidence}
     png, svg = pictures.render(figure.draw)
     table = table_csv(figure.rows)
     for data, ending in ((png, "png"), (svg, "svg"), (table, "csv")):

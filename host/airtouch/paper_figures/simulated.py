@@ -24,14 +24,14 @@ Effects = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]  #: name and par
 
 
 @cache
-def flown(name: str, count: int, effects: Effects = (), seed: int = SEED) -> tuple[FlightLog, ...]:
+def flights(name: str, count: int, effects: Effects = (), seed: int = SEED) -> tuple[FlightLog, ...]:
     """The first `count` flights of a built-in scenario that do not diverge. effects: added to the scenario's.
 
     Raises AirTouchError if too many diverge.
     """
-    chosen = [(effect, dict(values)) for effect, values in effects]
+    added = [(effect, dict(values)) for effect, values in effects]
     logs: list[FlightLog] = []
-    for flight in batch.flights(name, range(SPARE * count), effects=chosen, seed=seed):
+    for flight in batch.flights(name, range(SPARE * count), effects=added, seed=seed):
         if not isinstance(flight, Diverged):
             logs.append(flight)
         if len(logs) == count:
@@ -39,12 +39,12 @@ def flown(name: str, count: int, effects: Effects = (), seed: int = SEED) -> tup
     raise AirTouchError(f"{name}: only {len(logs)} of {SPARE * count} simulated flights ended well")
 
 
-def scores(flights: Sequence[FlightLog], detector: str, model: Any = None) -> list[FlightScore]:
+def scores(logs: Sequence[FlightLog], detector: str, model: Any = None) -> list[FlightScore]:
     """One score for each flight. True edges come from the down range. model: None for the shipped one."""
-    chosen = registry.get(detector)
-    model = chosen.load(None) if model is None else model
-    return [evaluate.evaluate_flight(FlightFile(Path(log.source), condition(log)), log, chosen, model).score
-            for log in flights]
+    runner = registry.get(detector)
+    model = runner.load(None) if model is None else model
+    return [evaluate.evaluate_flight(FlightFile(Path(log.source), condition(log)), log, runner, model).score
+            for log in logs]
 
 
 def condition(log: FlightLog) -> Condition:

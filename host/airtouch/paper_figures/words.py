@@ -52,9 +52,9 @@ def worse(first: dict, second: dict) -> bool:
                for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
 
 
-def judged(yes: bool, text: str) -> Verdict:
+def judged(yes: bool, evidence: str) -> Verdict:
     """The verdict "reproduced" or "not reproduced", with the figures behind it."""
-    return Verdict(REPRODUCED if yes else NOT_REPRODUCED, text)
+    return Verdict(REPRODUCED if yes else NOT_REPRODUCED, evidence)
 
 
 def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:

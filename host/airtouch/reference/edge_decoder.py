@@ -6,7 +6,8 @@ import numpy as np
 
 #: The logits that the decoder reads, the first columns; kernel_types.h has their number for C.
 LOGITS = ("over", "entry", "exit")
-LOGIT_LIMIT = 8.0  #: largest magnitude of a logit, a probability of 0.9997: one wild logit moves the smoothed one so far
+#: largest magnitude of a logit, a probability of 0.9997: one wild logit moves the smoothed one no further
+LOGIT_LIMIT = 8.0
 SLOW_AT_START = -3.0  #: the smoothed over logit before anything is known: over a platform with a probability of 0.05
 LONG_AGO = 0x3FFFFFFF  #: steps since an edge that never was
 

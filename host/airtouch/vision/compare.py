@@ -45,15 +45,15 @@ def filmed(films: Sequence[Film], lux: float, mappers: Mapping[str, lines.Mapper
             small = lines.binned(image)
             for name, mapper in mappers.items():
                 of_film[name].append(sight(camera, shot, time_s, lines.strongest(mapper(small), camera)))
-        for name, some in of_film.items():
-            sights[name].append(some)
+        for name, of_mapper in of_film.items():
+            sights[name].append(of_mapper)
         tell(f"{lux:g} lux: {number} of {len(films)} flights")
     return sights
 
 
 def threshold(films: Sequence[Film], sights: Sights) -> float:
     """The least strength of a line that counts: that of the best timed F1 over the training films."""
-    strengths = np.array([s.strength for some in sights for s in some])
+    strengths = np.array([s.strength for of_film in sights for s in of_film])
     candidates = np.unique(np.quantile(strengths, np.linspace(0.3, 0.99, THRESHOLDS)))
     chosen, _, _ = tuning.choose([float(c) for c in candidates], [f.edges for f in films],
                                  lambda c, i: detections(sights[i], c, films[i].speed_mps))
@@ -62,7 +62,7 @@ def threshold(films: Sequence[Film], sights: Sights) -> float:
 
 def crossings(films: Sequence[Film], sights: Sights, least: float) -> list[list[Detection]]:
     """The camera's crossings of each film."""
-    return [detections(some, least, shot.speed_mps) for shot, some in zip(films, sights, strict=True)]
+    return [detections(of_film, least, shot.speed_mps) for shot, of_film in zip(films, sights, strict=True)]
 
 
 def lag(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
@@ -70,15 +70,15 @@ def lag(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
 
     It is negative: the down range, from which the true edges come, is some hundredths of a second late.
     """
-    return tuning.lag((shot.edges, some) for shot, some in zip(films, by_film, strict=True)) / SAMPLE_PERIOD_S
+    return tuning.lag((shot.edges, found) for shot, found in zip(films, by_film, strict=True)) / SAMPLE_PERIOD_S
 
 
 def without_lag(by_film: Sequence[Sequence[Detection]], samples: float) -> list[list[Detection]]:
     """Crossings less a constant lag, as for every detector."""
-    return [[replace(d, sample=round(d.sample - samples)) for d in some] for some in by_film]
+    return [[replace(d, sample=round(d.sample - samples)) for d in of_film] for of_film in by_film]
 
 
-def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
+def airtouch_crossings(films: Sequence[Film], name: str) -> list[list[Detection]]:
     """Crossings of each film by the shipped model of a detector, less its lag, within the film."""
     detector = registry.get(name)
     model = detector.load(None)
@@ -93,10 +93,10 @@ def felt(films: Sequence[Film], name: str) -> list[list[Detection]]:
 def scored(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> list[FlightScore]:
     """One score for each film: errors and misses at its edges, and false crossings a minute."""
     scores = []
-    for shot, some in zip(films, by_film, strict=True):
+    for shot, found in zip(films, by_film, strict=True):
         filming = np.zeros(len(shot.log), bool)
         filming[int(shot.first_s / SAMPLE_PERIOD_S):int(shot.last_s / SAMPLE_PERIOD_S)] = True
-        inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in some]
+        inside = [replace(d, sample=int(np.clip(d.sample, 0, len(shot.log) - 1))) for d in found]
         scores.append(score_flight(Path(shot.log.source).name, Condition(speed_mps=shot.speed_mps), shot.edges, filming,
                                    np.full(len(shot.log), np.nan), inside))
     return scores
@@ -121,7 +121,7 @@ def choose_fusion(films: Sequence[Film], by_camera: Sequence[Sequence[Detection]
     An edge that both detect is always joined. The timed F1 does not choose the weight, because with few films single
     edges would decide it.
     """
-    camera, airtouch = (_squared_error(films, some) for some in (by_camera, by_airtouch))
+    camera, airtouch = (_squared_error(films, by_film) for by_film in (by_camera, by_airtouch))
     choices = [Fusion(airtouch / (camera + airtouch), camera_alone, airtouch_alone)
                for camera_alone in (True, False) for airtouch_alone in (True, False)]
     return max(choices, key=lambda f: tuning.timed_f1(
@@ -131,6 +131,6 @@ def choose_fusion(films: Sequence[Film], by_camera: Sequence[Sequence[Detection]
 def _squared_error(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> float:
     """Mean squared error of the edges found, samples squared, rounding included; the tolerance's where none is."""
     tolerance = TOLERANCE_S / SAMPLE_PERIOD_S
-    errors = [some[j].sample - shot.edges[i].sample for shot, some in zip(films, by_film, strict=True)
-              for i, j in match([e.sample for e in shot.edges], [d.sample for d in some], tolerance)]
+    errors = [found[j].sample - shot.edges[i].sample for shot, found in zip(films, by_film, strict=True)
+              for i, j in match([e.sample for e in shot.edges], [d.sample for d in found], tolerance)]
     return float(np.mean(np.square(errors))) + ROUNDING if errors else tolerance ** 2

@@ -48,13 +48,13 @@ def columns(n):
 def test_a_board_places_edges_one_lag_back_and_draws_itself():
     board = Board("test", "best", lag_s=0.5, link=Link(100.0, 0.01, 0.004, 0.002))
     board.add(np.arange(100) / 100, columns(100), np.linspace(0, 1, 100))
-    felt = board.feel("entry", 0.9, 0.97)
-    assert abs(felt.x_m - 0.4) < 0.06
+    edge = board.add_edge("entry", 0.9, 0.97)
+    assert abs(edge.x_m - 0.4) < 0.06
     out = io.StringIO()
     Console(file=out, width=160).print(board.render())
     text = out.getvalue()
     assert all(name in text for name in SIGNALS) and "entry" in text and "1.0 % lost" in text and "[" in text
-    assert "P 0.97" in edge_line(felt) and "1.0 s" in board.line() and "1 edges" in board.line()
+    assert "P 0.97" in edge_line(edge) and "1.0 s" in board.line() and "1 edges" in board.line()
     board.link.silent_s = 3.0
     assert "SILENT for 3.0 s" in board.line()
 

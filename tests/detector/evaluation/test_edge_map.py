@@ -21,7 +21,7 @@ def zigzag(width: float, rows: np.ndarray) -> np.ndarray:
     return np.vstack(legs)
 
 
-def felt(shape: Polygon, xy: np.ndarray, sigma_s: float = 0.0, seed: int = 0) -> list[edge_map.EdgePoint]:
+def detected_points(shape: Polygon, xy: np.ndarray, sigma_s: float = 0.0, seed: int = 0) -> list[edge_map.EdgePoint]:
     """Edge points of an ideal detector with Gaussian timing error on the true outline."""
     over = shapely.contains_xy(shape, xy[:, 0], xy[:, 1])
     change = np.flatnonzero(np.diff(over.astype(int))) + 1
@@ -44,13 +44,13 @@ SHAPES = {
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_zigzag_finds_the_shape(name):
-    found = edge_map.platforms(felt(SHAPES[name], zigzag(1.0, ROWS), sigma_s=0.05))
+    found = edge_map.platforms(detected_points(SHAPES[name], zigzag(1.0, ROWS), sigma_s=0.05))
     assert len(found) == 1
     assert overlap(found[0].outline, SHAPES[name]) > 0.88
 
 
 def test_the_uncertainty_is_the_timing_error_times_the_speed():
-    points = felt(SHAPES["square"], zigzag(1.0, ROWS), sigma_s=0.1)
+    points = detected_points(SHAPES["square"], zigzag(1.0, ROWS), sigma_s=0.1)
     assert np.allclose([p.sigma_m for p in points], 0.1 * SPEED, rtol=1e-6)
     beside = np.array([min(abs(p.x_m - 0.4), abs(p.x_m + 0.4)) for p in points])
     assert 0.6 < np.sqrt(np.mean(beside**2)) / 0.03 < 1.4
@@ -59,12 +59,12 @@ def test_the_uncertainty_is_the_timing_error_times_the_speed():
 def test_two_platforms_stay_two():
     two = SHAPES["square"].union(shapely.affinity.translate(SHAPES["square"], xoff=1.4))
     xy = zigzag(1.0, ROWS) * [1.5, 1.0] + [0.7, 0.0]
-    assert len(edge_map.platforms(felt(two, xy))) == 2
+    assert len(edge_map.platforms(detected_points(two, xy))) == 2
 
 
 def test_a_single_sweep_gives_points_only():
     xy = zigzag(1.0, np.array([0.0]))
-    found = edge_map.platforms(felt(SHAPES["square"], xy))
+    found = edge_map.platforms(detected_points(SHAPES["square"], xy))
     assert len(found) == 1 and found[0].outline is None
     assert found[0].far.x - found[0].near.x == pytest.approx(0.8, abs=0.01)
 
@@ -78,7 +78,7 @@ def test_dead_reckoning_needs_a_speed():
 
 
 def test_geojson_can_be_read_back():
-    points = felt(SHAPES["L"], zigzag(1.0, ROWS), sigma_s=0.02)
+    points = detected_points(SHAPES["L"], zigzag(1.0, ROWS), sigma_s=0.02)
     text = json.dumps(edge_map.geojson(points, edge_map.platforms(points), {"flight": "a"}))
     features = json.loads(text)["features"]
     shapes = [shapely.geometry.shape(f["geometry"]) for f in features]

@@ -46,8 +46,8 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
                 board = boards.Board(uri, "best on the host", detector.lag_s)
             with screen() as (show, say):
                 watcher = monitor.Monitor(board, Intake(slow), detector,
-                                          lambda felt: say(boards.edge_line(felt)))
+                                          lambda edge: say(boards.edge_line(edge)))
                 monitor.watch(drone, watcher, duration, stop, show, say)
         finally:
             drone.close()
-    click.echo(f"{board.now_s:.1f} s watched: {board.link}; {len(board.felt)} edges ({board.detector})")
+    click.echo(f"{board.now_s:.1f} s watched: {board.link}; {len(board.edges)} edges ({board.detector})")

@@ -44,7 +44,7 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     board = boards.Board(flight.name, "best", detector.lag_s)
     with stopping(quiet=True) as stop, screen(bool(speed)) as (show, say):
         fed = replay.run(log, board, detector, speed=speed, speed_mps=files[0].condition.speed_mps, stop=stop,
-                         show=show, felt=lambda felt: say(boards.edge_line(felt)))
+                         show=show, on_edge=lambda edge: say(boards.edge_line(edge)))
     if fed < len(log):
         click.echo(f"stopped after {fed / 100:.1f} of {len(log) / 100:.1f} s; no score")
         sys.exit(1)

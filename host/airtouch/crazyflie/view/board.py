@@ -21,7 +21,7 @@ SIGNALS = {
 
 
 @dataclass(frozen=True)
-class Felt:
+class ReportedEdge:
     """A detected edge: kind, time of its report (s from the start), position (m), and probability."""
 
     kind: str
@@ -67,7 +67,7 @@ class Board:
     link: Link | None = None
     status: str = ""
     now_s: float = 0.0
-    felt: list[Felt] = field(default_factory=list)
+    edges: list[ReportedEdge] = field(default_factory=list)
     latest: dict[str, float] = field(default_factory=dict)
     _signals: dict[str, deque] = field(
         default_factory=lambda: {name: deque(maxlen=int(100 * SECONDS)) for name in SIGNALS})
@@ -85,21 +85,21 @@ class Board:
         if "x_m" in columns:
             self._track += zip(times_s[::5], columns["x_m"][::5], columns["y_m"][::5], strict=True)
 
-    def feel(self, kind: str, at_s: float, probability: float) -> Felt:
+    def add_edge(self, kind: str, at_s: float, probability: float) -> ReportedEdge:
         """Add an edge reported at `at_s`. Its position is that of the drone one lag earlier."""
         known = [p for p in self._track if np.isfinite(p[1])]
         times = np.array([p[0] for p in known])
         i = int(np.searchsorted(times, at_s - self.lag_s)) if known else 0
         x, y = known[min(i, len(known) - 1)][1:] if known else (float("nan"), float("nan"))
-        felt = Felt(kind, at_s, float(x), float(y), probability)
-        self.felt.append(felt)
-        return felt
+        edge = ReportedEdge(kind, at_s, float(x), float(y), probability)
+        self.edges.append(edge)
+        return edge
 
     def line(self) -> str:
         """The view as one line, for output that is no terminal."""
         value = self.latest.get
         parts = [f"{self.now_s:7.1f} s", f"P {self._last('P(over)'):.2f}",
-                 f"down {value('zrange_m', np.nan):.2f} m", f"{len(self.felt)} edges"]
+                 f"down {value('zrange_m', np.nan):.2f} m", f"{len(self.edges)} edges"]
         parts += [f"{value('vbat_V'):.2f} V"] if np.isfinite(value("vbat_V", np.nan)) else []
         parts += [str(self.link)] if self.link else []
         return "  ".join(parts + ([self.status] if self.status else []))
@@ -117,11 +117,11 @@ class Board:
                             f"{self._last(name):8.2f} {unit}")
         if np.isfinite(self.latest.get("vbat_V", np.nan)):
             signals.add_row("battery", "", f"{self.latest['vbat_V']:8.2f} V")
-        edges = [f"{f.kind:5} {f.at_s:6.2f} s  x {f.x_m:+.2f} y {f.y_m:+.2f} m  P {f.probability:.2f}"
-                 for f in self.felt[-6:]]
-        below = "\n".join([f"edges ({len(self.felt)}, {self.detector})", *edges])
+        latest = [f"{f.kind:5} {f.at_s:6.2f} s  x {f.x_m:+.2f} y {f.y_m:+.2f} m  P {f.probability:.2f}"
+                 for f in self.edges[-6:]]
+        below = "\n".join([f"edges ({len(self.edges)}, {self.detector})", *latest])
         track = np.array([(x, y) for _, x, y in self._track]).reshape(-1, 2)
-        plan = Text("\n".join(text_map(track, [(f.x_m, f.y_m, f.kind) for f in self.felt])))
+        plan = Text("\n".join(text_map(track, [(f.x_m, f.y_m, f.kind) for f in self.edges])))
         foot = "   ".join(part for part in (str(self.link) if self.link else "", self.status) if part)
         panels = [Panel(signals, title=f"last {SECONDS:g} s"),
                   Panel(plan, title="from above: [ entry  ] exit  o drone"), Panel(below)]
@@ -131,7 +131,7 @@ class Board:
         return float(self._signals[name][-1]) if self._signals[name] else float("nan")
 
 
-def edge_line(felt: Felt) -> str:
+def edge_line(edge: ReportedEdge) -> str:
     """A detected edge as one line of text."""
-    place = f", x {felt.x_m:+.2f} m, y {felt.y_m:+.2f} m" if np.isfinite(felt.x_m) else ""
-    return f"{felt.kind} felt at {felt.at_s:.2f} s{place} (P {felt.probability:.2f})"
+    place = f", x {edge.x_m:+.2f} m, y {edge.y_m:+.2f} m" if np.isfinite(edge.x_m) else ""
+    return f"{edge.kind} felt at {edge.at_s:.2f} s{place} (P {edge.probability:.2f})"

@@ -68,7 +68,7 @@ class EdgeMap:
 
 
 @dataclass(frozen=True)
-class Timed:
+class TimedEdges:
     """Edges of a flight, their constant lag (s) and 1-sigma of their time (s)."""
 
     edges: Sequence[Edge | Detection]
@@ -76,12 +76,12 @@ class Timed:
     sigma_s: float
 
 
-def true(log: FlightLog) -> Timed:
+def true_edges_of(log: FlightLog) -> TimedEdges:
     """The edges of the down range."""
-    return Timed(true_edges(log), 0.0, TRUE_SIGMA_S)
+    return TimedEdges(true_edges(log), 0.0, TRUE_SIGMA_S)
 
 
-def felt(log: FlightLog, detector: str = "best", model: Path | None = None) -> Timed:
+def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = None) -> TimedEdges:
     """The edges that a detector reports, with the shipped model for None.
 
     Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
@@ -90,8 +90,8 @@ def felt(log: FlightLog, detector: str = "best", model: Path | None = None) -> T
     evaluate.check(log, evaluate.spare_of(module))
     trained = module.load(model)
     trained = module.model_for(trained, log) if hasattr(module, "model_for") else trained
-    return Timed(module.run(log, trained).edges, module.lag_s(trained),
-                 getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
+    return TimedEdges(module.run(log, trained).edges, module.lag_s(trained),
+                      getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
 
 
 def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,

@@ -1,6 +1,7 @@
 """Table 1: power of each stage, measured if there is an INA219 log, otherwise estimated."""
 
 from pathlib import Path
+from typing import Any
 
 from airtouch.errors import AirTouchError
 from airtouch.paper_figures import pictures, words
@@ -45,8 +46,8 @@ def estimated() -> Figure:
     rows = [{"what": stages.NAMES.get(name, name), "mw": (e.low_mw + e.high_mw) / 2, "low_mw": e.low_mw,
              "high_mw": e.high_mw, "instructions_a_step": e.instructions,
              "paper_mw": stages.PAPER_MW.get(name.split(",")[0])} for name, e in estimates.items()]
-    parts = [estimates[n] for n in ("FC-FE", "CCS-FF", "filter", "network, paper on the GAP8")]
-    low, high = sum(p.low_mw for p in parts), sum(p.high_mw for p in parts)
+    stages_of_paper = [estimates[n] for n in ("FC-FE", "CCS-FF", "filter", "network, paper on the GAP8")]
+    low, high = sum(p.low_mw for p in stages_of_paper), sum(p.high_mw for p in stages_of_paper)
     verdicts = {"power": Verdict(UNTESTABLE, f"no meter here; the work itself is estimated at {low:.1f} to {high:.1f} "
                                              "mW for the paper's stages (43 mW there), from counted instructions, "
                                              "without idle power, clocks and regulators"),
@@ -57,13 +58,13 @@ def estimated() -> Figure:
                   lambda canvas: _draw(canvas, rows))
 
 
-def _negligible(mw: float, how: str) -> Verdict:
+def _negligible(mw: float, source: str) -> Verdict:
     share = mw / CLAIMS["negligible"].values[0]
-    return words.judged(share < 0.05, f"{how} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the paper's "
-                                      "own 43 mW are 1.4 %. The propellers' power was not measured here")
+    return words.judged(share < 0.05, f"{source} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the "
+                                      "paper's own 43 mW are 1.4 %. The propellers' power was not measured here")
 
 
-def _draw(canvas, rows) -> None:
+def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
     axes = canvas.subplots()
     places = range(len(rows))
     axes.barh([p - 0.2 for p in places], [r["mw"] for r in rows], height=0.38, color=pictures.COLOURS["best"],

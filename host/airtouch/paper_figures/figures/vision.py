@@ -9,7 +9,7 @@ from airtouch.detector.evaluation import summary, tuning
 from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
-from airtouch.paper_figures.films import FELT, SIZE_LUX, everything, film_scores, films_of, lux_of
+from airtouch.paper_figures.figures.films import AIRTOUCH, SIZE_LUX, Crossings, crossings, film_scores, films_of, lux_of
 from airtouch.vision import teed, weights
 
 BEST_ZEROS = (0.85, 0.0)  #: sparsities of `best` in the plot of error against size
@@ -17,6 +17,8 @@ STEPS = 800  #: training steps of `best`
 NAMES = {"classical": "OpenCV", "teed": "TEED's structure"}
 COLOURS = {"classical": "#8a6d00", "teed": "#7a3e9d", "half": "#a678c4", "quarter": "#c9aedb", "eighth": "#e0d3ea",
            "fusion": "#1a7f37"}
+Summaries = dict[str, dict[str, Any]]  #: detector -> summary of its scores
+ByLight = dict[tuple[str, float], dict[str, Any]]  #: (method, lux) -> summary of its scores
 LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate move the error of a line's place. It "
           "cannot say how a real platform looks: no gloss, no shadow of the drone (which at 4 cm hides most of the "
           "light), no lens errors, no rim of its own colour, and the network was trained on the same renderer.")
@@ -24,67 +26,74 @@ LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate mov
 
 def light(job: Job) -> Figure:
     """Performance:3b: errors of the camera and of AirTouch from 500 to 5 lux."""
-    films, seen, felt = everything(job)
-    table, rows = [], {}
-    for lux in lux_of(job):
-        for name in ("classical", "teed"):
-            rows[name, lux] = row = summary.summarise(film_scores(films, seen[name, lux]))
-            table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux))
-    ours = {name: summary.summarise(film_scores(films, felt[name])) for name in FELT}
+    found = crossings(job)
+    lux = lux_of(job)
+    rows = {(name, v): summary.summarise(film_scores(found.films, found.camera[name, v]))
+            for v in lux for name in ("classical", "teed")}
+    ours = _summaries(found)
+    table = [words.table_row(f"{name}, {v:g} lux", row, detector=name, lux=v) for (name, v), row in rows.items()]
     table += [words.table_row(f"{name}, any light", row, detector=name) for name, row in ours.items()]
+    caption = (f"Simulated: {len(found.films)} flights, 4 cm over the platform, camera and AirTouch on the same "
+               f"flights; frames of 324 x 244 rendered at 6 a second. {LIMITS}")
+    return Figure("Errors against light", table, caption, _light_verdicts(rows, ours, lux),
+                  lambda canvas: _draw_light(canvas, rows, ours, lux))
 
-    def text(lux: float) -> str:
-        return "; ".join(f"{NAMES[n]} at {lux:g} lux {words.metres(rows[n, lux])}, {words.missed(rows[n, lux])}"
-                         for n in ("teed", "classical") if (n, lux) in rows)
 
+def _summaries(found: Crossings) -> Summaries:
+    return {name: summary.summarise(film_scores(found.films, found.airtouch[name])) for name in AIRTOUCH}
+
+
+def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dict[str, Verdict]:
+    def text(value: float) -> str:
+        return "; ".join(f"{NAMES[n]} at {value:g} lux {words.metres(rows[n, value])}, {words.missed(rows[n, value])}"
+                         for n in ("teed", "classical") if (n, value) in rows)
+
+    claimed_m = CLAIMS["light-airtouch"].values[0]
+    bright, bright_m = CLAIMS["light-bright"].values
+    dark = [v for v in CLAIMS["light-dark"].values if ("teed", v) in rows]
     flights = "; ".join(f"{n} {words.metres(r)}, {words.missed(r)}" for n, r in ours.items())
-    bright, dark = CLAIMS["light-bright"].values[0], [v for v in CLAIMS["light-dark"].values if ("teed", v) in rows]
-    verdicts = {
+    best = words.metres(ours["best"])
+    return {
         "light-airtouch": words.judged(
-            words.reaches(ours["paper"], CLAIMS["light-airtouch"].values[0]),
+            words.reaches(ours["paper"], claimed_m),
             f"light plays no part in its signals; simulated, shipped networks: {flights}"
-            + (f"; best reaches {CLAIMS['light-airtouch'].values[0]:g} m"
-               if words.reaches(ours["best"], CLAIMS["light-airtouch"].values[0]) else "")),
-        "light-bright": words.judged(words.worse(rows["teed", bright], ours["best"]) and words.reaches(
-            rows["teed", bright], CLAIMS["light-bright"].values[1]),
-                                     f"{text(bright)}; best {words.metres(ours['best'])}"),
+            + (f"; best reaches {claimed_m:g} m" if words.reaches(ours["best"], claimed_m) else "")),
+        "light-bright": words.judged(
+            words.worse(rows["teed", bright], ours["best"]) and words.reaches(rows["teed", bright], bright_m),
+            f"{text(bright)}; best {best}"),
         "light-dark": words.judged(all(words.worse(ours["best"], rows["teed", v]) for v in dark),
-                                   "; ".join(text(v) for v in dark) + f"; best {words.metres(ours['best'])}. "
-                                   + _crossing(rows, ours["best"], lux_of(job)))}
+                                   "; ".join(text(v) for v in dark) + f"; best {best}. "
+                                   + _crossing(rows, ours["best"], lux))}
 
-    def draw(canvas):
-        left, right = canvas.subplots(1, 2)
-        for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
-            for name in ("classical", "teed"):
-                pictures.curve(axes, lux_of(job), [rows[name, v] for v in lux_of(job)], key, factor, COLOURS[name],
-                               NAMES[name])
-            _airtouch(axes, ours, key, factor)
-            for name, row in ours.items():
-                if row["intervals"][key]:
-                    axes.axhspan(*(factor * b for b in row["intervals"][key]), color=pictures.colour(name), alpha=0.12,
-                                 lw=0)
-            pictures.logarithmic(axes, lux_of(job), "light, lux")
-            axes.set(ylim=(0, None))
-        left.plot(bright, CLAIMS["light-bright"].values[1], "k*", ms=8, label="paper: TEED")
-        left.plot([20, 50, 100], [CLAIMS["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
-        _labelled(canvas, left, right)
 
-    caption = (f"Simulated: {len(films)} flights, 4 cm over the platform, camera and AirTouch on the same flights; "
-               f"frames of 324 x 244 rendered at 6 a second. {LIMITS}")
-    return Figure("Errors against light", table, caption, verdicts, draw)
+def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float]) -> None:
+    left, right = canvas.subplots(1, 2)
+    for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
+        for name in ("classical", "teed"):
+            pictures.curve(axes, lux, [rows[name, v] for v in lux], key, factor, COLOURS[name], NAMES[name])
+        _airtouch(axes, ours, key, factor)
+        for name, row in ours.items():
+            if row["intervals"][key]:
+                axes.axhspan(*(factor * b for b in row["intervals"][key]), color=pictures.colour(name), alpha=0.12,
+                             lw=0)
+        pictures.logarithmic(axes, lux, "light, lux")
+        axes.set(ylim=(0, None))
+    left.plot(*CLAIMS["light-bright"].values, "k*", ms=8, label="paper: TEED")
+    left.plot([20, 50, 100], [CLAIMS["light-airtouch"].values[0]] * 3, "k_", ms=9, label="paper: AirTouch")
+    _labelled(canvas, left, right)
 
 
 def network_size(job: Job) -> Figure:
     """Performance:3c: the camera's errors against the size of its network, AirTouch's against the size of its own."""
-    films, seen, felt = everything(job)
+    found = crossings(job)
     lux = SIZE_LUX
-    rows = {name: summary.summarise(film_scores(films, seen[name, lux])) for name in weights.SIZES}
+    rows = {name: summary.summarise(film_scores(found.films, found.camera[name, lux])) for name in weights.SIZES}
     table = [words.table_row(name, r, parameters=teed.parameters(weights.SIZES[name]), lux=lux)
              for name, r in rows.items()]
     full, least = rows["teed"], rows["eighth"]
     text = "; ".join(f"{teed.parameters(weights.SIZES[n]):,} parameters {words.metres(r)}, {words.missed(r)}"
                      for n, r in rows.items())
-    ours = {name: summary.summarise(film_scores(films, felt[name])) for name in FELT}
+    ours = _summaries(found)
     by_bytes, airtouch = _airtouch_sizes(job)
     table += [words.table_row(f"best, {size:,} bytes, recorded flights", r, parameters=size)
               for size, r in by_bytes.items()]
@@ -105,8 +114,8 @@ def network_size(job: Job) -> Figure:
             axes.set(ylim=(0, None))
         _labelled(canvas, left, right)
 
-    caption = (f"Simulated: the {len(films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 and 8; "
-               f"each network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
+    caption = (f"Simulated: the {len(found.films)} flights of fig11b at {SIZE_LUX:g} lux. Widths are divided by 2, 4 "
+               f"and 8; each network has the same training. Dashed: the paper's 53 KB. {LIMITS}")
     return Figure("Errors against the size of the network", table, caption, verdicts, draw)
 
 
@@ -117,7 +126,7 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
     rows = {}
     try:
         for zeros in BEST_ZEROS:
-            scores, folds = recorded.varied(job, "best", None, {"steps": STEPS, "sparsity": zeros})
+            scores, folds = recorded.variant_scores(job, "best", None, {"steps": STEPS, "sparsity": zeros})
             rows[folds[0]["parameters"]["parameter_bytes"]] = summary.summarise(scores)
     except Missing as missing:
         return {}, Verdict(UNTESTABLE, str(missing))
@@ -128,29 +137,22 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
 
 def fusion(job: Job) -> Figure:
     """Late fusion of camera and AirTouch: the timed F1 of each and of both at every illuminance."""
-    films, seen, felt = everything(job)
-    table, scores = [], {}
+    found = crossings(job)
+    table: list[dict[str, Any]] = []
+    scores: dict[tuple[str, float], float] = {}
     for lux in lux_of(job):
-        detections = {"camera": seen["teed", lux], "AirTouch": felt["best"], "both": seen["fusion", lux]}
-        for name, some in detections.items():
-            scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(films, some, strict=True)])
-            row = summary.summarise(film_scores(films, some))
+        detections = {"camera": found.camera["teed", lux], "AirTouch": found.airtouch["best"],
+                      "both": found.camera["fusion", lux]}
+        for name, by_film in detections.items():
+            scores[name, lux] = tuning.timed_f1([(f.edges, d) for f, d in zip(found.films, by_film, strict=True)])
+            row = summary.summarise(film_scores(found.films, by_film))
             table.append(words.table_row(f"{name}, {lux:g} lux", row, detector=name, lux=lux,
                                          timed_f1=scores[name, lux]))
-        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(films, detections)
-    worst = [(r["fusion_loses"], r["loses_low"], r["lux"]) for r in table if r["detector"] == "both"]
+        table[-1]["fusion_loses"], table[-1]["loses_low"], table[-1]["loses_high"] = _loss(found.films, detections)
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
-    most = max(loss for loss, _, _ in worst)
-    beyond = ", ".join(f"{v:g} lux" for _, low, v in worst if low > 0.0)
-    if beyond:
-        outcome = f"both are below the better one beyond the 95 % interval of the difference at {beyond}"
-    elif most > 0.0:
-        outcome = (f"both are below the better one by {most:.3f} at most, and nowhere beyond the 95 % interval of the "
-                "difference")
-    else:
-        outcome = f"both are at no light below the better one: {-most:.3f} above it at least"
-    verdict = words.judged(not beyond, f"timed F1, {sum(len(f.edges) for f in films)} edges: {text}; {outcome}")
+    never_worse, outcome = _outcome([r for r in table if r["detector"] == "both"])
+    verdict = words.judged(never_worse, f"timed F1, {sum(len(f.edges) for f in found.films)} edges: {text}; {outcome}")
 
     def draw(canvas):
         axes = canvas.subplots()
@@ -161,11 +163,23 @@ def fusion(job: Job) -> Figure:
         axes.set(ylabel="timed F1 (1: every edge, no error)", ylim=(0.5, 1.02))
         axes.legend(fontsize=7, frameon=False)
 
-    caption = (f"Simulated: {len(films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 s are "
-               "one edge, at a time weighted by the inverse squared errors; errors, and whether edges of one sense "
-               f"alone count, are learnt at each light on {films_of(job)[0]} other flights. Timed F1 counts a match "
-               f"1 - |error| / 1.5 s. {LIMITS}")
+    caption = (f"Simulated: {len(found.films)} flights. Edges of the camera (TEED's structure) and of best within 0.6 "
+               "s are one edge, at a time weighted by the inverse squared errors; errors, and whether edges of one "
+               f"sense alone count, are learnt at each light on {films_of(job)[0]} other flights. Timed F1 counts a "
+               f"match 1 - |error| / 1.5 s. {LIMITS}")
     return Figure("Camera and AirTouch together", table, caption, {"backup": verdict}, draw)
+
+
+def _outcome(rows: Sequence[dict[str, Any]]) -> tuple[bool, str]:
+    """Whether the fusion is nowhere worse than its better sense beyond the interval of the difference; in words."""
+    beyond = ", ".join(f"{r['lux']:g} lux" for r in rows if r["loses_low"] > 0.0)
+    most = max(r["fusion_loses"] for r in rows)
+    if beyond:
+        return False, f"both are below the better one beyond the 95 % interval of the difference at {beyond}"
+    if most > 0.0:
+        return True, (f"both are below the better one by {most:.3f} at most, and nowhere beyond the 95 % interval of "
+                      "the difference")
+    return True, f"both are at no light below the better one: {-most:.3f} above it at least"
 
 
 def _loss(films: Sequence[Any], detections: dict[str, Any], draws: int = 2000) -> tuple[float, float, float]:
@@ -173,10 +187,11 @@ def _loss(films: Sequence[Any], detections: dict[str, Any], draws: int = 2000) -
 
     The terms of the timed F1 are additive over flights, so each bootstrap draw is a sum.
     """
-    counts = {n: np.array([len(f.edges) + len(d) for f, d in zip(films, some, strict=True)])
-              for n, some in detections.items()}
+    counts = {n: np.array([len(f.edges) + len(d) for f, d in zip(films, by_film, strict=True)])
+              for n, by_film in detections.items()}
     credits = {n: np.array([0.5 * c * tuning.timed_f1([(f.edges, d)])
-                            for f, d, c in zip(films, some, counts[n], strict=True)]) for n, some in detections.items()}
+                            for f, d, c in zip(films, by_film, counts[n], strict=True)])
+               for n, by_film in detections.items()}
 
     def f1(name: str, weights: np.ndarray) -> np.ndarray:
         return 2.0 * (weights @ credits[name]) / np.maximum(weights @ counts[name], 1)
@@ -188,7 +203,7 @@ def _loss(films: Sequence[Any], detections: dict[str, Any], draws: int = 2000) -
     return float(f1(better, whole) - f1("both", whole)), float(low), float(high)
 
 
-def _airtouch(axes: Any, ours: dict[str, dict[str, Any]], key: str, factor: float) -> None:
+def _airtouch(axes: Any, ours: Summaries, key: str, factor: float) -> None:
     """Draw a horizontal line for each of AirTouch's detectors, which do not depend on light."""
     for name, row in ours.items():
         if row[key] is not None:
@@ -202,7 +217,7 @@ def _labelled(canvas: Any, left: Any, right: Any) -> None:
     canvas.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7, frameon=False)
 
 
-def _crossing(rows: dict[tuple[str, float], dict[str, Any]], ours: dict[str, Any], lux: Sequence[float]) -> str:
+def _crossing(rows: ByLight, ours: dict[str, Any], lux: Sequence[float]) -> str:
     """The illuminances between which the mean errors of camera and AirTouch cross, in words."""
     errors = [(v, rows["teed", v]["mean_abs_error_m"]) for v in lux if rows["teed", v]["mean_abs_error_m"] is not None]
     crossed = [f"between {a:g} and {b:g} lux" for (a, x), (b, y) in zip(errors, errors[1:], strict=False)

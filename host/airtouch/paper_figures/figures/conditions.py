@@ -1,5 +1,7 @@
 """Errors by height, approach angle and wind (labels Performance:1d and 1e, section 7.7)."""
 
+from typing import Any
+
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, simulated, words
@@ -9,92 +11,108 @@ from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 DETECTORS = ("best", "paper")
 HEIGHTS = ("paper-4cm", "paper-9cm", "paper-12cm")
 WINDS_MPS = CLAIMS["wind"].values
-STYLES = {"best": {"ls": "-"}, "paper": {"ls": "--"}}
+#: (detector, height, "simulated" or "recorded") -> scores of its flights
+Groups = dict[tuple[str, str, str], list[FlightScore]]
 
 
 def by_height(job: Job) -> Figure:
     """Performance:1d: simulated flights at the paper's 4, 9 and 12 cm, and the recorded heights where there are any."""
     count = 8 if job.quick else 40
-    groups: dict[tuple[str, str, str], list[FlightScore]] = {}
-    for scene in HEIGHTS:
-        job.tell(f"{scene}: {count} simulated flights")
-        for name in DETECTORS:
-            groups[name, scene.removeprefix("paper-"), "simulated"] = simulated.scores(simulated.flown(scene, count),
-                                                                                       name)
+    groups = _simulated_by_height(job, count)
     caption = (f"Simulated: {count} flights a height, the shipped networks, which were trained on recorded flights. ")
     try:
-        for name in DETECTORS:
-            some = recorded.scores(job, name)[0]
-            groups[name, "2.5 cm", "recorded"] = [s for s in some if s.condition.height == "low"]
-            groups[name, "7.5 to 8.5 cm", "recorded"] = [s for s in some if s.condition.height != "low"]
+        groups |= _recorded_by_height(job)
         caption += "Recorded: cross-validated by flight; heights are the down range over the platform."
     except Missing as missing:
         caption += f"Recorded flights are left out: {missing}."
-    groups = {key: some for key, some in groups.items() if some}
-    rows = {key: summary.summarise(some) for key, some in groups.items()}
+    groups = {key: scores for key, scores in groups.items() if scores}
+    rows = {key: summary.summarise(scores) for key, scores in groups.items()}
     table = [words.table_row(f"{n}, {h}", r, detector=n, height=h, flights_are=kind)
              for (n, h, kind), r in rows.items()]
+    return Figure("Errors by height", table, caption, _height_verdicts(rows, 2 * count),
+                  lambda canvas: _draw_heights(canvas, groups))
+
+
+def _simulated_by_height(job: Job, count: int) -> Groups:
+    groups: Groups = {}
+    for scene in HEIGHTS:
+        job.tell(f"{scene}: {count} simulated flights")
+        for name in DETECTORS:
+            scores = simulated.scores(simulated.flights(scene, count), name)
+            groups[name, scene.removeprefix("paper-"), "simulated"] = scores
+    return groups
+
+
+def _recorded_by_height(job: Job) -> Groups:
+    groups: Groups = {}
+    for name in DETECTORS:
+        scores = recorded.scores(job, name)[0]
+        groups[name, "2.5 cm", "recorded"] = [s for s in scores if s.condition.height == "low"]
+        groups[name, "7.5 to 8.5 cm", "recorded"] = [s for s in scores if s.condition.height != "low"]
+    return groups
+
+
+def _height_verdicts(rows: dict[tuple[str, str, str], dict[str, Any]], edges: int) -> dict[str, Verdict]:
+    """The claims on heights, by the share of edges within 0.05 m; edges: true ones at each simulated height."""
     hits = {key: (r["hit"]["0.05"], r["intervals"]["hit"]["0.05"]) for key, r in rows.items()}
 
-    def within(name: str, height: str) -> str:
-        return f"{name} {height} {words.percent(*hits[name, height, 'simulated'])}"
+    def within(*heights: str) -> str:
+        return "within 0.05 m, misses included: " + "; ".join(
+            f"{n} {h} {words.percent(*hits[n, h, 'simulated'])}" for n in DETECTORS for h in heights)
 
     low, high = CLAIMS["height-4cm"].values[0], CLAIMS["height-9cm"].values[0]
     near = hits["paper", "4cm", "simulated"]  # share and its interval
     far = [hits["paper", h, "simulated"] for h in ("9cm", "12cm")]
-    verdicts = {
-        "height-4cm": words.judged(near[1][1] >= low, "within 0.05 m, misses included: "
-                                   + "; ".join(within(n, "4cm") for n in DETECTORS) + f" (n = {2 * count} edges)"),
-        "height-9cm": words.judged(all(value <= high and value < near[1][0] for value, _ in far),
-                                   "within 0.05 m, misses included: "
-                                   + "; ".join(within(n, h) for n in DETECTORS for h in ("9cm", "12cm"))
-                                   + f" (n = {2 * count} edges each)")}
+    return {"height-4cm": words.judged(near[1][1] >= low, f"{within('4cm')} (n = {edges} edges)"),
+            "height-9cm": words.judged(all(value <= high and value < near[1][0] for value, _ in far),
+                                       f"{within('9cm', '12cm')} (n = {edges} edges each)")}
 
-    def draw(canvas):
-        for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
-            pictures.hit_curves(axes, {f"{h}, {kind}": some for (n, h, kind), some in groups.items() if n == name},
-                                legend=False)
-            if name == "paper":
-                axes.plot(0.05, low, "k*", ms=9)
-                axes.plot(0.05, high, "kv", ms=6)
-                axes.text(0.06, low, "paper: 4 cm", fontsize=7)
-                axes.text(0.06, high, "paper: 9 and 12 cm, at most", fontsize=7)
-            axes.set_title(name)
-        canvas.legend(*canvas.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7,
-                      frameon=False)
 
-    return Figure("Errors by height", table, caption, verdicts, draw)
+def _draw_heights(canvas: Any, groups: Groups) -> None:
+    for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
+        pictures.hit_curves(axes, {f"{h}, {kind}": scores for (n, h, kind), scores in groups.items() if n == name},
+                            legend=False)
+        if name == "paper":
+            low, high = CLAIMS["height-4cm"].values[0], CLAIMS["height-9cm"].values[0]
+            axes.plot(0.05, low, "k*", ms=9)
+            axes.plot(0.05, high, "kv", ms=6)
+            axes.text(0.06, low, "paper: 4 cm", fontsize=7)
+            axes.text(0.06, high, "paper: 9 and 12 cm, at most", fontsize=7)
+        axes.set_title(name)
+    canvas.legend(*canvas.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7,
+                  frameon=False)
 
 
 def by_angle(job: Job) -> Figure:
     """Performance:1e: recorded flights by approach angle."""
     scores = {name: recorded.scores(job, name)[0] for name in DETECTORS}
     table, rows = [], {}
-    for name, some in scores.items():
-        for angle in sorted({s.condition.angle_deg for s in some if s.condition.angle_deg is not None}):
-            group = [s for s in some if s.condition.angle_deg == angle and s.condition.height == "low"]
+    for name, flights in scores.items():
+        for angle in sorted({s.condition.angle_deg for s in flights if s.condition.angle_deg is not None}):
+            group = [s for s in flights if s.condition.angle_deg == angle and s.condition.height == "low"]
             if group:
                 rows[name, angle] = row = summary.summarise(group)
                 table.append(words.table_row(f"{name}, {angle:+.0f}°", row, detector=name, angle_deg=angle))
-    groups = {name: {size: [s for s in some if s.condition.height == "low"
+    groups = {name: {size: [s for s in flights if s.condition.height == "low"
                             and abs(s.condition.angle_deg or 0.0) == size]
                      for size in (0.0, 10.0, 20.0)}
-              for name, some in scores.items()}
-    steep = {name: {size: summary.summarise(some) for size, some in sizes.items()} for name, sizes in groups.items()}
+              for name, flights in scores.items()}
+    by_size = {name: {size: summary.summarise(group) for size, group in sizes.items()}
+               for name, sizes in groups.items()}
 
     def text(name: str) -> str:
         return f"{name}: " + ", ".join(f"{size:.0f}° {words.metres(r)} and {words.missed(r)}"
-                                       for size, r in steep[name].items() if r["edges"])
+                                       for size, r in by_size[name].items() if r["edges"])
 
     both = "; ".join(text(name) for name in reversed(DETECTORS))
-    verdicts = {"angle": words.judged(words.worse(steep["paper"][0.0], steep["paper"][20.0]), both),
+    verdicts = {"angle": words.judged(words.worse(by_size["paper"][0.0], by_size["paper"][20.0]), both),
                 "angle-sides": words.judged(*_sides(rows))}
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
                + recorded.sample_sentence(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
-            pictures.hit_curves(axes, {f"{size:.0f}°": some for size, some in groups[name].items()})
+            pictures.hit_curves(axes, {f"{size:.0f}°": group for size, group in groups[name].items()})
             axes.set_title(name)
 
     return Figure("Errors by approach angle", table, caption, verdicts, draw)
@@ -121,8 +139,8 @@ def wind(job: Job) -> Figure:
         job.tell(f"wind of {speed:g} m/s: {2 * count} simulated flights")
         flights = []
         for axis, half in (("x", slice(count)), ("y", slice(count, None))):
-            blown = (("wind", ((axis, -speed),)),) if speed else ()
-            flights += simulated.flown("paper-4cm", 2 * count, blown)[half]
+            effects = (("wind", ((axis, -speed),)),) if speed else ()
+            flights += simulated.flights("paper-4cm", 2 * count, effects)[half]
         for name in DETECTORS:
             rows[name, speed] = summary.summarise(simulated.scores(flights, name))
     table = [words.table_row(f"{n}, {v:g} m/s", r, detector=n, wind_mps=v) for (n, v), r in rows.items()]
@@ -140,9 +158,9 @@ def wind(job: Job) -> Figure:
     def draw(canvas):
         left, right = canvas.subplots(1, 2)
         for name in DETECTORS:
-            some = [rows[name, v] for v in WINDS_MPS]
+            by_speed = [rows[name, v] for v in WINDS_MPS]
             for axes, key, factor in ((left, "mean_abs_error_m", 1.0), (right, "missed", 100.0)):
-                pictures.curve(axes, WINDS_MPS, some, key, factor, pictures.colour(name), name)
+                pictures.curve(axes, WINDS_MPS, by_speed, key, factor, pictures.colour(name), name)
                 axes.set_xlabel("wind, m/s")
         left.set(ylabel="mean error of edges found, m", ylim=(0, None))
         right.set(ylabel="missed edges, %", ylim=(0, 100))

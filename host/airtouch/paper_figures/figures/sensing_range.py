@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from airtouch import vehicle as vehicles
 from airtouch.paper_figures import pictures, words
 from airtouch.paper_figures.claims import CLAIMS
-from airtouch.paper_figures.figure import Figure, Job
+from airtouch.paper_figures.figure import Figure, Job, Verdict
 from airtouch.simulation import effects
 from airtouch.simulation.effects.air.ground_effect import faded, thrust_ratio
 
@@ -69,58 +70,78 @@ def sensing_range(job: Job) -> Figure:
     """Section 8.1: heights at which the lift is THRESHOLD of the weight, and the lift at the paper's 3 m."""
     mass, span, propeller, claimed = CLAIMS["range"].values
     small = vehicles.load("crazyflie-2.1-flow")
-    craft = [("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
-             ("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
-             ("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
-    rows: list[dict[str, Any]] = []
-    for name, mass_kg, radius, arm in craft:
-        for source, curve in curves(radius, arm).items():
-            there = float(curve(np.array([claimed]))[0])
-            rows.append({"what": name, "curve": source, "mass_kg": mass_kg, "rotor_radius_m": radius,
-                         "range_m": reach(curve), "range_at_best_m": reach(curve, IDEAL),
-                         "lift_at_3_m_share": there, "lift_at_3_m_n": there * mass_kg * GRAVITY,
-                         "seconds_to_see_it": averaging_s(there)})
+    craft = [Craft("Crazyflie, 36 g, rotor 23.5 mm", small.mass_kg, small.rotor_radius_m, small.arm_m),
+             Craft("2.5 kg, 450 mm, propellers 100 mm across", mass, propeller / 2, span / 2),
+             Craft("2.5 kg, 450 mm, propellers 100 mm in radius", mass, propeller, span / 2)]
+    rows = [row for one in craft for row in _rows(one, claimed)]
     rows.append({"what": "frame of 67 g", "curve": "measured", "mass_kg": 0.067, "rotor_radius_m": None,
                  "range_m": reach(lambda h: measured(h, "frame-67g"))})
-    large = [r for r in rows if r["mass_kg"] == mass]
-    tiny = [r for r in rows if r["mass_kg"] == small.mass_kg]
-    small_reach_m = reach(lambda h: measured(h, SMALL))
-    verdicts = {
-        "range": words.judged(any(r["range_at_best_m"] >= claimed for r in large),
-                              f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(large):.2f} to "
-                              f"{most(large):.2f} m by three curves and two readings of the propeller's size; with "
-                              f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to "
-                              f"{max(r['range_at_best_m'] for r in large):.1f} m at most. At 3 m "
-                              f"{100 * max(r['lift_at_3_m_share'] for r in large):.2f} % of the weight is left at "
-                              "most. Nothing was flown"),
-        "range-small": words.judged(small_reach_m <= CLAIMS["range-small"].values[0],
-                                    f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at "
-                                    f"{small_reach_m:.3f} m of rotor height; published curves say {least(tiny):.3f} to "
-                                    f"{most(tiny):.3f} m")}
+    verdicts = {"range": _at_3_m([r for r in rows if r["mass_kg"] == mass], claimed),
+                "range-small": _small([r for r in rows if r["mass_kg"] == small.mass_kg])}
     caption = (f"Heights are of the rotor discs. The range is where the lift falls below {100 * THRESHOLD:.0f} % of "
                f"the weight. The force that thrust does not explain has a noise of {100 * NOISE:.1f} % rms at 100 Hz; "
                f"if it were white and nothing else, a mean over one second would show {100 * IDEAL:.2f} % at three "
                "sigma. Mass does not enter the curves: lift is a share of the weight, and the lengths are those of "
                "rotors and frame. The measured curve is scaled with the rotor, which nobody measured at 2.5 kg, and "
                "the published ones are used far beyond the heights at which they were fitted.")
+    return Figure("Sensing range of larger drones", rows, caption, verdicts,
+                  lambda canvas: _draw(canvas, craft, claimed))
 
-    def draw(canvas):
-        axes = canvas.subplots()
-        for (_, _, radius, arm), colour in zip(craft, pictures.COLOURS.values(), strict=False):
-            for (source, curve), style in zip(curves(radius, arm).items(), (":", "--", "-"), strict=True):
-                axes.loglog(HEIGHTS_M, 100 * np.maximum(curve(HEIGHTS_M), 1e-9), ls=style, color=colour, lw=1.1,
-                            label=f"rotor {1000 * radius:.4g} mm, {source}")
-        axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.MUTED,
-                    label="67 g frame, measured")
-        axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
-        axes.text(5.9, 100 * NOISE, "noise of the force", fontsize=7, va="bottom", ha="right")
-        axes.axvline(claimed, color=pictures.PAPER, ls="--", lw=1)
-        axes.text(claimed, 30, "paper: 3 m ", fontsize=7, ha="right")
-        axes.set(xlabel="height of the rotors over the ground, m", ylabel="lift gained, % of the weight",
-                 ylim=(1e-4, 60))
-        axes.legend(fontsize=5.5, frameon=False, loc="lower left")
 
-    return Figure("Sensing range of larger drones", rows, caption, verdicts, draw)
+@dataclass(frozen=True)
+class Craft:
+    """A quadrotor as far as the lift over a surface depends on it."""
+
+    name: str
+    mass_kg: float
+    radius_m: float  #: of a rotor
+    arm_m: float
+
+
+def _rows(craft: Craft, claimed_m: float) -> list[dict[str, Any]]:
+    """A row for each curve of lift: its range, and what is left of the lift at the claimed range."""
+    rows = []
+    for source, curve in curves(craft.radius_m, craft.arm_m).items():
+        lift = float(curve(np.array([claimed_m]))[0])
+        rows.append({"what": craft.name, "curve": source, "mass_kg": craft.mass_kg, "rotor_radius_m": craft.radius_m,
+                     "range_m": reach(curve), "range_at_best_m": reach(curve, IDEAL),
+                     "lift_at_3_m_share": lift, "lift_at_3_m_n": lift * craft.mass_kg * GRAVITY,
+                     "seconds_to_see_it": averaging_s(lift)})
+    return rows
+
+
+def _at_3_m(rows: list[dict[str, Any]], claimed_m: float) -> Verdict:
+    farthest = max(r["range_at_best_m"] for r in rows)
+    return words.judged(farthest >= claimed_m,
+                        f"lift of {100 * THRESHOLD:.0f} % of the weight up to {least(rows):.2f} to {most(rows):.2f} m "
+                        "by three curves and two readings of the propeller's size; with "
+                        f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to {farthest:.1f} m "
+                        f"at most. At 3 m {100 * max(r['lift_at_3_m_share'] for r in rows):.2f} % of the weight is "
+                        "left at most. Nothing was flown")
+
+
+def _small(rows: list[dict[str, Any]]) -> Verdict:
+    reach_m = reach(lambda h: measured(h, SMALL))
+    return words.judged(reach_m <= CLAIMS["range-small"].values[0],
+                        f"measured on 34 g (20 flights), the lift falls below {100 * THRESHOLD:.0f} % at {reach_m:.3f} "
+                        f"m of rotor height; published curves say {least(rows):.3f} to {most(rows):.3f} m")
+
+
+def _draw(canvas: Any, craft: list[Craft], claimed_m: float) -> None:
+    axes = canvas.subplots()
+    for one, colour in zip(craft, pictures.COLOURS.values(), strict=False):
+        for (source, curve), style in zip(curves(one.radius_m, one.arm_m).items(), (":", "--", "-"), strict=True):
+            axes.loglog(HEIGHTS_M, 100 * np.maximum(curve(HEIGHTS_M), 1e-9), ls=style, color=colour, lw=1.1,
+                        label=f"rotor {1000 * one.radius_m:.4g} mm, {source}")
+    axes.loglog(HEIGHTS_M, 100 * np.maximum(measured(HEIGHTS_M, "frame-67g"), 1e-9), color=pictures.MUTED,
+                label="67 g frame, measured")
+    axes.axhline(100 * NOISE, color=pictures.PAPER, ls="--", lw=0.8)
+    axes.text(5.9, 100 * NOISE, "noise of the force", fontsize=7, va="bottom", ha="right")
+    axes.axvline(claimed_m, color=pictures.PAPER, ls="--", lw=1)
+    axes.text(claimed_m, 30, "paper: 3 m ", fontsize=7, ha="right")
+    axes.set(xlabel="height of the rotors over the ground, m", ylabel="lift gained, % of the weight",
+             ylim=(1e-4, 60))
+    axes.legend(fontsize=5.5, frameon=False, loc="lower left")
 
 
 def averaging_s(lift: float, sigmas: float = 3.0, rate_hz: float = 100.0) -> float:

@@ -21,7 +21,7 @@ def heights(job: Job) -> Figure:
     """Performance:1a: the errors over platforms, edge by edge."""
     claim = CLAIMS["height-error"]
     scores = {name: recorded.scores(job, name)[0] for name in ("best", "paper")}
-    rows = {name: summary.summarise(some) for name, some in scores.items()}
+    rows = {name: summary.summarise(flights) for name, flights in scores.items()}
     verdict = words.judged(
         words.reaches(rows["paper"], claim.values[0]),
         f"paper's method {words.score(rows['paper'])}; best {words.score(rows['best'])}"

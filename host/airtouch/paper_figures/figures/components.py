@@ -14,12 +14,12 @@ from airtouch.paper_figures import pictures, recorded, words
 from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
 
-FEW = 10  #: training flights in the small training set, with which the paper says that its loss helps most
+FEW = 10  #: flights of the small training set, on which the paper says that its loss helps most
 EPOCHS, QUICK_EPOCHS = 6, 3
 
 
 @dataclass(frozen=True)
-class Few(Variant):
+class OnTenFlights(Variant):
     """A variant that is trained on FEW of its training flights, drawn by seed."""
 
     def fit(self, flights: Sequence[FlightLog], seed: int = 0, epochs: int = EPOCHS) -> VariantModel:
@@ -31,8 +31,8 @@ class Few(Variant):
 UNFILTERED = Variant(physical_filter=False)
 #: name -> variant, with the names of `airtouch ablate` for variants that it has
 LOSSES = {"with the loss": ("paper", Variant()), "without": ("no-df-loss", Variant(df_lambda=0.0)),
-          f"with, {FEW} flights": (f"few-{FEW}", Few()), f"without, {FEW} flights": (f"few-{FEW}-no-df-loss",
-                                                                                    Few(df_lambda=0.0))}
+          f"with, {FEW} flights": (f"few-{FEW}", OnTenFlights()), f"without, {FEW} flights": (f"few-{FEW}-no-df-loss",
+                                                                                    OnTenFlights(df_lambda=0.0))}
 RESOLUTIONS = {200: ("no-filter", UNFILTERED), 100: ("stft-100", replace(UNFILTERED, band_window=100)),
                50: ("stft-50", replace(UNFILTERED, band_window=50))}
 SIZES = {50: ("input-50", replace(UNFILTERED, rows=50)), 100: ("no-filter", UNFILTERED),
@@ -41,24 +41,25 @@ SIZES = {50: ("input-50", replace(UNFILTERED, rows=50)), 100: ("no-filter", UNFI
 
 def scores(job: Job, name: str, variant: Variant) -> tuple[list[FlightScore], list[dict[str, Any]]]:
     """Scores of a variant, one for each flight, and the entries of its folds."""
-    return recorded.varied(job, name, variant, {"epochs": QUICK_EPOCHS if job.quick else EPOCHS})
+    return recorded.variant_scores(job, name, variant, {"epochs": QUICK_EPOCHS if job.quick else EPOCHS})
 
 
 def df_loss(job: Job) -> Figure:
     """Performance:1g: trained with and without the disturbance-force loss, on all training flights and on ten."""
     recorded.files(job)
     scored = {what: scores(job, *variant) for what, variant in LOSSES.items()}
-    rows = {what: summary.summarise(some) for what, (some, _) in scored.items()}
+    rows = {what: summary.summarise(flights) for what, (flights, _) in scored.items()}
     epochs = {what: float(np.mean([f["parameters"]["converged_after_epochs"] for f in folds]))
               for what, (_, folds) in scored.items()}
     table = [words.table_row(what, r, epochs_to_converge=epochs[what]) for what, r in rows.items()]
-    pairs = list(zip(*[iter(LOSSES)] * 2, strict=True))
-    gains = {pair[0]: 1.0 - (rows[pair[0]]["mean_abs_error_m"] or np.nan)
-             / (rows[pair[1]]["mean_abs_error_m"] or np.nan)
-             for pair in pairs}
+    names = list(LOSSES)
+    pairs = list(zip(names[::2], names[1::2], strict=True))  # with the loss, without it
+    gains = {on: 1.0 - (rows[on]["mean_abs_error_m"] or np.nan) / (rows[off]["mean_abs_error_m"] or np.nan)
+             for on, off in pairs}
     text = "; ".join(f"{what} {words.metres(r)}, {words.missed(r)}" for what, r in rows.items())
-    helps = any(words.worse(rows[w], rows[wo]) and gains[w] >= 0.5 * CLAIMS["df-loss"].values[2] for w, wo in pairs)
-    sooner = [1.0 - epochs[w] / epochs[wo] for w, wo in pairs]
+    helps = any(words.worse(rows[on], rows[off]) and gains[on] >= 0.5 * CLAIMS["df-loss"].values[2]
+                for on, off in pairs)
+    sooner = [1.0 - epochs[on] / epochs[off] for on, off in pairs]
     verdicts = {
         "df-loss": words.judged(helps, f"{text}; error less by "
                                 + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
@@ -69,7 +70,7 @@ def df_loss(job: Job) -> Figure:
         verdicts["df-epochs"] = Verdict(UNTESTABLE, f"{QUICK_EPOCHS} epochs are too few to see; leave out --quick")
     caption = (f"{_caption(job, rows)} Lambda is 0.1; the paper does not say its own. Dashed: trained on {FEW} "
                "flights, where the paper expects most of it.")
-    groups = {what: some for what, (some, _) in scored.items()}
+    groups = {what: flights for what, (flights, _) in scored.items()}
     styles = {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
                                                else "paper"], "ls": "--" if "flights" in what else "-"}
               for what in scored}

@@ -13,7 +13,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import pictures, simulated, words
 from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Verdict
-from airtouch.paper_figures.overall import each_m, errors_m
+from airtouch.paper_figures.figures.overall import each_m, errors_m
 
 #: scenario -> the pair as the paper names it
 PAIRS = {"paper-mat-cement": "mat and cement", "paper-grass-cement": "artificial grass and cement",
@@ -46,15 +46,15 @@ def _pair_scores(quick: bool, tell: Callable[[str], None]) -> dict[tuple[str, st
 
 
 def _flights(scene: str, count: int, seed: int) -> list[FlightLog]:
-    return [simulated.labelled(log) for log in simulated.flown(scene, count, seed=seed)]
+    return [simulated.labelled(log) for log in simulated.flights(scene, count, seed=seed)]
 
 
 def overall(job: Job) -> Figure:
     """Performance:1b: the errors over all four pairs, edge by edge."""
     claim = CLAIMS["material-error"]
     scores = pair_scores(job)
-    whole = {name: [s for (n, _), some in scores.items() if n == name for s in some] for name in DETECTORS}
-    rows = {name: summary.summarise(some) for name, some in whole.items()}
+    whole = {name: [s for (n, _), flights in scores.items() if n == name for s in flights] for name in DETECTORS}
+    rows = {name: summary.summarise(flights) for name, flights in whole.items()}
     text = "; ".join(f"{n} {words.score(r)}" for n, r in reversed(rows.items()))
     return Figure("Errors at material interfaces", [words.table_row(n, r) for n, r in rows.items()], _caption(scores),
                   {"material-error": Verdict(UNTESTABLE, f"{CIRCULAR}; simulated: {text}")},
@@ -65,7 +65,7 @@ def overall(job: Job) -> Figure:
 def by_pair(job: Job) -> Figure:
     """Performance:1f: the errors of each pair."""
     scores = pair_scores(job)
-    rows = {key: summary.summarise(some) for key, some in scores.items()}
+    rows = {key: summary.summarise(flights) for key, flights in scores.items()}
     table = []
     for (name, scene), row in rows.items():
         errors = np.abs(errors_m(scores[name, scene]))

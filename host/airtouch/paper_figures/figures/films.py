@@ -1,6 +1,7 @@
 """Flights filmed by the rendered camera: crossings of camera, AirTouch and both, for the figures of the camera."""
 
 import json
+from dataclasses import dataclass
 from typing import Any
 
 from airtouch import extras
@@ -16,14 +17,20 @@ LUX, QUICK_LUX = (500.0, 100.0, 50.0, 20.0, 5.0), (100.0, 20.0)
 SIZE_LUX = 100.0  #: lux at which the smaller networks run too
 FILMS, QUICK_FILMS = (12, 24), (2, 4)  #: flights to choose thresholds and fusion on, flights to score; the paper has 20
 SEED = 31
-FELT = ("best", "paper")
+AIRTOUCH = ("best", "paper")  #: detectors beside the camera
 
 
-def everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dict[str, list]]:
-    """The films to score, (method, lux) -> crossings of each film, and detector -> crossings of each.
+@dataclass(frozen=True)
+class Crossings:
+    """The films to score, and the crossings that each sense detects in each of them, film by film."""
 
-    Results are stored in the work folder.
-    """
+    films: list[Any]
+    camera: dict[tuple[str, float], list]  #: (method, lux); "fusion" is of TEED's structure and `best`
+    airtouch: dict[str, list]  #: detector
+
+
+def crossings(job: Job) -> Crossings:
+    """All crossings of the figures of the camera. Those of the camera are stored in the work folder."""
     lacking = extras.lacking("vision")
     if lacking:
         raise Missing(f"the camera needs {', '.join(lacking)}: pip install 'airtouch[vision]'")
@@ -31,23 +38,24 @@ def everything(job: Job) -> tuple[list[Any], dict[tuple[str, float], list], dict
     from airtouch.vision.crossings import film
 
     training_count, scored_count = films_of(job)
-    made_of = weights.digest(repr((SCENE, SEED, simulated.SEED, Camera())))
+    settings = weights.digest(repr((SCENE, SEED, simulated.SEED, Camera())))
     job.tell(f"{training_count + scored_count} simulated flights, {SCENE}")
-    films = [film(log, SEED) for log in simulated.flown(SCENE, training_count + scored_count)]
-    trained, scored = films[:training_count], films[training_count:]
-    felt = {name: compare.felt(films, name) for name in FELT}
-    seen: dict[tuple[str, float], list] = {}
+    films = [film(log, SEED) for log in simulated.flights(SCENE, training_count + scored_count)]
+    training, scored = films[:training_count], films[training_count:]
+    airtouch = {name: compare.airtouch_crossings(films, name) for name in AIRTOUCH}
+    camera: dict[tuple[str, float], list] = {}
     for lux in lux_of(job):
-        found = _crossings(job, films, training_count, lux, f"{training_count}_{scored_count}_{lux:g}_{made_of}")
-        for way, some in found.items():
-            seen[way, lux] = compare.without_lag(some, compare.lag(trained, some[:training_count]))
-        how = compare.choose_fusion(trained, seen["teed", lux][:training_count], felt["best"][:training_count])
-        seen["fusion", lux] = [compare.fused(a, b, how) for a, b in zip(seen["teed", lux], felt["best"], strict=True)]
-    return (scored, {key: some[training_count:] for key, some in seen.items()},
-            {name: some[training_count:] for name, some in felt.items()})
+        by_method = _camera(job, films, training_count, lux, f"{training_count}_{scored_count}_{lux:g}_{settings}")
+        for method, by_film in by_method.items():
+            camera[method, lux] = compare.without_lag(by_film, compare.lag(training, by_film[:training_count]))
+        rule = compare.choose_fusion(training, camera["teed", lux][:training_count], airtouch["best"][:training_count])
+        camera["fusion", lux] = [compare.fused(a, b, rule)
+                                 for a, b in zip(camera["teed", lux], airtouch["best"], strict=True)]
+    return Crossings(scored, {key: by_film[training_count:] for key, by_film in camera.items()},
+                     {name: by_film[training_count:] for name, by_film in airtouch.items()})
 
 
-def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name: str) -> dict[str, list]:
+def _camera(job: Job, films: list[Any], training_count: int, lux: float, name: str) -> dict[str, list]:
     """Method -> crossings of each film at one illuminance, from the work folder if they are there.
 
     Each method has a threshold for each illuminance, because a camera knows its exposure.
@@ -62,12 +70,13 @@ def _crossings(job: Job, films: list[Any], training_count: int, lux: float, name
         sizes = weights.SIZES if lux == SIZE_LUX else ("teed",)
         mappers = {"classical": lines.classical, **{n: lines.learned(weights.load(n)[0]) for n in sizes}}
         stored = {}
-        for way, sights in compare.filmed(films, lux, mappers, SEED, job.tell).items():
+        for method, sights in compare.filmed(films, lux, mappers, SEED, job.tell).items():
             least = compare.threshold(films[:training_count], sights[:training_count])
-            stored[way] = [[d.sample for d in detections] for detections in compare.crossings(films, sights, least)]
+            stored[method] = [[d.sample for d in detections] for detections in compare.crossings(films, sights, least)]
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(json.dumps(stored).encode(), path, force=True)
-    return {way: [[Detection(s, "edge") for s in detections] for detections in some] for way, some in stored.items()}
+    return {method: [[Detection(s, "edge") for s in samples] for samples in by_film]
+            for method, by_film in stored.items()}
 
 
 def film_scores(films: list[Any], detections: list[Any]) -> list[FlightScore]:
