@@ -1,4 +1,4 @@
-"""By what a detector feels a high platform, and what simulated edges lack of it.
+"""By what a detector notices a high platform, and what simulated edges lack of it.
 
     python tools/high_edges.py FOLDER... --fold 0 --fold 1 --fold 2 --model MODEL.npz... [--twin FOLDER]
 
@@ -13,7 +13,7 @@ Prints tables of the flights over one platform, by class of height:
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,11 +39,12 @@ from airtouch.twin.recorded.features import CLASSES, height_class
 CHANNELS = NAMES[:-1]  #: without the empty one
 SPLIT_HZ = 3.0
 SETTLED, BEFORE = slice(30, -10), slice(-300, -40)  #: samples: over a platform from the entry on; before the entry
-AHEAD = 40  #: samples before the entry in which the platform is already felt
+AHEAD = 40  #: samples before the entry in which the platform acts already
 HOVER_S = 2.0  #: shortest hover of a flight in tables 2 and 3
 REPLACED = ("as flown", "before: hover", "platform: hover", "both: hover")
 COLUMNS = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "m1", "m2", "m3", "m4")
 RESPONSES = 60
+Groups = dict[str, list[tuple[FlightLog, Course]]]  #: class of height -> its flights
 
 
 def over(model: BestModel, values: np.ndarray, flown: Course) -> float:
@@ -125,11 +126,28 @@ def main() -> None:
     parser.add_argument("--twin", type=Path, help="folder of `airtouch twin`")
     options = parser.parse_args()
     models = [best.load(path) for path in options.model]
-    listed = [f for f in dataset.collect(options.folders) if not options.fold or f.condition.fold in options.fold]
+    groups = by_height([f for f in dataset.collect(options.folders)
+                        if not options.fold or f.condition.fold in options.fold])
+    hovers = {name: [(log, flown) for log, flown in group if length(flown.phases()["hover"]) > HOVER_S * RATE_HZ]
+              for name, group in groups.items()}
+    if models:
+        print_logits(head("over logit; muted", ["whole", *CHANNELS]), groups, models, muted)
+        print_logits(head("over logit; replaced", REPLACED), hovers, models, approach)
+    print(head("standard deviation, usual swings", CHANNELS))
+    for name, group in hovers.items():
+        pairs = [calm(log, flown) for log, flown in group]
+        for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):
+            print(row(f"{name}, {title}", len(part), np.median(part, axis=0).tolist(), "{:.2f}"), flush=True)
+    if options.twin:
+        print_responses(groups, options.twin)
+
+
+def by_height(listed: Sequence[dataset.FlightFile]) -> Groups:
+    """Logs and courses by class of height. Ends the program where a flight is not usable."""
     usable, left_out = adapt.readable(listed)
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
-    groups: dict[str, list[tuple[FlightLog, Course]]] = {name: [] for name in CLASSES}
+    groups: Groups = {name: [] for name in CLASSES}
     for flight in usable:
         try:
             flown = course(flight.log, 0.3)
@@ -138,41 +156,35 @@ def main() -> None:
         name = height_class(flown.clearance_m)
         if name:
             groups[name].append((flight.log, flown))
-    if models:
-        print(head("over logit; muted", ["whole", *CHANNELS]))
-        for name, some in groups.items():
-            found = [muted(log, flown, model) for log, flown in some for model in models
-                     if not training_set.contains(model.metadata, log)]
-            if found:
-                print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
-    hovers = {name: [(log, flown) for log, flown in some if length(flown.phases()["hover"]) > HOVER_S * RATE_HZ]
-              for name, some in groups.items()}
-    if models:
-        print(head("over logit; replaced", REPLACED))
-        for name, some in hovers.items():
-            found = [approach(log, flown, model) for log, flown in some for model in models
-                     if not training_set.contains(model.metadata, log)]
-            if found:
-                print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
-    print(head("standard deviation, usual swings", CHANNELS))
-    for name, some in hovers.items():
-        pairs = [calm(log, flown) for log, flown in some]
-        for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):
-            print(row(f"{name}, {title}", len(part), np.median(part, axis=0).tolist(), "{:.2f}"), flush=True)
-    if options.twin:
-        craft = vehicle.load(str(options.twin / files.VEHICLE))
-        laid = overlay.responses(scenario.load(options.twin / files.SCENARIO), craft, RESPONSES)
-        print(head("above 3 Hz, over the platform / before", COLUMNS))
-        for name, some in groups.items():
-            pairs = [shaking(overlay.values_of(log), flown.entry, flown.exit) for log, flown in some
-                     if flown.entry > -BEFORE.start]
-            added = [shaking(r.values, *(e.sample for e in r.edges))[1] for r in laid
-                     if height_class(r.edges[0].height_after_m) == name]
-            if pairs and added:
-                before, over = (np.median(part, axis=0) for part in zip(*pairs, strict=True))
-                print(row(f"{name}, recorded", len(pairs), np.sqrt(over / before).tolist(), "{:.1f}"))
-                both = np.sqrt((before + np.median(added, axis=0)) / before)
-                print(row(f"{name}, simulated", len(added), both.tolist(), "{:.1f}"), flush=True)
+    return groups
+
+
+def print_logits(title: str, groups: Groups, models: Sequence[BestModel],
+                 logits: Callable[[FlightLog, Course, BestModel], np.ndarray]) -> None:
+    """A table of median logits: each flight by the models that were not trained on it."""
+    print(title)
+    for name, group in groups.items():
+        found = [logits(log, flown, model) for log, flown in group for model in models
+                 if not training_set.contains(model.metadata, log)]
+        if found:
+            print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
+
+
+def print_responses(groups: Groups, twin: Path) -> None:
+    """The table of what a platform adds above SPLIT_HZ, recorded and by the twin's responses."""
+    craft = vehicle.load(str(twin / files.VEHICLE))
+    responses = overlay.responses(scenario.load(twin / files.SCENARIO), craft, RESPONSES)
+    print(head("above 3 Hz, over the platform / before", COLUMNS))
+    for name, group in groups.items():
+        pairs = [shaking(overlay.values_of(log), flown.entry, flown.exit) for log, flown in group
+                 if flown.entry > -BEFORE.start]
+        added = [shaking(r.values, *(e.sample for e in r.edges))[1] for r in responses
+                 if height_class(r.edges[0].height_after_m) == name]
+        if pairs and added:
+            before, over = (np.median(part, axis=0) for part in zip(*pairs, strict=True))
+            print(row(f"{name}, recorded", len(pairs), np.sqrt(over / before).tolist(), "{:.1f}"))
+            both = np.sqrt((before + np.median(added, axis=0)) / before)
+            print(row(f"{name}, simulated", len(added), both.tolist(), "{:.1f}"), flush=True)
 
 
 if __name__ == "__main__":

@@ -22,61 +22,79 @@ TYPES = {"acc.x": "float", "gyro.z": "float", "gyro.xRaw": "int16_t", "stateEsti
          "airtouch.prob": "float", "airtouch.edges": "uint16_t", "airtouch.health": "uint16_t"}
 
 
-def test_connect_tables_parameters_and_ten_seconds_at_100_hz(monkeypatch, tmp_path):
+@pytest.fixture
+def craft(monkeypatch, tmp_path):
+    """(virtual drone, cflib's Crazyflie connected to it), in still air."""
+    with simulated(monkeypatch, without=["gust"]) as virtual, connected(virtual.uri, str(tmp_path)) as cf:
+        yield virtual, cf
+
+
+def test_tables_have_the_firmwares_names_and_types(craft):
+    virtual, cf = craft
+    assert cf.platform.get_protocol_version() == 12
+    for name, kind in TYPES.items():
+        assert cf.log.toc.get_element_by_complete_name(name).ctype == kind, name
+    assert len(cf.log.toc.toc) == len({v.group for v in virtual.firmware.log.toc.items})
+    for name, value in {"deck.bcFlow2": 1, "deck.bcMultiranger": 1, "deck.bcAI": 1, "commander.enHighLevel": 0,
+                        "airtouch.detector": 1, "stabilizer.estimator": 2}.items():
+        assert int(cf.param.get_value(name)) == value, name
+
+
+def test_a_parameter_is_set_and_one_out_of_range_is_put_right_by_the_app(craft):
+    virtual, cf = craft
+    wait_for = virtual.clock.wait_for
+    cf.param.set_value("airtouch.pFa", 1e-3)
+    wait_for(lambda: abs(virtual.drone.app.values()["airtouch.pFa"] - 1e-3) < 1e-9)
+    cf.param.set_value("airtouch.detector", 200)
+    wait_for(lambda: cf.param.get_value("airtouch.detector") == "200")
+    cf.param.request_param_update("airtouch.detector")
+    wait_for(lambda: int(cf.param.get_value("airtouch.detector")) <= 4)
+    with pytest.raises(AttributeError):
+        cf.param.set_value("deck.bcAI", 0)
+
+
+def test_a_persistent_parameter_is_stored(craft):
+    virtual, cf = craft
+    assert cf.param.toc.get_element_by_complete_name("pm.lowVoltage").is_persistent()
+    states = []
+    cf.param.persistent_store("pm.lowVoltage", lambda name, ok: states.append(ok))
+    cf.param.persistent_get_state("pm.lowVoltage", lambda name, state: states.append(state))
+    virtual.clock.wait_for(lambda: len(states) == 2)
+    assert states[0] is True and states[1].is_stored
+
+
+def test_a_block_that_is_too_large_is_refused(craft):
     from cflib.crazyflie.log import LogConfig
 
-    with simulated(monkeypatch, without=["gust"]) as virtual, connected(virtual.uri, str(tmp_path)) as cf:
-        wait_for = virtual.clock.wait_for
-        assert cf.platform.get_protocol_version() == 12
-        for name, kind in TYPES.items():
-            assert cf.log.toc.get_element_by_complete_name(name).ctype == kind, name
-        assert len(cf.log.toc.toc) == len({v.group for v in virtual.firmware.log.toc.items})
-        for name, value in {"deck.bcFlow2": 1, "deck.bcMultiranger": 1, "deck.bcAI": 1,
-                            "commander.enHighLevel": 0, "airtouch.detector": 1,
-                            "stabilizer.estimator": 2}.items():
-            assert int(cf.param.get_value(name)) == value, name
-        # a parameter is set, and one out of range is put right by the app
-        cf.param.set_value("airtouch.pFa", 1e-3)
-        wait_for(lambda: abs(virtual.drone.app.values()["airtouch.pFa"] - 1e-3) < 1e-9)
-        cf.param.set_value("airtouch.detector", 200)
-        wait_for(lambda: cf.param.get_value("airtouch.detector") == "200")
-        cf.param.request_param_update("airtouch.detector")
-        wait_for(lambda: int(cf.param.get_value("airtouch.detector")) <= 4)
-        assert cf.param.toc.get_element_by_complete_name("pm.lowVoltage").is_persistent()
-        states = []
-        cf.param.persistent_store("pm.lowVoltage", lambda name, ok: states.append(ok))
-        cf.param.persistent_get_state("pm.lowVoltage", lambda name, state: states.append(state))
-        wait_for(lambda: len(states) == 2)
-        assert states[0] is True and states[1].is_stored
-        with pytest.raises(AttributeError):
-            cf.param.set_value("deck.bcAI", 0)
-        # a block that the drone refuses
-        refused = LogConfig("refused", 10)
-        for name in ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"):
-            refused.add_variable(name, "float")
-        cf.log.add_config(refused)
-        refused.variables += refused.variables[:1]
-        errors = []
-        refused.error_cb.add_callback(lambda block, text: errors.append(text))
-        refused.start()
-        assert wait_for(lambda: errors) == ["Block too large"]
-        refused.delete()
-        # ten seconds at 100 Hz, in flight, no sample lost
-        rows, slow = [], []
-        log_block(cf, "motion", 10, MOTION, rows)
-        log_block(cf, "state", 50, {"stateEstimate.z": "float", "sys.isFlying": "uint8_t"}, slow)
-        wait_for(lambda: rows)
-        cf.high_level_commander.takeoff(0.5, 1.5)
-        first = rows[0][0]
-        wait_for(lambda: rows[-1][0] - first >= 10000, 30.0)
-        cf.high_level_commander.land(0.0, 1.0)
-        stamps = np.array([stamp for stamp, _ in rows[:1001]])
-        assert (np.diff(stamps) == 10).all()
-        values = {name: np.array([row[name] for _, row in rows]) for name in MOTION}
-        assert np.mean(values["acc.z"][600:1000]) == pytest.approx(1.0, abs=0.03)
-        assert np.mean(values["motor.m1"][600:1000]) > 30000 and values["range.zrange"][900] > 350
-        assert any(row["sys.isFlying"] for _, row in slow)
-        wait_for(lambda: virtual.drone.height_over_floor < 0.03)
+    virtual, cf = craft
+    refused = LogConfig("refused", 10)
+    for name in ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"):
+        refused.add_variable(name, "float")
+    cf.log.add_config(refused)
+    refused.variables += refused.variables[:1]
+    errors = []
+    refused.error_cb.add_callback(lambda block, text: errors.append(text))
+    refused.start()
+    assert virtual.clock.wait_for(lambda: errors) == ["Block too large"]
+
+
+def test_ten_seconds_of_flight_at_100_hz_lose_no_sample(craft):
+    virtual, cf = craft
+    wait_for, rows, slow = virtual.clock.wait_for, [], []
+    log_block(cf, "motion", 10, MOTION, rows)
+    log_block(cf, "state", 50, {"stateEstimate.z": "float", "sys.isFlying": "uint8_t"}, slow)
+    wait_for(lambda: rows)
+    cf.high_level_commander.takeoff(0.5, 1.5)
+    first = rows[0][0]
+    wait_for(lambda: rows[-1][0] - first >= 10000, 30.0)
+    cf.high_level_commander.land(0.0, 1.0)
+    stamps = np.array([stamp for stamp, _ in rows[:1001]])
+    assert (np.diff(stamps) == 10).all()
+    values = {name: np.array([row[name] for _, row in rows]) for name in MOTION}
+    assert np.mean(values["acc.z"][600:1000]) == pytest.approx(1.0, abs=0.03)
+    assert np.mean(values["motor.m1"][600:1000]) > 30000 and values["range.zrange"][900] > 350
+    assert any(row["sys.isFlying"] for _, row in slow)
+    wait_for(lambda: virtual.drone.height_over_floor < 0.03)
 
 
 def test_clients_come_and_go(cflib, tmp_path):

@@ -16,7 +16,7 @@ from airtouch.kernels.app_core import EDGES
 from airtouch.simulation import loop
 from airtouch.simulation.firmware import setpoint
 from airtouch.simulation.flight import choose
-from airtouch.simulation.scenario import Scenario, draw_flight
+from airtouch.simulation.scenario import FlightPlan, Scenario, draw_flight
 from airtouch.vehicle import Vehicle
 from tools.emulate import plant as at
 from tools.emulate.board import FLY, Board
@@ -106,6 +106,28 @@ def sensor_block(readings: np.ndarray, rest: np.ndarray) -> bytes:
     return gyro.tobytes() + acc.tobytes() + struct.pack("<H", millimetres) + flow.tobytes()
 
 
+class _Radio:
+    """What reaches the board by radio: voltage and parameters, the command that arms, set-points."""
+
+    def __init__(self, board: Board, plan: FlightPlan, wait: int, arms: bool, parameters: Mapping[str, float]) -> None:
+        self._board, self._setpoints, self._wait, self._parameters = board, plan.setpoints, wait, parameters
+        self._arm_step = wait - int(ARM_S / at.STEP_S) if arms else -1
+
+    def send(self, step: int, volts: float) -> None:
+        """The packets of a step of the log."""
+        if step == self._arm_step:
+            self._board.say("L", crtp(SUPERVISOR, SUPERVISOR_COMMAND, ARM))
+        for packet in radio_packets(self._setpoints, volts, step, self._wait, self._parameters):
+            self._board.say("L", packet)
+
+
+def log_row(now_s: float, plant: Plant, values: Mapping[str, float]) -> list[float]:
+    """A row of Flown.table. values: of WATCHED."""
+    return [now_s, *plant.place, *(values[name] for name in MOTORS), *(values[name] for name in ESTIMATE),
+            values["range.zrange"] / 1000.0, plant.top, *plant.velocity, *plant.angles,
+            *(IMU_UNITS * [values[name] for name in IMU])]
+
+
 def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: int = 0, *, app: bool = True,
         whole_milliseconds: bool = False, parameters: Mapping[str, float] | None = None,
         blind_s: Sequence[tuple[float, float]] = ()) -> Flown:
@@ -116,52 +138,48 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
     """
     plan = draw_flight(scenario, seed, flight)
     plant = Plant(plan, vehicle, seed, flight, choose(plan))
-    found, rows, pwm, latencies = Flown(), [], [], []
-    plant.state["imu"]["gyro_rms"] *= REST
-    plant.state["imu"]["acc_rms"] *= REST
-    rest, wait = np.zeros(2), int(BOOT_S / at.STEP_S)
-    app_rows: list[dict[str, float]] = []
+    flown, rows, pwm, latencies = Flown(), [], [], []
+    rest, wait, edges = np.zeros(2), int(BOOT_S / at.STEP_S), 0
+    at_rest(plant, True)
     with Board(elf, FLY, WATCHED, app=app, whole_milliseconds=whole_milliseconds) as board:
-        board.on("S", lambda content: app_rows.append(board.values(content)))
+        radio = _Radio(board, plan, wait, vehicle.platform not in ARMS_ITSELF, parameters or {})
         board.go()
-        edges = 0
         for step in range(wait + len(plan.setpoints) * loop.LOG_STEPS):
-            values = board.values(board.hear("M"))
+            values, now = board.values(board.hear("M")), (step - wait) * at.STEP_S
             motors = np.array([values[name] for name in MOTORS])
             pwm.append(motors)
             if step > wait:
                 latencies.append(values["latency_us"])
             if step == wait:
-                plant.state["imu"]["gyro_rms"] /= REST
-                plant.state["imu"]["acc_rms"] /= REST
+                at_rest(plant, False)
             ending = plant.step(motors)
             if ending != loop.OK:
-                found.ending = f"{loop.ENDINGS[ending]} after {(step - wait) * at.STEP_S:.2f} s"
+                flown.ending = f"{loop.ENDINGS[ending]} after {now:.2f} s"
                 break
-            if any(begin <= (step - wait) * at.STEP_S < end for begin, end in blind_s):
+            if any(begin <= now < end for begin, end in blind_s):
                 plant.readings[at.RANGE] = np.nan
             board.say("I", sensor_block(plant.readings, rest))
-            now = (step - wait) * at.STEP_S
             if step % loop.LOG_STEPS == 0:
-                if step == wait - int(ARM_S / at.STEP_S) and vehicle.platform not in ARMS_ITSELF:
-                    board.say("L", crtp(SUPERVISOR, SUPERVISOR_COMMAND, ARM))
-                for packet in radio_packets(plan.setpoints, plant.readings[at.VOLTS], step, wait, parameters or {}):
-                    board.say("L", packet)
-                rows.append([now, *plant.place, *motors, *(values[n] for n in ESTIMATE),
-                             values["range.zrange"] / 1000.0, plant.top, *plant.velocity, *plant.angles,
-                             *(IMU_UNITS * [values[name] for name in IMU])])
+                radio.send(step, plant.readings[at.VOLTS])
+                rows.append(log_row(now, plant, values))
             if values["airtouch.edges"] > edges:
                 edges = int(values["airtouch.edges"])
-                found.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))
+                flown.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))
             board.go()
-        found.late, found.load_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
-        if found.ending == "ok":
+        flown.late, flown.load_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
+        if flown.ending == "ok":
             board.hear("M")
-            found.left = board.end()
-        found.console = board.console
-    found.table, found.pwm = np.array(rows), np.array(pwm, np.uint16)
-    found.latencies_us = np.array(latencies)
-    found.latency_us = int(found.latencies_us.max(initial=0))
-    if "Self test passed!" not in found.console:
-        raise AirTouchError("the firmware's self-test failed; the console said:\n" + found.console[-1000:])
-    return found
+            flown.left = board.end()
+        flown.console = board.console
+    flown.table, flown.pwm, flown.latencies_us = np.array(rows), np.array(pwm, np.uint16), np.array(latencies)
+    flown.latency_us = int(flown.latencies_us.max(initial=0))
+    if "Self test passed!" not in flown.console:
+        raise AirTouchError("the firmware's self-test failed; the console said:\n" + flown.console[-1000:])
+    return flown
+
+
+def at_rest(plant: Plant, begins: bool) -> None:
+    """Scale the IMU's noise down for the time on the floor, or back."""
+    for name in ("gyro_rms", "acc_rms"):
+        noise = plant.state["imu"][name]
+        plant.state["imu"][name] = noise * REST if begins else noise / REST

@@ -86,7 +86,7 @@ def mission(case: Case) -> Scenario:
 
 
 def delays(crossed: Sequence[tuple[float, str]], reported: Sequence[tuple[float, str]]) -> np.ndarray:
-    """Seconds by which reports follow the crossings (s, kind) they belong to: same kind, one to one, within MOST_DELAY_S."""
+    """Seconds by which reports follow their crossings (s, kind): of the same kind, one to one, within MOST_DELAY_S."""
     late = []
     for kind in ("entry", "exit"):
         true, said = ([t for t, k in edges if k == kind] for edges in (crossed, reported))

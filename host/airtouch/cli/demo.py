@@ -13,6 +13,7 @@ from airtouch.cli.shared.progress import Bar
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import demo_flights
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
@@ -64,19 +65,13 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     models = {name: fit(name, training, short.get(name, {})) for name in names}
 
     steps.say("Export: C sources for the GAP8")
-    for name in ("paper", "best"):
-        export(name, models[name], out)
+    export({name: models[name] for name in ("paper", "best")}, out / "model")
 
     steps.say("Detection on the held-out flights, through the C kernels and the C int8 network")
-    results: dict[str, list[evaluate.Result]] = {}
-    for name, model in models.items():
-        outcomes: list[evaluate.Result | AirTouchError] = []
-        _, failures = evaluate.evaluate(test, registry.get(name), model, outcomes.append)
-        results[name] = [r for r in outcomes if isinstance(r, evaluate.Result)]
-        left_out += [f for f in failures if f not in left_out]
+    results = {name: detect(name, model, test, left_out) for name, model in models.items()}
     if not results[names[0]]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
-    scored = score_report({name: [r.score for r in some] for name, some in results.items()},
+    scored = score_report({name: [r.score for r in of_detector] for name, of_detector in results.items()},
                           shown_flights(results, SHOWN))
     show.console().print(show.table(scored.summaries, where))
     for _, reason in left_out:
@@ -113,17 +108,26 @@ def fit(name: str, training: Sequence[Any], options: dict[str, Any]) -> Any:
         return registry.get(name).fit(training, progress=progress, **options)
 
 
+def detect(name: str, model: Any, flights: Sequence[FlightFile],
+           left_out: list[tuple[Any, str]]) -> list[evaluate.Result]:
+    """A detector's result on each flight; flights that cannot be scored are added to `left_out`, once."""
+    outcomes: list[evaluate.Result | AirTouchError] = []
+    _, failures = evaluate.evaluate(flights, registry.get(name), model, outcomes.append)
+    left_out += [f for f in failures if f not in left_out]
+    return [r for r in outcomes if isinstance(r, evaluate.Result)]
+
+
 def order(name: str) -> int:
     """The best detector first, the paper's baseline last."""
     return SCORED.index(name)
 
 
-def export(name: str, model: Any, out: Path) -> None:
-    """Write the model file, and the C sources generated from it, to `out`/model."""
+def export(models: dict[str, Any], folder: Path) -> None:
+    """Write the model files, and the C sources generated from them, to a folder."""
     from airtouch.detector.shared import export as gap8
 
-    folder = out / "model"
     folder.mkdir(exist_ok=True)
-    model.save(folder / f"{name}.npz", force=True)
-    written = gap8.export(model, folder, f"{name}.npz", force=True)
-    click.echo(f"  {folder}: {name}.npz, {', '.join(path.name for path in written)}")
+    for name, model in models.items():
+        model.save(folder / f"{name}.npz", force=True)
+        written = gap8.export(model, folder, f"{name}.npz", force=True)
+        click.echo(f"  {folder}: {name}.npz, {', '.join(path.name for path in written)}")

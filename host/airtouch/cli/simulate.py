@@ -1,8 +1,8 @@
 """`airtouch simulate`: fly a scenario many times and write the flight logs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from airtouch.simulation.flight import Diverged
 
 FLIGHTS_A_PROCESS = 10  #: least flights for each process
+SAID = 20  #: diverged flights that are named
 
 
 def _list_effects(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -59,8 +60,8 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
 @click.option("--list-scenarios", is_flag=True, is_eager=True, expose_value=False, callback=_list_scenarios,
               help="Every scenario that comes with the package, and exit.")
 def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[str, ...],
-            without: tuple[str, ...],
-            files: tuple[str, ...], seed: int, workers: int | None, dask: str | None, force: bool) -> None:
+            without: tuple[str, ...], files: tuple[str, ...], seed: int, workers: int | None, dask: str | None,
+            force: bool) -> None:
     """Fly SCENARIO (a built-in name or a .toml file) and write one log a flight.
 
     The vehicle's firmware flies, or the scenario's (firmware = "2026.08" or "authors-2024-01", range_module = "map",
@@ -84,8 +85,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     refuse_off(plan, without)
     choose(plan, pairs, without)
     request = {"scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)),
-               "vehicle": vars(craft),
-               "effects": pairs, "without": list(without), "seed": seed,
+               "vehicle": vars(craft), "effects": pairs, "without": list(without), "seed": seed,
                "effect_files": [store.digest(text) for text in plugins]}
     store.open_folder(out, request, force)
     todo = store.missing(out, scene.name, seed, flights)
@@ -94,8 +94,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     results: Iterator[FlightLog | Diverged] | Iterator[Diverged | None]
     if dask:
         client = cluster.connect(dask)
-        results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without,
-                                  seed=seed,
+        results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
                                   plugins=plugins)
     else:
         # starting a process takes 1 s, flying and writing a flight 0.1 s
@@ -104,16 +103,21 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
                               plugins=plugins, workers=most)
     _write(results, len(todo), out, scene.name)
     there = flights - len(store.missing(out, scene.name, seed, flights))
-    lost = [f for f in store.failures(out) if f["flight"] < flights]
+    diverged = [f for f in store.failures(out) if f["flight"] < flights]
     store.write_manifest(out, scene, seed, flights)
-    click.echo(f"{there - len(lost)} flights in {out}")
-    if lost:
-        for f in lost[:20]:
-            click.echo(f"airtouch: flight {f['flight']} of seed {f['seed']} diverged: {f['reason']} after "
-                       f"{f['time_s']:.2f} s; not written", err=True)
-        if len(lost) > 20:
-            click.echo(f"airtouch: and {len(lost) - 20} more, in {out / store.FAILED}", err=True)
+    click.echo(f"{there - len(diverged)} flights in {out}")
+    if diverged:
+        _say_diverged(diverged, out / store.FAILED)
         raise SystemExit(1)
+
+
+def _say_diverged(flights: Sequence[dict[str, Any]], record: Path) -> None:
+    """Say of each flight when and why it diverged, of the first SAID."""
+    for f in flights[:SAID]:
+        click.echo(f"airtouch: flight {f['flight']} of seed {f['seed']} diverged: {f['reason']} after "
+                   f"{f['time_s']:.2f} s; not written", err=True)
+    if len(flights) > SAID:
+        click.echo(f"airtouch: and {len(flights) - SAID} more, in {record}", err=True)
 
 
 def _write(results, count: int, out: Path, name: str) -> None:

@@ -3,6 +3,7 @@
 import shlex
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -65,14 +66,7 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     if twin_folder and vehicle:
         raise AirTouchError("--twin has a vehicle of its own; leave --vehicle out")
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
-    files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
-    with Bar("reading") as bar:
-        usable, left_out = adapt.readable(files, progress=bar)
-    for _, reason in left_out:
-        click.echo(f"airtouch: {reason}", err=True)
-    if not usable:
-        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, with "
-                            "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
+    usable = _read([f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds])
     labelled = [f for f in usable if f.labelled]
     work = out.with_suffix(".adapt")
     twin = calibrate.of_folder(twin_folder) if twin_folder else calibrate.of_flights(
@@ -87,6 +81,20 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     adapted.model.save(out, force)
     _say(adapted, adapt, summary, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
+
+
+def _read(files: Sequence[Any]) -> list[Any]:
+    """The flights that can be trained on; says why the others cannot. Raises AirTouchError where none can."""
+    from airtouch.twin import adapt
+
+    with Bar("reading") as bar:
+        usable, left_out = adapt.readable(files, progress=bar)
+    for _, reason in left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    if not usable:
+        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, with "
+                            "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
+    return usable
 
 
 def _say(adapted: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) -> None:
@@ -118,8 +126,8 @@ def in_words(table: dict[str, Any]) -> str:
         if table[name] is None:
             return "-"
         ends = table["intervals"].get(name)
-        said = format(scale * table[name], form)
-        return said + (f" ({format(scale * ends[0], form)} to {format(scale * ends[1], form)})" if ends else "")
+        value = format(scale * table[name], form)
+        return value + (f" ({format(scale * ends[0], form)} to {format(scale * ends[1], form)})" if ends else "")
 
     return (f"error {cell('mean_abs_error_m', 1, '.3f')} m, missed {cell('missed', 100, '.1f')} %, false "
             f"{cell('false_per_minute', 1, '.2f')} a minute; {table['flights']} flights, {table['edges']} edges, "

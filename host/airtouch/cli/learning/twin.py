@@ -3,6 +3,7 @@
 import json
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import count
 from pathlib import Path
@@ -57,18 +58,14 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     from airtouch import vehicle as vehicles
     from airtouch.report import twin_report
     from airtouch.twin import files
-    from airtouch.twin.comparison import compare, words
+    from airtouch.twin.comparison import compare
     from airtouch.twin.comparison.curves import curves
     from airtouch.twin.fitting import calibrate, levers
-    from airtouch.twin.recorded import flights as recordings
 
     make_folder(out)
     _check_free(out / calibrate.FIT, resume, force)
     craft = vehicles.load(vehicle)
-    with Bar("reading") as bar:
-        recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
-    for _, reason in recorded.left_out:
-        click.echo(f"airtouch: {reason}", err=True)
+    recorded = _read(flights, speed, folds)
     fitted = calibrate.calibrate(recorded, craft, out, rounds=rounds, flights=batch, seed=seed, workers=workers,
                                  bar=Bar)
     with Bar("flying the twin") as bar:
@@ -83,8 +80,28 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
     twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flown), fitted.levers,
                              fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
-    click.echo(f"{len(recorded.courses)} flights; misfit in scatters: "
-               f"{calibrate.in_words(fitted.history[0]['misfit'])} -> {calibrate.in_words(comparison.misfit)}")
+    _say(comparison, len(recorded.courses), fitted.history[0]["misfit"])
+    click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
+
+
+def _read(flights: Sequence[Path], speed: float | None, folds: Sequence[int]) -> Any:
+    """The recorded flights; says why others were left out."""
+    from airtouch.twin.recorded import flights as recordings
+
+    with Bar("reading") as bar:
+        recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
+    for _, reason in recorded.left_out:
+        click.echo(f"airtouch: {reason}", err=True)
+    return recorded
+
+
+def _say(comparison: Any, flights: int, first_misfit: Any) -> None:
+    """Print how far the fit came, how well a classifier tells twin and drone apart, and what differs most."""
+    from airtouch.twin.comparison import words
+    from airtouch.twin.fitting import calibrate
+
+    click.echo(f"{flights} flights; misfit in scatters: "
+               f"{calibrate.in_words(first_misfit)} -> {calibrate.in_words(comparison.misfit)}")
     for a in comparison.auroc:
         click.echo(f"{a.phase:7} AUROC {a.value:.3f} ({a.low:.3f} to {a.high:.3f}), {a.real_flights} flights, "
                    f"{a.windows} windows; tells: {a.telling[0]}")
@@ -92,7 +109,6 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     for gap in comparison.gaps[:5]:
         where, what, difference, scatters, n = words.gap_row(gap)
         click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
-    click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 
 
 def _check_free(fit_file: Path, resume: bool, force: bool) -> None:
