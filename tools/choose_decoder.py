@@ -140,8 +140,8 @@ def main() -> None:
         lag = lag_of([found[choice][k] for k in others])
         nested += [score(flight, tried[choice], lag) for flight in flights if flight.fold == fold]
     result = evaluate.as_json("best", nested, [], lag_of(found[winner]), asdict(tried[winner]))
-    show_scores.console().print(show_scores.table({"best": result, **result["by_height"]},
-                                                  "each fold with the settings best on the others"))
+    show_scores.print_table(show_scores.console(), {"best": result, **result["by_height"]},
+                            "each fold with the settings best on the others")
     if options.json:
         show_scores.write_json(options.json, result, force=True)
 

@@ -87,10 +87,10 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
     from airtouch.detector import registry
     from airtouch.detector.evaluation import evaluate as scoring
 
-    chosen, log = registry.get(detector), read(flight)
-    scoring.check(log, scoring.spare_of(chosen))
-    trained = chosen.load(Path(model) if model else None)
-    return chosen.run(log, chosen.model_for(trained, log) if hasattr(chosen, "model_for") else trained)
+    module, log = registry.get(detector), read(flight)
+    scoring.check(log, scoring.spare_of(module))
+    trained = module.load(Path(model) if model else None)
+    return module.run(log, module.model_for(trained, log) if hasattr(module, "model_for") else trained)
 
 
 def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = "best", *,
@@ -107,19 +107,19 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 
-    chosen, inputs = registry.get(detector), _several(flights)
-    trained = chosen.load(Path(model) if model else None)
+    module, inputs = registry.get(detector), _several(flights)
+    trained = module.load(Path(model) if model else None)
     paths = [f for f in inputs if isinstance(f, (str, Path))]
-    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), chosen, trained) if paths else ([], [])
+    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
         speed = speed_mps or _flown_speed(log)
-        scoring.check(log, scoring.spare_of(chosen))
+        scoring.check(log, scoring.spare_of(module))
         if scoring.truth(log) and speed is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
         file = FlightFile(Path(log.source), Condition(speed_mps=speed))
-        scores.append(scoring.evaluate_flight(file, log, chosen, trained).score)
+        scores.append(scoring.evaluate_flight(file, log, module, trained).score)
     name = detector if isinstance(detector, str) else getattr(detector, "__name__", type(detector).__name__)
-    return scoring.as_json(name, scores, left_out, chosen.lag_s(trained), chosen.parameters(trained))
+    return scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
 
 
 def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "Vehicle | str | Path | None" = None,
@@ -133,12 +133,12 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
 
-    chosen = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
-    flown = list(batch.flights(scenario, flights, vehicle=vehicle, effects=chosen, without=without, seed=seed))
-    lost = [f for f in flown if isinstance(f, Diverged)]
+    pairs = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
+    logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=pairs, without=without, seed=seed))
+    lost = [f for f in logs if isinstance(f, Diverged)]
     if lost:
         raise AirTouchError(f"{len(lost)} of {flights} flights diverged; the first: {lost[0]}")
-    return [f for f in flown if isinstance(f, FlightLog)]
+    return [f for f in logs if isinstance(f, FlightLog)]
 
 
 def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,

@@ -11,7 +11,7 @@ class AirTouchError(ValueError):
     """
 
 
-def shown(text: str, most: int = 40) -> str:
+def printable(text: str, most: int = 40) -> str:
     """At most `most` characters of a text from a file, with unprintable ones as escapes."""
     short = text if len(text) <= most else text[:most - 3] + "..."
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in short)
@@ -22,3 +22,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
     folded = {k.lower(): k for k in known}
     close = [folded[k] for k in difflib.get_close_matches(name.lower(), folded, 3)]
     return f"; did you mean {' or '.join(close)}?" if close else ""
+
+
+def unknown(what: str, name: str, known: Iterable[str], more: str = "") -> AirTouchError:
+    """The error for a name that is none of the known ones. more: what else may be given, as ", or a .toml file"."""
+    known = list(known)
+    return AirTouchError(f"no {what} {name!r}{nearest(name, known)} (known: {', '.join(known)}{more})")

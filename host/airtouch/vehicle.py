@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import AirTouchError, unknown
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,7 @@ def load(name_or_path: str | Path = "crazyflie-2.1-flow") -> Vehicle:
         file = folder / f"{name_or_path}.toml"
         if not file.is_file():
             known = sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
-            raise AirTouchError(f"no vehicle {str(name_or_path)!r}{nearest(str(name_or_path), known)}; "
-                                f"known: {', '.join(known)}, or a .toml file")
+            raise unknown("vehicle", str(name_or_path), known, ", or a .toml file")
         text = file.read_text(encoding="utf-8")
     return parse(text, str(name_or_path))
 

@@ -1,5 +1,7 @@
 """What a new user types first, wrong and right: suggestions, checks before the work, what a score must pass on."""
 
+import re
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -11,7 +13,7 @@ from airtouch.crazyflie import manifest, mission
 from airtouch.crazyflie.view import board
 from airtouch.detector import registry
 from airtouch.detector.shared import sensors
-from airtouch.errors import AirTouchError
+from airtouch.errors import AirTouchError, unknown
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from airtouch.report import figures
@@ -38,7 +40,7 @@ def test_a_mistyped_mission_gets_the_nearest():
 
 
 @pytest.mark.parametrize(("call", "typed", "said"), [
-    (scenario.load, "zig-zag", "no scenario 'zig-zag'; did you mean zigzag?"),
+    (scenario.load, "zig-zag", "no scenario 'zig-zag'; did you mean zigzag"),
     (vehicle.load, "crazyflie-21", "no vehicle 'crazyflie-21'; did you mean crazyflie-2.1"),
     (registry.get, "papr", "no detector 'papr'; did you mean paper"),
     (faults.parse, "los=0.3", "no fault 'los'; did you mean loss"),
@@ -47,7 +49,12 @@ def test_a_mistyped_mission_gets_the_nearest():
 def test_a_mistyped_name_gets_the_nearest(call, typed, said):
     with pytest.raises(AirTouchError) as error:
         call(typed)
-    assert str(error.value).startswith(said) and "\n" not in str(error.value)
+    assert re.fullmatch(re.escape(said) + r".*\? \(known: .+\)", str(error.value))
+
+
+def test_a_name_like_no_other_gets_all_of_them():
+    assert str(unknown("sensor", "xyz", ("rates", "motors"), ", or none")) == \
+        "no sensor 'xyz' (known: rates, motors, or none)"
 
 
 def test_every_ready_mission_is_a_world_of_the_virtual_drone_with_an_edge_on_its_way():
@@ -66,6 +73,11 @@ def test_an_output_that_cannot_be_written_is_told_before_the_work(generated, tmp
         assert shown.exit_code != 0
         said = f"{shown.exception} {shown.output}"
         assert any(t in said for t in ("cannot be made", "is a folder", "is a directory")), said
+
+
+def test_a_folder_is_no_flight_to_map(generated, tmp_path):
+    shown = run("map", generated, "--out", tmp_path / "map.geojson")
+    assert isinstance(shown.exception, AirTouchError) and "a folder; a map is of one flight" in str(shown.exception)
 
 
 def test_a_manifest_is_no_flight(generated):

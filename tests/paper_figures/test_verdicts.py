@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Canvas
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.paper_figures import recorded, simulated
-from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, UNTESTABLE, of
+from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, UNTESTABLE, of_figure
 from airtouch.paper_figures.figure import Job, table_csv
 from airtouch.paper_figures.figures import components, conditions, films, materials, overall, resources, sizes, vision
 
@@ -98,7 +98,7 @@ def test_materials_are_shown_and_never_judged(job, monkeypatch):
     monkeypatch.setattr(materials, "pair_scores", lambda _: found)
     assert verdict(materials.overall(job), "material-error") == UNTESTABLE
     figure = materials.by_pair(job)
-    assert {verdict(figure, claim) for claim in of("fig8f")} == {UNTESTABLE}
+    assert {verdict(figure, claim) for claim in of_figure("fig8f")} == {UNTESTABLE}
     assert figure.rows[0]["median_error_m"] == pytest.approx(0.05, rel=0.1)
 
 
@@ -199,7 +199,7 @@ def crossings(monkeypatch, camera_m, airtouch_m):
 def test_light_as_in_the_paper(job, monkeypatch):
     crossings(monkeypatch, lambda way, lux: 0.012 if lux >= 100 else 0.06, 0.033)
     figure = vision.light(job)
-    assert {verdict(figure, claim) for claim in of("fig11b")} == {REPRODUCED}
+    assert {verdict(figure, claim) for claim in of_figure("fig11b")} == {REPRODUCED}
     assert "cross between 100 and 50 lux" in figure.verdicts["light-dark"].evidence
 
 

@@ -11,21 +11,21 @@ def gains(p=0.0, i=0.0, d=0.0, integral_limit=0.0, output_limit=0.0):
     return np.array([(p, i, d, integral_limit, output_limit)], GAINS)[0]
 
 
-def outputs(of, how, pairs):
+def outputs(of, options, pairs):
     """What the loop gives for (desired, measured), one after the other."""
     state = np.zeros(1, pid.STATE)
     pid.reset(state[0], pairs[0][1])
-    return [pid.run(of, state[0], how, float(desired), float(measured)) for desired, measured in pairs]
+    return [pid.run(of, state[0], options, float(desired), float(measured)) for desired, measured in pairs]
 
 
-LEVEL = pid.How(dt=0.01, scale=1.0, on_error=False, turns=False)
+LEVEL = pid.Options(dt=0.01, scale=1.0, on_error=False, turns=False)
 
 
 def test_a_proportional_loop_under_an_integrator_settles_as_an_exponential():
     """x' = p (1 - x): x(t) = 1 - exp(-p t)."""
-    of, state, x, how = gains(p=3.0), np.zeros(1, pid.STATE), 0.0, pid.How(1e-4, 1.0, False, False)
+    of, state, x, options = gains(p=3.0), np.zeros(1, pid.STATE), 0.0, pid.Options(1e-4, 1.0, False, False)
     for _ in range(5000):
-        x += 1e-4 * pid.run(of, state[0], how, 1.0, x)
+        x += 1e-4 * pid.run(of, state[0], options, 1.0, x)
     assert x == pytest.approx(1.0 - np.exp(-1.5), abs=1e-4)
 
 
@@ -45,14 +45,14 @@ def test_a_step_of_the_set_point_kicks_the_derivative_of_the_error_alone():
 
 
 def test_angles_take_the_shorter_way_round():
-    how = LEVEL._replace(turns=True)
-    assert outputs(gains(p=1.0), how, [(170.0, -170.0)]) == pytest.approx([-20.0])
-    assert outputs(gains(p=1.0), how, [(-170.0, 170.0)]) == pytest.approx([20.0])
+    options = LEVEL._replace(turns=True)
+    assert outputs(gains(p=1.0), options, [(170.0, -170.0)]) == pytest.approx([-20.0])
+    assert outputs(gains(p=1.0), options, [(-170.0, 170.0)]) == pytest.approx([20.0])
     # the measurement passes the turn: 4 degrees further, not 356 back
-    assert outputs(gains(d=1.0), how, [(0.0, 178.0), (0.0, -178.0)])[1] == pytest.approx(-4.0 / 0.01)
+    assert outputs(gains(d=1.0), options, [(0.0, 178.0), (0.0, -178.0)])[1] == pytest.approx(-4.0 / 0.01)
 
 
 def test_scale_multiplies_all_gains_and_the_output_ends_at_its_limit():
-    how = LEVEL._replace(scale=3.0)
-    assert outputs(gains(p=2.0, i=100.0), how, [(1.0, 0.0)]) == pytest.approx([3.0 * (2.0 + 1.0)])
-    assert outputs(gains(p=2.0, output_limit=1.5), how, [(1.0, 0.0), (-1.0, 0.0)]) == pytest.approx([1.5, -1.5])
+    options = LEVEL._replace(scale=3.0)
+    assert outputs(gains(p=2.0, i=100.0), options, [(1.0, 0.0)]) == pytest.approx([3.0 * (2.0 + 1.0)])
+    assert outputs(gains(p=2.0, output_limit=1.5), options, [(1.0, 0.0), (-1.0, 0.0)]) == pytest.approx([1.5, -1.5])

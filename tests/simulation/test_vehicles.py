@@ -78,7 +78,7 @@ step = [{ do = "take-off", height_m = 0.5 }, { do = "hover", time_s = 1.0 }]
 def test_a_scenario_may_change_fields_of_the_vehicle():
     given = "range_module = 'none'\n[vehicle]\nmass_kg = { low = 0.03, high = 0.05 }\nflow_noise_mps = [0.01, 0.02]\n"
     scene = scenario.parse(given + LEVEL, "mine.toml")
-    drawn = [scenario.draw_flight(scene, 0, i).flown_by(vehicles.load()) for i in range(20)]
+    drawn = [scenario.draw_flight(scene, 0, i).with_changes(vehicles.load()) for i in range(20)]
     assert all(0.03 <= v.mass_kg <= 0.05 for v in drawn) and len({v.mass_kg for v in drawn}) == 20
     assert {(v.flow_noise_mps, v.range_module, v.name) for v in drawn} == {((0.01, 0.02), "none", "crazyflie-2.1-flow")}
 

@@ -16,7 +16,7 @@ from simulated_link import simulated
 
 
 @pytest.mark.parametrize("text, fault", [
-    ("loss=0.3", Fault("loss", amount=0.3)), ("loss=0.3,all", Fault("loss", amount=0.3, everything=True)),
+    ("loss=0.3", Fault("loss", amount=0.3)), ("loss=0.3,all", Fault("loss", amount=0.3, all_packets=True)),
     ("late=50ms", Fault("late", amount=0.05)), ("disconnect=3,5s", Fault("disconnect", 3.0, 5.0)),
     ("gap8-reset=2.5s", Fault("gap8-reset", 2.5)), ("low-battery=start", Fault("low-battery"))])
 def test_written_faults(text, fault):

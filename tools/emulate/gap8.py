@@ -101,7 +101,7 @@ def _follow(found: Linked, made: list[_Step], sent: list[bytes]) -> None:
             found.edges.append((i, kind))
         compare(found, i, step.values, desktop_values(core))
         after = made[min(i + 1, len(made) - 1)].values
-        wanted += core.packets(taken=after["airtouch.dropped"] == step.values["airtouch.dropped"])
+        wanted += core.packets(accepted=after["airtouch.dropped"] == step.values["airtouch.dropped"])
     found.packets = len(sent)
     found.other_packets = sum(one != other for one, other in zip(sent, wanted, strict=False))
     found.kept_packets = len(wanted) - len(sent)

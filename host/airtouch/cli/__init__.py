@@ -9,38 +9,53 @@ import click
 from airtouch import __version__
 from airtouch.errors import AirTouchError, nearest
 
-#: command -> (module in this package, one line of help)
-COMMANDS = {
-    "logs": ("logs", "Look at, convert and check flight logs."),
-    "train": ("learning.train", "Train a detector on recorded flights."),
-    "export": ("learning.export", "Write a trained network, or a vehicle, as C for the drone."),
-    "evaluate": ("evaluate", "Score a detector on flights with known edges."),
-    "crossval": ("learning.crossval", "Cross-validate a detector by flight."),
-    "ablate": ("learning.ablate", "Find what each part of the detectors is worth."),
-    "paper": ("paper", "Make the paper's tables and figures again, beside its own."),
-    "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
-    "simulate": ("simulate", "Fly a scenario in the simulator and write flight logs."),
-    "collect": ("drone.collect", "Fly a mission with a Crazyflie and log it."),
-    "monitor": ("drone.monitor", "Watch a Crazyflie live: signals, probability, edges."),
-    "replay": ("drone.replay", "Show a recorded flight as it would look live."),
-    "flash": ("drone.flash", "Check a firmware image and flash it."),
-    "sitl": ("drone.sitl", "Fly without a drone: a virtual Crazyflie that cflib connects to."),
-    "twin": ("learning.twin", "Fit the simulator to recorded flights of one drone."),
-    "adapt": ("learning.adapt", "Train a detector for the drone that flew some flights."),
-    "gap": ("gap", "Diagnose the gap between real flights and the simulator."),
-    "dataset": ("dataset", "Fetch the authors' public flights."),
-    "demo": ("demo", "Run the whole pipeline and write an HTML report."),
+#: heading -> command -> (module in this package, one line of help)
+SECTIONS = {
+    "First": {
+        "demo": ("demo", "Train, detect and report once: the whole pipeline in two minutes."),
+        "gap": ("gap", "Diagnose the gap between real flights and the simulator (`gap demo`: half a minute)."),
+    },
+    "Flights": {
+        "logs": ("logs", "Look at, convert and check flight logs."),
+        "dataset": ("dataset", "Fetch the authors' public flights."),
+        "simulate": ("simulate", "Fly a scenario in the simulator and write flight logs."),
+    },
+    "Detectors": {
+        "evaluate": ("evaluate", "Score a detector on flights with known edges."),
+        "map": ("map", "Map the edges of a flight: plot and GeoJSON."),
+        "train": ("learning.train", "Train a detector on recorded flights."),
+        "adapt": ("learning.adapt", "Train a detector for the drone that flew some flights."),
+        "twin": ("learning.twin", "Fit the simulator to recorded flights of one drone."),
+        "crossval": ("learning.crossval", "Cross-validate a detector by flight."),
+        "ablate": ("learning.ablate", "Find what each part of the detectors is worth."),
+        "paper": ("paper", "Make the paper's tables and figures again, beside its own."),
+        "export": ("learning.export", "Write a trained network, or a vehicle, as C for the drone."),
+    },
+    "Drone": {
+        "sitl": ("drone.sitl", "Fly without a drone: a virtual Crazyflie that cflib connects to."),
+        "collect": ("drone.collect", "Fly a mission with a Crazyflie and log it."),
+        "monitor": ("drone.monitor", "Watch a Crazyflie live: signals, probability, edges."),
+        "replay": ("drone.replay", "Show a recorded flight as it would look live."),
+        "flash": ("drone.flash", "Check a firmware image and flash it."),
+    },
 }
+COMMANDS = {name: command for section in SECTIONS.values() for name, command in section.items()}
 
 
 class Suggesting(click.Group):
-    """A group of commands that suggests similar names for an unknown command."""
+    """A group of commands: it says in a whole line what each does, and suggests similar names for an unknown one."""
 
     def resolve_command(self, ctx: click.Context,
                         args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
-            ctx.fail(f"No such command {args[0]!r}{nearest(args[0], self.list_commands(ctx))}.")
+            ctx.fail(f"No such command {args[0]!r}{nearest(args[0], self.list_commands(ctx)) or '.'}")
         return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.get_short_help_str(limit=200)) for name, command in commands.items()
+                                if command is not None])
 
 
 class LazyGroup(Suggesting):
@@ -56,8 +71,10 @@ class LazyGroup(Suggesting):
         return module.command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+        width = max(len(name) for name in COMMANDS)  # not map: that is a module of this package
+        for heading, commands in SECTIONS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), text) for name, (_, text) in commands.items()])
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -65,7 +82,7 @@ class LazyGroup(Suggesting):
 def airtouch() -> None:
     """AirTouch detects edges below a nano-quadcopter, and finds what a simulator of it gets wrong.
 
-    Start with `airtouch demo`, or `airtouch logs info FLIGHT.csv`.
+    Start with `airtouch gap demo` or `airtouch demo`; with flights of your own, with `airtouch logs info FLIGHT.csv`.
     """
 
 

@@ -9,6 +9,7 @@ import click
 
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.progress import Bar
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
@@ -25,7 +26,9 @@ SHOWN = 4  #: flights plotted in the report
 COMPILES = "the first time compiles the simulator, which takes a minute"
 
 
-@click.command(name="demo")
+@click.command(name="demo", epilog=examples(
+    "airtouch demo",
+    "airtouch demo --flights my-flights --out out/mine"))
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/demo"), show_default=True,
               help="Folder for the report, the model and simulated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
@@ -52,12 +55,12 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
 
     steps.say("Flights")
     with Bar("  flights ") as bar:
-        chosen = demo_flights.choose(flights or find_flights(), out / "flights", speed,
+        demo = demo_flights.choose(flights or find_flights(), out / "flights", speed,
                                      lambda line: click.echo(f"airtouch: {line}", err=True),
                                      lambda done, total: bar(done, total, "" if done else COMPILES))
-    test, where = chosen.test, chosen.where
-    click.echo(f"  {where}: {len(chosen.train)} to train on, {len(test)} held out, split by flight")
-    training, left_out = demo_flights.readable(chosen.train)
+    test, origin = demo.test, demo.origin
+    click.echo(f"  {origin}: {len(demo.train)} to train on, {len(test)} held out, split by flight")
+    training, left_out = demo_flights.readable(demo.train)
 
     steps.say(f"Training, short: {epochs} epochs, pruned, int8; thresholds from training flights")
     short = {"paper": {"epochs": epochs}, "best": {"steps": STEPS}}
@@ -73,12 +76,12 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
     scored = score_report({name: [r.score for r in of_detector] for name, of_detector in results.items()},
                           shown_flights(results, SHOWN))
-    show.console().print(show.table(scored.summaries, where))
+    show.print_table(show.console(), scored.summaries, origin)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
 
     steps.say("Report")
-    write_report(report, f"AirTouch demo: {where}", scored,
+    write_report(report, f"AirTouch demo: {origin}", scored,
                  parameters={f"{n}: {key}": value for n, model in models.items()
                              for key, value in registry.get(n).parameters(model).items()},
                  command=f"airtouch demo --epochs {epochs}", left_out=left_out, force=True)

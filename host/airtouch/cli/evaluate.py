@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from airtouch.cli.shared import scores as show
+from airtouch.cli.shared.help import examples
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -13,7 +14,10 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free
 
 
-@click.command(name="evaluate")
+@click.command(name="evaluate", epilog=examples(
+    "airtouch evaluate flight.csv --speed 0.3",
+    "airtouch evaluate my-flights --detector paper --json scores.json",
+    "airtouch evaluate my-flights --model mine.npz --fold 3 --fold 4"))
 @click.argument("flights", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--model", type=click.Path(path_type=Path),
@@ -47,15 +51,15 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
             bar.update(1)
 
         scores, failures = evaluate.evaluate(files, module, trained, done)
-    _pass_on(remarks)
+    _print_remarks(remarks)
     result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
     result["remarks"] = remarks
     screen = show.console()
     if scores:
-        screen.print(show.table({detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off"))
+        show.print_table(screen, {detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off")
         for what in ("height", "angle", "wind"):
             if len(result[f"by_{what}"]) > 1:
-                screen.print(show.table(result[f"by_{what}"], f"by {what}"))
+                show.print_table(screen, result[f"by_{what}"], f"by {what}")
         for name in sorted({s.note for s in scores if s.note}):
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
     trained_on = len(result["in_training"])
@@ -70,7 +74,7 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
         sys.exit(2)
 
 
-def _pass_on(remarks: dict[str, list[str]]) -> None:
+def _print_remarks(remarks: dict[str, list[str]]) -> None:
     """Print the warnings of the quality checks on stderr, one line each."""
     files: dict[str, list[str]] = {}
     for file, lines in remarks.items():

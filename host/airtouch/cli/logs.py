@@ -25,9 +25,8 @@ FILES = click.argument("files", nargs=-1, required=True, type=click.Path())
 def command() -> None:
     """Look at, check and convert flight logs.
 
-    Every known format is told apart by its content: the paper's authors' CSV,
-    Bitcraze uSD-card logs, CrazyPAD, IMRCLab, AirTouch's own CSV and Parquet,
-    gzipped or not. FILES may be folders.
+    The format is found from the content: the paper's authors' CSV, Bitcraze uSD-card logs, PX4 ULog, ROS 2 bags,
+    CrazyPAD, IMRCLab, AirTouch's own CSV and Parquet, gzipped or not. FILES may be folders.
 
     \b
     Example:

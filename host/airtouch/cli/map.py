@@ -7,13 +7,14 @@ import click
 
 from airtouch import logs
 from airtouch.detector.evaluation.data import dataset
+from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 
 
 @click.command(name="map")
 @click.argument("flight", type=click.Path(path_type=Path))
-@click.option("--detector", default="best", show_default=True, help="Which detector feels the edges.")
+@click.option("--detector", default="best", show_default=True, help="Detector that finds the edges.")
 @click.option("--model", type=click.Path(path_type=Path), help="Trained model (.npz); the shipped one if left out.")
 @click.option("--truth", is_flag=True, help="Map the true edges of the down range instead of the detector's.")
 @click.option("--speed", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
@@ -42,6 +43,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     picture = out.with_suffix(".png")
     for path in (out, picture):
         check_free(path, force)
+    if flight.is_dir():
+        raise AirTouchError(f"{flight}: a folder; a map is of one flight, name its log")
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
     edge_map.track(log, speed or file.condition.speed_mps)  # raises if both are missing, before the detector runs

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from airtouch.cli.shared.help import examples
 from airtouch.errors import AirTouchError
 
 if TYPE_CHECKING:
@@ -41,7 +42,11 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
     ctx.exit()
 
 
-@click.command("simulate")
+@click.command("simulate", epilog=examples(
+    "airtouch simulate paper-low -n 20 --out flights",
+    "airtouch simulate paper-4cm -n 5 --out windy --effect wind:x=0.5m/s --without gust",
+    "airtouch simulate mine.toml -n 1000 --out many --workers 8",
+    "airtouch simulate --list-effects"))
 @click.argument("scenario")
 @click.option("--flights", "-n", default=1, show_default=True, help="How many flights.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True,

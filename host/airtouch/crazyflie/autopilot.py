@@ -122,7 +122,7 @@ class Autopilot:
             self._until_s = max(now_s, self._until_s if math.isfinite(self._until_s) else now_s) + leg.seconds
             return [Command("stop")] if landed else []
         self.in_air = True
-        return self._send(self._of(leg), now_s, wall_s)
+        return self._send(self._command_of(leg), now_s, wall_s)
 
     def _come_down(self, now_s: float, wall_s: float) -> list[Command]:
         if self._command is not None:  # answered, and its duration is over
@@ -150,7 +150,7 @@ class Autopilot:
         self._tries = tries
         return sent
 
-    def _of(self, leg: Leg) -> Command:
+    def _command_of(self, leg: Leg) -> Command:
         o = self.origin
         cos, sin = math.cos(o.yaw_rad), math.sin(o.yaw_rad)
         return Command(leg.kind, o.x_m + cos * leg.x_m - sin * leg.y_m, o.y_m + sin * leg.x_m + cos * leg.y_m,

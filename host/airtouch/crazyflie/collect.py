@@ -116,12 +116,12 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
 def meta_of(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: int) -> dict[str, Any]:
     """The metadata of a flight that are known before take-off."""
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-    held = {"period_s": blocks.STATE.period_ms / 1000.0, "longest_s": blocks.HELD_S} if ready.slow else {}
+    hold = {"period_s": blocks.STATE.period_ms / 1000.0, "longest_s": blocks.HELD_S} if ready.slow else {}
     return {
         "vehicle": plan.vehicle, "condition": dict(mission.values), "acc_frame": "body",
         "mission": mission.name, "speed_mps": mission.speed_mps, "flight": number,
         "firmware": ready.firmware, "protocol": drone.protocol,
         "decks": sorted(deck for deck, there in ready.condition.decks.items() if there), "uri": plan.uri,
-        "started": now, "recorded_by": f"airtouch {__version__}", "held_columns": held, "warnings": [],
+        "started": now, "recorded_by": f"airtouch {__version__}", "held_columns": hold, "warnings": [],
         "settings": [f"{name}={text}" for name, text in plan.settings],
     }

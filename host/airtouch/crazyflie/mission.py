@@ -91,8 +91,8 @@ def scene_of(name_or_path: str | Path) -> scenario.Scenario:
         return scenario.parse(text, str(name_or_path))
     if Path(name_or_path).suffix != ".toml" and str(name_or_path) not in scenario.names():
         near = nearest(str(name_or_path), [*names(), *scenario.names()])
-        raise AirTouchError(f"no mission {str(name_or_path)!r}{near}; ready ones: {', '.join(names())}; "
-                            "or give a .toml file")
+        raise AirTouchError(f"no mission {str(name_or_path)!r}{near} (ready ones: {', '.join(names())}, or a .toml "
+                            "file)")
     return scenario.load(name_or_path)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from airtouch.detector.trace import Trace
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import unknown
 from airtouch.logs.flight_log import FlightLog
 
 #: name -> module that is a `Detector`; imported only when asked for
@@ -63,5 +63,5 @@ def get(name: str | Detector) -> Detector:
     if not isinstance(name, str):
         return name
     if name not in DETECTORS:
-        raise AirTouchError(f"no detector {name!r}{nearest(name, DETECTORS)}; known: {', '.join(DETECTORS)}")
+        raise unknown("detector", name, DETECTORS)
     return importlib.import_module(DETECTORS[name])

@@ -66,14 +66,14 @@ class AppCore:
         edge = lib.appHostStep(self._memory, sample, self.log)
         return EDGES[self.log.edge] if edge else EDGES[0]
 
-    def packets(self, taken: bool = True) -> Iterator[bytes]:
-        """The packets for the GAP8 after a step. taken: whether the transport takes them."""
+    def packets(self, accepted: bool = True) -> Iterator[bytes]:
+        """The packets for the GAP8 after a step. accepted: whether the transport takes them."""
         for _ in range(PACKETS):
             length = lib.appHostOutgoing(self._memory, self._packet)
             if length == 0:
                 return
-            lib.appHostSent(self._memory, taken)
-            if taken:
+            lib.appHostSent(self._memory, accepted)
+            if accepted:
                 yield bytes(ffi.buffer(self._packet, length))
 
     def receive(self, packet: bytes) -> None:

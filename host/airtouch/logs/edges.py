@@ -33,7 +33,7 @@ def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
     and belong to it. A step that is undone within 0.1 s is a glitch and no edge. Low platforms
     need a `step_m` below 0.30. Raises AirTouchError for a log without `zrange_m`.
     """
-    height = _held(log["zrange_m"])
+    height = _filled_forward(log["zrange_m"])
     steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log))
     period = sample_period(log)
     settling = max(int(round(SETTLING_S / period)), 2)
@@ -71,7 +71,7 @@ def _in_flight(log: FlightLog) -> np.ndarray:
     return grounded[np.minimum(place + margin + 1, n)] == grounded[np.maximum(place - margin, 0)]
 
 
-def _held(values: np.ndarray) -> np.ndarray:
+def _filled_forward(values: np.ndarray) -> np.ndarray:
     """The values, (n,), with NaN replaced by the last valid one; at the start by the first valid one."""
     valid = np.isfinite(values)
     if valid.all() or not valid.any():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.readings import checked
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.formats import authors, canonical, crazypad, imrclab, usd, usd_old
@@ -168,7 +168,7 @@ def _by_header(text: Sheet, source: str) -> FlightLog:
         return imrclab.read(text, source)
     if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
-    header = shown(text.first[:200].decode("utf-8", "replace"), 60)
+    header = printable(text.first[:200].decode("utf-8", "replace"), 60)
     raise AirTouchError(f"{source}:{text.line}: unknown header '{header}'; "
                         "name the columns as in the table of columns")
 

@@ -72,12 +72,12 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
     for name, values in columns.items():
         alike.setdefault((name in HELD, np.isfinite(values).tobytes()), []).append(name)
     new: dict[str, np.ndarray] = {}
-    for (held, mask), names in alike.items():
+    for (hold, mask), names in alike.items():
         valid = np.frombuffer(mask, dtype=bool)
         values = np.array([columns[name][valid] for name in names])
         for name in set(names) & set(ANGLES):
             values[names.index(name)] = np.unwrap(values[names.index(name)])
-        values = _at(values, time_s[valid], new_time, period, held, low_pass)
+        values = _at(values, time_s[valid], new_time, period, hold, low_pass)
         new |= dict(zip(names, values, strict=True))
     for name in set(new) & set(ANGLES):
         new[name] = np.angle(np.exp(1j * new[name]))
@@ -86,7 +86,7 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
     return {name: new[name] for name in columns}
 
 
-def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float, held: bool,
+def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float, hold: bool,
         low_pass: tuple[np.ndarray, int] | None) -> np.ndarray:
     """Channels (k, n) at the new times, (k, m); NaN in gaps longer than LONGEST_BRIDGE_S."""
     new = np.full((len(values), len(new_time)), np.nan)
@@ -98,7 +98,7 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
         t, v = time_s[start:stop], values[:, start:stop]
         first, last = np.searchsorted(new_time, (t[0] - 1e-9, t[-1] + 1e-9))
         at = new_time[first:last]
-        if held:
+        if hold:
             new[:, first:last] = v[:, np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
         else:
             t, v = _smoothed(t, v, period, *low_pass) if low_pass else (t, v)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 
 MOST_COLUMNS = 256  #: columns that a log may have
 LONGEST_NAME = 100  #: characters of a column's name
@@ -56,7 +56,7 @@ def check_names(names: list[str], place: str) -> None:
                  "has too long a name" if len(name) > LONGEST_NAME else
                  "has another one's name" if name in names[:i] else "")
         if fault:
-            raise AirTouchError(f"{place}: column {i + 1} {fault} ('{shown(name)}'); give each its own short name")
+            raise AirTouchError(f"{place}: column {i + 1} {fault} ('{printable(name)}'); give each its own short name")
 
 
 def named_table(text: Sheet, source: str, warnings: list[str]) -> dict[str, np.ndarray]:
@@ -122,8 +122,8 @@ def _first_problem(body: bytes, columns: int) -> tuple[int, str, bool]:
             return i, f"{cells} cells where {columns} are expected", place >= last
         for number, cell in enumerate(line.split(b","), start=1):
             if not _is_number(cell):
-                held = shown(cell.strip()[:80].decode("ascii", "replace"), 20)
-                return i, f"cell {number} holds '{held}', not a number", place >= last
+                text = printable(cell.strip()[:80].decode("ascii", "replace"), 20)
+                return i, f"cell {number} holds '{text}', not a number", place >= last
     return 0, "not a table of numbers", False
 
 

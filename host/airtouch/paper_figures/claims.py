@@ -91,6 +91,6 @@ CLAIMS = {
 }
 
 
-def of(figure: str) -> dict[str, Claim]:
+def of_figure(figure: str) -> dict[str, Claim]:
     """The claims of a figure: name -> claim."""
     return {name: claim for name, claim in CLAIMS.items() if claim.figure == figure}

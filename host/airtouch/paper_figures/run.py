@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from airtouch import __version__
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import AirTouchError, unknown
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.paper_figures import claims, page, pictures
 from airtouch.paper_figures.figure import Figure, Job, Missing, table_csv
@@ -43,7 +43,7 @@ def names(only: Sequence[str]) -> list[str]:
     """
     for name in only:
         if name not in FIGURES:
-            raise AirTouchError(f"no figure {name!r}{nearest(name, FIGURES)}; known: {', '.join(FIGURES)}")
+            raise unknown("figure", name, FIGURES)
     return [name for name in FIGURES if not only or name in only]
 
 
@@ -113,7 +113,8 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     """Make one figure: write its picture and table to `out`, and return its record."""
     module, function = FIGURES[name]
     verdicts: dict[str, dict[str, Any]] = {
-        claim: {"said": s.text, "line": s.line, "values": list(s.values)} for claim, s in claims.of(name).items()}
+        key: {"said": claim.text, "line": claim.line, "values": list(claim.values)}
+        for key, claim in claims.of_figure(name).items()}
     try:
         figure: Figure = getattr(importlib.import_module(f"airtouch.paper_figures.figures.{module}"), function)(job)
     except AirTouchError as error:

@@ -45,8 +45,8 @@ def total_thrust(pwm: np.ndarray, vehicle: Vehicle, vbat_v: np.ndarray | float |
     pwm = np.asarray(pwm, dtype=np.float64)
     if pwm.shape != (len(pwm), 4):
         raise AirTouchError(f"thrust: needs (n, 4) PWM, not {pwm.shape}")
-    held = np.clip(hold_finite(pwm)[0], 0.0, PWM_MAX)
-    return vehicle.thrust(held).sum(axis=1) * voltage_factor(len(held), vehicle, vbat_v)
+    pwm = np.clip(hold_finite(pwm)[0], 0.0, PWM_MAX)
+    return vehicle.thrust(pwm).sum(axis=1) * voltage_factor(len(pwm), vehicle, vbat_v)
 
 
 def voltage_factor(n: int, vehicle: Vehicle, vbat_v: np.ndarray | float | None) -> np.ndarray:
@@ -55,8 +55,8 @@ def voltage_factor(n: int, vehicle: Vehicle, vbat_v: np.ndarray | float | None) 
         return np.ones(n)
     volts = np.broadcast_to(np.asarray(vbat_v, dtype=np.float64), (n,))
     known = np.where((volts >= VOLTAGE_RANGE[0]) & (volts <= VOLTAGE_RANGE[1]), volts, np.nan)
-    held = hold_finite(known, initial=vehicle.nominal_voltage_v)[0]
-    return np.clip(np.square(held / vehicle.nominal_voltage_v), *FACTOR_RANGE)
+    volts = hold_finite(known, initial=vehicle.nominal_voltage_v)[0]
+    return np.clip(np.square(volts / vehicle.nominal_voltage_v), *FACTOR_RANGE)
 
 
 def force_norm(force: np.ndarray) -> np.ndarray:

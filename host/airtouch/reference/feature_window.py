@@ -17,8 +17,8 @@ def z_score_window(features: np.ndarray) -> np.ndarray:
     features = np.asarray(features, dtype=np.float64)
     if features.ndim < 2 or features.shape[-2] == 0:
         raise AirTouchError(f"z-score: needs (..., window, columns), not {features.shape}")
-    held = np.moveaxis(hold_finite(np.moveaxis(features, -2, 0))[0], 0, -2)
-    deviation = held - held[..., :1, :]
+    finite = np.moveaxis(hold_finite(np.moveaxis(features, -2, 0))[0], 0, -2)
+    deviation = finite - finite[..., :1, :]
     span = np.abs(deviation).max(axis=-2, keepdims=True)
     deviation = deviation / np.where(span > 0, span, 1.0)
     deviation -= deviation.mean(axis=-2, keepdims=True)
@@ -48,10 +48,10 @@ def streaming_z_score(features: np.ndarray, time_constant: float) -> np.ndarray:
     return out
 
 
-def _standardise(held: np.ndarray, time_constant: float) -> np.ndarray:
-    out = np.zeros(len(held))
-    mean, variance = held[0], 0.0
-    for i, (sample, gain) in enumerate(zip(held, exponential_gain(len(held), time_constant), strict=True)):
+def _standardise(values: np.ndarray, time_constant: float) -> np.ndarray:
+    out = np.zeros(len(values))
+    mean, variance = values[0], 0.0
+    for i, (sample, gain) in enumerate(zip(values, exponential_gain(len(values), time_constant), strict=True)):
         step = sample - mean
         mean += gain * step
         variance = (1 - gain) * (variance + gain * step * step)

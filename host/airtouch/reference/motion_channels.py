@@ -104,11 +104,11 @@ def _slow(
     mean_thrust, lagged, slow = np.zeros(n), np.zeros(n), np.zeros((n, 4))
     if n == 0:
         return mean_thrust, lagged, slow
-    state, behind, mean, flown = mixed[0].copy(), thrust[0], thrust[0], 0
+    state, behind, mean, airborne_steps = mixed[0].copy(), thrust[0], thrust[0], 0
     for t in range(n):
-        flown = flown + 1 if airborne[t] else 0
+        airborne_steps = airborne_steps + 1 if airborne[t] else 0
         behind += (thrust[max(t - THRUST_DELAY, 0)] - behind) / config.lag_samples
-        gain = 1.0 / config.slow_samples if flown > config.settle_samples else 1.0
+        gain = 1.0 / config.slow_samples if airborne_steps > config.settle_samples else 1.0
         state += gain * (mixed[t] - state)
         mean += gain * (behind - mean)
         mean_thrust[t], lagged[t], slow[t] = mean, behind, state

@@ -17,10 +17,10 @@ COLOURS = {"entry": FOUND, "exit": OTHER, "edge": TRUE}
 def edge_map(plane: EdgeMap, title: str) -> bytes:
     """PNG of the track, the edges with 2-sigma bars along the track, platforms and a scale bar."""
     with style():
-        return png(drawn(plane, title))
+        return png(figure_of(plane, title))
 
 
-def drawn(plane: EdgeMap, title: str) -> Figure:
+def figure_of(plane: EdgeMap, title: str) -> Figure:
     """The map as a matplotlib figure."""
     xy, points = plane.xy, plane.points
     with style():
@@ -30,7 +30,7 @@ def drawn(plane: EdgeMap, title: str) -> Figure:
         ax.plot(*xy.T, color=MUTED, lw=0.9, label="track")
         _ends(ax, xy)
         for platform in plane.platforms:
-            ends = (platform.near, platform.far)
+            ends = (platform.near_side, platform.far_side)
             if platform.outline is None and all(isinstance(end, Point) for end in ends):
                 strip = _strip(*(np.array(end.coords[0]) for end in ends))
                 ax.add_patch(PolygonPatch(strip, facecolor=TRUE, alpha=0.12, lw=0,
@@ -42,7 +42,7 @@ def drawn(plane: EdgeMap, title: str) -> Figure:
                 band = platform.outline.boundary.buffer(2 * platform.sigma_m)
                 ax.add_patch(patch_from_polygon(band, facecolor=TRUE, alpha=0.15, lw=0))
                 ax.plot(*ring.T, color=TRUE, lw=1.6, label="outline")
-            for line in (platform.near, platform.far):
+            for line in (platform.near_side, platform.far_side):
                 if isinstance(line, LineString):
                     ax.plot(*np.array(line.coords).T, color=TRUE, lw=0.8, ls=":")
         for point in points:

@@ -65,14 +65,14 @@ def refuse_off(plan: FlightPlan, without: Sequence[str]) -> None:
     for name in without:
         registry.get(name)
         if name not in on:
-            raise AirTouchError(f"--without {name}: this scenario does not switch it on; on are "
-                                f"{', '.join(dict.fromkeys(on)) or 'none'}")
+            raise AirTouchError(f"--without {name}: this scenario does not switch it on"
+                                + (f"; on are {', '.join(dict.fromkeys(on))}" if on else ", nor any other effect"))
 
 
 def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
              name: str) -> FlightLog | Diverged:
     """Fly a drawn flight with these effects."""
-    vehicle = plan.flown_by(vehicle)
+    vehicle = plan.with_changes(vehicle)
     stepper = Stepper(plan, vehicle, seed, flight, active)
     plant = stepper.plant
     table = np.empty((len(plan.setpoints), log_row.COLUMNS))

@@ -61,7 +61,7 @@ class Constants(NamedTuple):
     """What follows from the plant alone."""
 
     hover_speed: float  #: rad/s of a rotor
-    ahead: int  #: physics steps from the firmware's 100 Hz run to the log's row
+    lead_steps: int  #: physics steps from the firmware's 100 Hz run to the log's row
     body: rigid_body.Constants
     noise: motors.Noise
 
@@ -70,8 +70,8 @@ class Constants(NamedTuple):
 def constants(plant):
     """The Constants of a plant."""
     hover_speed = math.sqrt(plant.mass * plant.gravity / 4.0 / plant.thrust_per_speed2)
-    ahead = int(plant.controller_ahead / plant.step + 1e-6) % LOG_STEPS
-    return Constants(hover_speed, ahead, rigid_body.constants(plant), motors.noise(plant))
+    lead_steps = int(plant.controller_ahead / plant.step + 1e-6) % LOG_STEPS
+    return Constants(hover_speed, lead_steps, rigid_body.constants(plant), motors.noise(plant))
 
 
 @inlined
@@ -81,13 +81,13 @@ def control(flight, fixed, row, volts):
     The command is in state.motors.pwm; fixed: Constants; volts: what the motors see.
     """
     plant, state, generator = flight.plant[0], flight.state[0], flight.generators[0].ranging[:]
-    k, ahead = state.step, 2 * fixed.ahead
+    k, lead = state.step, 2 * fixed.lead_steps
     for tick in range(max(2 * k - 1, 0), 2 * k + 1):
         imu.reading(plant, state, tick)
         ranging.range_reading(plant, state, flight.world, tick, generator)
         ranging.flow_reading(plant, state, tick, generator)
-        autopilot.estimate(plant, state, tick + ahead, volts)
-    autopilot.steer(plant, state, row, 2 * k + ahead)
+        autopilot.estimate(plant, state, tick + lead, volts)
+    autopilot.steer(plant, state, row, 2 * k + lead)
 
 
 @inlined
@@ -129,10 +129,10 @@ def fly(flight, setpoints, table):
     are filled.
     """
     plant, state, generators = flight.plant[0], flight.state[0], flight.generators[0]
-    fixed, begun = constants(plant), state.step
+    fixed, first_step = constants(plant), state.step
     for n in range(table.shape[0] * LOG_STEPS):
         row = n // LOG_STEPS
-        state.step = begun + n
+        state.step = first_step + n
         state.time_s = state.step * plant.step
         imu.sense(plant, state, fixed.hover_speed, generators.imu[:])
         multi_ranger.read(state, flight.room)
@@ -143,5 +143,5 @@ def fly(flight, setpoints, table):
         ending = move(flight, fixed, volts)
         if ending != OK:
             return ending, row + (ending != NOT_FINITE)
-    state.step = begun + table.shape[0] * LOG_STEPS
+    state.step = first_step + table.shape[0] * LOG_STEPS
     return OK, table.shape[0]

@@ -156,16 +156,16 @@ def _firmware(row: np.ndarray, vehicle: Vehicle) -> None:
     """
     release = settings.load(vehicle.firmware)[0]
     row["firmware"] = release
-    flown, hover = row["firmware"], hover_pwm(vehicle)
+    firmware, hover = row["firmware"], hover_pwm(vehicle)
     if vehicle.range_module != settings.OWN_MODULE:
-        flown["range_module"]["kind"] = settings.RANGE_MODULES.index(vehicle.range_module)
+        firmware["range_module"]["kind"] = settings.RANGE_MODULES.index(vehicle.range_module)
     row["gyro_lowpass"] = release["filters"]["gyro_hz"]
     if vehicle.platform == OWN_PLATFORM:
         for name in ("thrust_base", "thrust_min", "thrust_scale"):
             row[name] = release["controller"][name]
     else:
         kind = settings.OF_VEHICLE if vehicle.platform else settings.NO_COMPENSATION
-        flown["battery_compensation"]["kind"] = kind
+        firmware["battery_compensation"]["kind"] = kind
         row["thrust_base"], row["thrust_min"] = 0.9 * hover, min(20000.0, 0.5 * hover)
         row["rate_scale"] = _authority(REFERENCE) / _authority(vehicle)
         row["thrust_scale"] = release["controller"]["thrust_scale"] * _lift_slope(REFERENCE) / _lift_slope(vehicle)

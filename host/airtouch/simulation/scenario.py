@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import AirTouchError, unknown
 from airtouch.simulation import effects
 from airtouch.simulation.firmware.settings import DEFAULT
 from airtouch.simulation.flight_plan import mission, world
@@ -48,7 +48,7 @@ class FlightPlan:
     values: dict[str, Any]
     changes: Mapping[str, Any] = field(default_factory=dict)
 
-    def flown_by(self, vehicle: Vehicle) -> Vehicle:
+    def with_changes(self, vehicle: Vehicle) -> Vehicle:
         """The vehicle of this flight: the declared one with the flight's own values."""
         return replace(vehicle, **self.changes)
 
@@ -70,8 +70,7 @@ def load(name_or_path: str | Path) -> Scenario:
         folder = resources.files("airtouch") / "simulation" / "scenarios"
         text = (folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
     else:
-        raise AirTouchError(f"no scenario {str(name_or_path)!r}{nearest(str(name_or_path), names())}; "
-                            f"known: {', '.join(names())}, or a .toml file")
+        raise unknown("scenario", str(name_or_path), names(), ", or a .toml file")
     return parse(text, str(name_or_path))
 
 
@@ -113,9 +112,9 @@ def draw_flight(scenario: Scenario, seed: int, flight: int) -> FlightPlan:
         raise AirTouchError(f"{source}: [world] takes floor and room_m")
     built = world.build(platforms, ground.get("floor", "cement"))
     chosen = []
-    for name, given in draw(table.get("effects", {}), values, rng, f"{source}: effects").items():
+    for name, drawn in draw(table.get("effects", {}), values, rng, f"{source}: effects").items():
         effect = effects.get(name)
-        chosen += [(name, effect.values(one)) for one in (given if isinstance(given, list) else [given])]
+        chosen += [(name, effect.values(one)) for one in (drawn if isinstance(drawn, list) else [drawn])]
     plan = draw(table["mission"], values, rng, f"{source}: mission")
     rows = mission.setpoints(plan, built, source)
     room = np.array(ground.get("room_m", DEFAULT_ROOM_M), dtype=np.float64)

@@ -43,7 +43,7 @@ class Stepper:
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int,
                  active: Sequence[Active]) -> None:
         """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself."""
-        vehicle = plan.flown_by(vehicle)
+        vehicle = plan.with_changes(vehicle)
         if hover_pwm(vehicle) > MOST_HOVER_PWM:
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
                                 f"{hover_pwm(vehicle):.0f}")

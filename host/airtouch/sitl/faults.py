@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import AirTouchError, unknown
 from airtouch.sitl.services import packet as crtp
 from airtouch.sitl.services.packet import Packet, Peer
 
@@ -40,21 +40,21 @@ class Fault:
     kind: str
     at_s: float = -math.inf
     amount: float = 0.0
-    everything: bool = False
+    all_packets: bool = False
 
 
 def parse(text: str) -> Fault:
     """The fault in a text as on the command line. Raises AirTouchError with the right form."""
     kind, _, value = text.partition("=")
     if kind not in KINDS:
-        raise AirTouchError(f"no fault {kind!r}{nearest(kind, KINDS)}; known: {', '.join(KINDS)}")
+        raise unknown("fault", kind, KINDS)
     parts = value.split(",")
     try:
         if kind == "loss":
             share = float(parts[0])
             if not 0.0 <= share < 1.0 or parts[1:] not in ([], [ALL]):
                 raise ValueError
-            return Fault(kind, amount=share, everything=len(parts) > 1)
+            return Fault(kind, amount=share, all_packets=len(parts) > 1)
         if kind == "late" and len(parts) == 1:
             return Fault(kind, amount=seconds(parts[0]))
         if len(parts) == (2 if kind == "disconnect" else 1):
@@ -106,7 +106,7 @@ class Line:
 
     def put(self, packet: Packet, peer: Peer, now_s: float) -> None:
         """Send a packet to or from `peer`."""
-        if any(self._rng.random() < f.amount for f in self._loss if f.everything or is_unacknowledged(packet)):
+        if any(self._rng.random() < f.amount for f in self._loss if f.all_packets or is_unacknowledged(packet)):
             self.lost += 1
             return
         due = now_s

@@ -130,7 +130,7 @@ class Planner:
         self._begun, self._seconds, self.state = t, seconds, state
         return 0
 
-    def _rest(self, position: np.ndarray, yaw: float) -> Goal:
+    def _goal_at_rest(self, position: np.ndarray, yaw: float) -> Goal:
         return Goal(position, np.zeros(3), np.zeros(3), yaw, 0.0)
 
     def _vertical(self, kind: int, t: float, values: list) -> int:
@@ -150,7 +150,7 @@ class Planner:
             speed = values[4] if values[4] > 0.0 else self.landing_mps if down else self.takeoff_mps
             seconds = abs(height - here.position[2]) / speed
         to = np.array([here.position[0], here.position[1], height])
-        start, end = self._rest(here.position, here.yaw), self._rest(to, turn(here.yaw, yaw))
+        start, end = self._goal_at_rest(here.position, here.yaw), self._goal_at_rest(to, turn(here.yaw, yaw))
         return self._plan(t, seconds, start, end, LANDING if down else FLYING)
 
     def _go(self, t: float, relative: int, linear: int, x: float, y: float, z: float, yaw: float,
@@ -158,7 +158,7 @@ class Planner:
         start, to = self._last, np.array([x, y, z])
         if relative:
             to, yaw = to + start.position, yaw + start.yaw
-        end = self._rest(to, turn(start.yaw, yaw))
+        end = self._goal_at_rest(to, turn(start.yaw, yaw))
         if linear:
             seconds = max(seconds, LEAST_DURATION_S)
             speed, rate = (to - start.position) / seconds, (end.yaw - start.yaw) / seconds

@@ -66,7 +66,7 @@ def test_a_single_sweep_gives_points_only():
     xy = zigzag(1.0, np.array([0.0]))
     found = edge_map.platforms(detected_points(SHAPES["square"], xy))
     assert len(found) == 1 and found[0].outline is None
-    assert found[0].far.x - found[0].near.x == pytest.approx(0.8, abs=0.01)
+    assert found[0].far_side.x - found[0].near_side.x == pytest.approx(0.8, abs=0.01)
 
 
 def test_dead_reckoning_needs_a_speed():

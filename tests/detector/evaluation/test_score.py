@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore, match, over_platform, score_edges, score_flight
-from airtouch.detector.evaluation.summary import by_height, summarise
+from airtouch.detector.evaluation.summary import by_centimetre, by_height, summarise
 from airtouch.detector.trace import Detection
 
 
@@ -84,6 +84,13 @@ def test_summary_of_two_flights_by_hand():
     heights = by_height([first, second])
     assert set(heights) == {"low", "h85", "h82+h85"}
     assert heights["h82+h85"]["missed_count"] == 1
+
+
+def test_heights_that_were_drawn_are_grouped_by_centimetre():
+    heights = ("24mm", "19mm", "101mm", "low", None, "16mm")
+    groups = by_centimetre([replace(flight([]), condition=Condition(height=height)) for height in heights])
+    assert {name: row["flights"] for name, row in groups.items()} == {"2 cm": 3, "10 cm": 1, "low": 1}
+    assert list(groups) == ["2 cm", "10 cm", "low"]
 
 
 def test_balanced_accuracy_uses_airborne_samples_only():

@@ -62,7 +62,7 @@ def test_a_full_queue_is_logged_and_loses_nothing(flight):
     drone.fly(flight, stop=400)
     for i in range(400, 420):
         drone.app.step(acc[i], gyro[i], pwm[i])
-        assert list(drone.app.packets(taken=False)) == []
+        assert list(drone.app.packets(accepted=False)) == []
     assert drone.app.log.dropped >= 1 and "packet dropped" in drone.health
     for i in range(420, 460):
         drone.step(acc[i], gyro[i], pwm[i])

@@ -12,7 +12,7 @@ import pytest
 from airtouch import logs
 from airtouch.cli import main
 from airtouch.crazyflie.recorder import recover
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs import public
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import FlightLog
@@ -61,7 +61,7 @@ def test_slow_logs_have_edges_without_a_warning():
 
 def test_names_from_a_file_can_be_printed(tmp_path, capsys):
     """Lone surrogates in stored warnings, and file names that are no UTF-8, ended `logs check` in a traceback."""
-    assert shown("a\ud800\x1b[2J\u202e\n") == "a\\ud800\\x1b[2J\\u202e\\n" and len(shown("n" * 999)) == 40
+    assert printable("a\ud800\x1b[2J\u202e\n") == "a\\ud800\\x1b[2J\\u202e\\n" and len(printable("n" * 999)) == 40
     stored = b'# warnings: ["\\ud800 \\u001b[2J", "a\\nb"]\n# condition: "\\ud800"\n'
     path = tmp_path / os.fsdecode(b"flight\xff.csv")
     path.write_bytes(stored + flying())

@@ -112,7 +112,7 @@ def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | Non
         for number, mission in missions.items():
             if ask:
                 click.confirm(f"flight {number}: drone at the start, nose along x, room clear?", abort=True)
-            with _shown(mission.seconds) as show:
+            with _display(mission.seconds) as show:
                 outcome = collect.fly(drone, ready, mission, plan, number, stop=stop, say=click.echo, show=show)
             _report(outcome)
             if not outcome.planned:
@@ -127,7 +127,7 @@ def stopping(quiet: bool = False):
     """An event that Ctrl-C, SIGTERM and SIGHUP set instead of ending the process."""
     stop = threading.Event()
 
-    def asked(*_) -> None:
+    def request_stop(*_) -> None:
         first = not stop.is_set()
         stop.set()
         if first and not quiet:
@@ -137,7 +137,7 @@ def stopping(quiet: bool = False):
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {s: signal.signal(s, asked) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    before = {s: signal.signal(s, request_stop) for s in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
         yield stop
     finally:
@@ -146,7 +146,7 @@ def stopping(quiet: bool = False):
 
 
 @contextmanager
-def _shown(seconds: float):
+def _display(seconds: float):
     """A status line with leg, time, battery and losses; without a terminal one line for each leg."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
@@ -159,7 +159,7 @@ def _shown(seconds: float):
             label = _label(flight)
             if seen[-1:] != [label]:
                 seen.append(label)
-                click.echo(f"{_flown(flight):6.1f} s  {label}")
+                click.echo(f"{_time_s(flight):6.1f} s  {label}")
 
         yield plain
         return
@@ -169,8 +169,8 @@ def _shown(seconds: float):
 
         def live(flight) -> None:
             i = flight.intake
-            bar.update(task, completed=_flown(flight), leg=_label(flight),
-                       text=f"{_flown(flight):5.1f} s  {i.latest.get('vbat_V', float('nan')):.2f} V  "
+            bar.update(task, completed=_time_s(flight), leg=_label(flight),
+                       text=f"{_time_s(flight):5.1f} s  {i.latest.get('vbat_V', float('nan')):.2f} V  "
                             f"{100 * i.lost / max(i.received + i.lost, 1):.1f} % lost")
 
         yield live
@@ -181,7 +181,7 @@ def _label(flight) -> str:
     return pilot.leg.kind if pilot.phase == "mission" and pilot.leg else pilot.phase
 
 
-def _flown(flight) -> float:
+def _time_s(flight) -> float:
     i = flight.intake
     return 0.0 if i.first_ms is None else (i.newest_ms - i.first_ms) / 1000.0
 

@@ -55,7 +55,7 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
         click.echo("false: " + ", ".join(f"{s / 100:.2f} s" for s in result.score.false))
     figures = evaluate.as_json("best", [result.score], [], detector.lag_s, {})
     title = f"best: lag of {detector.lag_s:.2f} s taken off"
-    table_of.console().print(table_of.table({"best": figures}, title))
+    table_of.print_table(table_of.console(), {"best": figures}, title)
 
 
 def _in_words(edge) -> str:

@@ -6,10 +6,15 @@ from pathlib import Path
 
 import click
 
+from airtouch.cli.shared.help import examples
+
 STARTING = "starting; the first time compiles the simulator, which takes a minute"
 
 
-@click.command("sitl")
+@click.command("sitl", epilog=examples(
+    "airtouch sitl there-and-back                  # then `airtouch collect` in another terminal",
+    "airtouch sitl sweep --effect weak_motor:rotor=2,thrust_loss=0.1 --fault loss=0.1",
+    "airtouch sitl mine.toml --record truth.csv.gz"))
 @click.argument("scenario", default="sweep")
 @click.option("--port", default=19850, show_default=True,
               help="UDP port; cflib scans 19850 to 19859. 0: any free one.")

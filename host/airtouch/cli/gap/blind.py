@@ -7,7 +7,9 @@ import click
 
 from airtouch.cli import Suggesting
 from airtouch.cli.gap.options import check_free, runner, written
+from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
+from airtouch.cli.shared.help import examples
 from airtouch.logs.files import make_folder
 
 
@@ -16,7 +18,8 @@ def blind() -> None:
     """Sealed sets of flights whose effect is withheld: make them, score a diagnosis of them."""
 
 
-@blind.command("make")
+@blind.command("make", epilog=examples(
+    "airtouch gap blind make sealed --flights 100 --seed 7"))
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1),
               help="How many flights.")
@@ -26,16 +29,16 @@ def blind() -> None:
 @click.option("--force", is_flag=True, help="Replace a set in OUT.")
 def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool) -> None:
     """Write a sealed set to the folder OUT: flights, the hash of their answers, the key apart."""
-    from airtouch.cli.gap import show
-    from airtouch.gap.sealed import blind as sealed
-
     make_folder(out)
-    with show.Bar() as bar:
+    with Bar() as bar:
+        from airtouch.gap.sealed import blind as sealed
+
         written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
     click.echo(f"{flights} flights in {out}; the key in {written}")
 
 
-@blind.command("score")
+@blind.command("score", epilog=examples(
+    "airtouch gap blind score sealed answers.json --plot score.png"))
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.argument("answers", type=click.Path(path_type=Path, exists=True))
 @click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Default: beside FOLDER.")
@@ -55,7 +58,8 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
     _scored(sealed.score(folder, answers, key), json_path, plot, force)
 
 
-@blind.command("run")
+@blind.command("run", epilog=examples(
+    "airtouch gap blind run check --flights 160 --seed 7"))
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--flights", "-n", default=480, show_default=True, type=click.IntRange(1),
               help="How many flights; 42 % have one effect, 42 % none, the rest two.")
@@ -70,14 +74,14 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     Goes on where it was broken off. Single effects are then diagnosed once more with the
     effect left out, where `unknown` is right.
     """
-    from airtouch.cli.gap import show
     from airtouch.extras import need
-    from airtouch.gap.sealed import blind_run as check
 
     need("plots", "scoring a sealed set")
     spread = runner(dask, ()) if dask else None
     make_folder(out)
-    with show.Bar() as bar:
+    with Bar() as bar:
+        from airtouch.gap.sealed import blind_run as check
+
         figures = check.run(out, flights, seed, workers=workers, spread=spread, progress=bar)
     _scored(figures, json_path or out / "figures.json", out / "figures.png", True)
 

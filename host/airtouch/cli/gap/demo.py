@@ -5,10 +5,14 @@ from pathlib import Path
 import click
 
 from airtouch.cli.gap.options import check_free
+from airtouch.cli.gap.progress import Steps
 from airtouch.cli.shared import scores
+from airtouch.cli.shared.help import examples
 
 
-@click.command("demo")
+@click.command("demo", epilog=examples(
+    "airtouch gap demo",
+    "airtouch gap demo --out again"))
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), default=Path("out/gap-demo"),
               show_default=True, help="Folder for the report and the JSON.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
@@ -19,26 +23,28 @@ def demo_command(out: Path, force: bool) -> None:
     """
     import time
 
-    from airtouch.cli.gap import show
     from airtouch.gap import example
-    from airtouch.gap.answer import words
-    from airtouch.gap.diagnose import diagnose
-    from airtouch.logs import read
-    from airtouch.report import gap_report
-    from airtouch.vehicle import load
 
     report, json_path = out / "report.html", out / "diagnosis.json"
     check_free(report, json_path, force)
     began = time.monotonic()
     line = f"airtouch gap diagnose {example.real()} --baseline {example.FOLDER / 'nominal_*.csv.gz'} --report {report}"
     click.echo(f"This is: {line}")
-    nominal = [read(p) for p in example.nominal()]
-    with show.Steps(began) as say:
+    with Steps(began) as say:
         say("reading and compiling")
+        from airtouch.cli.gap import show
+        from airtouch.gap.answer import words
+        from airtouch.gap.diagnose import diagnose
+        from airtouch.logs import read
+        from airtouch.report import gap_report
+        from airtouch.vehicle import load
+
+        nominal = [read(p) for p in example.nominal()]
         diagnosis = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
                              pictures=True)
-    scores.write_json(json_path, diagnosis.plain(), force)
-    gap_report.write_diagnosis(report, diagnosis, command="airtouch gap demo", force=force)
+        say("report")
+        scores.write_json(json_path, diagnosis.plain(), force)
+        gap_report.write_diagnosis(report, diagnosis, command="airtouch gap demo", force=force)
     show.diagnosis(scores.console(), diagnosis)
     true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
     answer = words.joined([e.name for e in diagnosis.effects]) or diagnosis.verdict

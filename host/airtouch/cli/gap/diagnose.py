@@ -8,11 +8,16 @@ from typing import Any
 import click
 
 from airtouch.cli.gap.options import Greedy, check_free, inputs_and_outputs, runner, typed, written
+from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
+from airtouch.cli.shared.help import examples
 from airtouch.errors import AirTouchError
 
 
-@click.command("diagnose", cls=Greedy)
+@click.command("diagnose", cls=Greedy, epilog=examples(
+    "airtouch gap diagnose flight.csv --report which.html",
+    "airtouch gap diagnose real/*.csv --baseline nominal --vehicle mine.toml --json which.json",
+    "airtouch gap diagnose real --baseline nominal --each"))
 @inputs_and_outputs
 @click.option("--without", multiple=True, metavar="EFFECT", help="Exclude a candidate; may be repeated.")
 @click.option("--effects-file", "--effect-file", "effect_files", multiple=True, metavar="FILE",
@@ -23,39 +28,41 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
                      without: tuple[str, ...], effect_files: tuple[str, ...], each: bool) -> None:
     """Find the unmodelled effect that REAL flights have in common, and the part of the gap that it explains.
 
-    REAL and --baseline are log files, folders or patterns; give REAL first. One flight is enough. The exit
-    code is 0 for any verdict.
+    REAL and --baseline are log files, folders or patterns; give REAL first. One flight is enough. With
+    --baseline, nominal flights of the same vehicle, weaker effects are found. Prints where the gap lies, which
+    effect causes it and how far it closes; `none` and `unknown` are answers too, with exit code 0.
     """
-    from airtouch.cli.gap import files, show
-    from airtouch.simulation import effects
-
     check_free(report, json_path, force)
     if each and report:
         raise AirTouchError("--report shows one diagnosis; leave --each out")
     if dask and not each:
         raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each")
-    for path in effect_files:
-        effects.load_file(path)
-    for name in without:
-        effects.get(name)
-    flights, nominal = files.Flights(real), files.Flights(baseline)
-    vehicle = files.vehicle_of(vehicle_name, flights)
-    case = _case(vehicle, list(nominal), without)
+    with Bar() as bar:
+        from airtouch.cli.gap import files, show
+        from airtouch.simulation import effects
+
+        for path in effect_files:
+            effects.load_file(path)
+        for name in without:
+            effects.get(name)
+        flights, nominal = files.Flights(real), files.Flights(baseline)
+        case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without)
+        if not each:
+            logs = list(flights)
+            if not logs:
+                raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
+            diagnosis = case(logs, progress=bar, pictures=bool(report))
+            if json_path:
+                scores.write_json(json_path, diagnosis.plain(), force)
+            if report:
+                from airtouch.report import gap_report
+
+                bar("report")
+                gap_report.write_diagnosis(report, diagnosis, command=typed("diagnose", real, baseline, vehicle_name),
+                                           force=force)
     if each:
         _each(flights, case, json_path, runner(dask, effect_files), force)
     else:
-        logs = list(flights)
-        if not logs:
-            raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
-        with show.Bar() as bar:
-            diagnosis = case(logs, progress=bar, pictures=bool(report))
-        if json_path:
-            scores.write_json(json_path, diagnosis.plain(), force)
-        if report:
-            from airtouch.report import gap_report
-
-            gap_report.write_diagnosis(report, diagnosis, command=typed("diagnose", real, baseline, vehicle_name),
-                                       force=force)
         show.diagnosis(scores.console(), diagnosis)
     show.left_out([*flights.failed.values(), *nominal.failed.values()])
     written(json_path, report)
@@ -81,7 +88,7 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
 
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
-    with show.Bar(len(flights)) as bar:
+    with Bar(len(flights), "diagnosing") as bar:
         for diagnosis in run(partial(_alone, case), flights):
             if isinstance(diagnosis, str):
                 show.left_out([diagnosis])

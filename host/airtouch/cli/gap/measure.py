@@ -6,10 +6,14 @@ from pathlib import Path
 import click
 
 from airtouch.cli.gap.options import Greedy, check_free, inputs_and_outputs, typed, written
+from airtouch.cli.gap.progress import Bar
 from airtouch.cli.shared import scores
+from airtouch.cli.shared.help import examples
 
 
-@click.command("measure", cls=Greedy)
+@click.command("measure", cls=Greedy, epilog=examples(
+    "airtouch gap measure my-flights --report where.html",
+    "airtouch gap measure real/*.csv --baseline nominal --vehicle mine.toml"))
 @inputs_and_outputs
 def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
                     report: Path | None, json_path: Path | None, dask: str | None, force: bool) -> None:
@@ -17,15 +21,16 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
 
     REAL and --baseline are log files, folders or patterns; give REAL first.
     """
-    from airtouch.cli.gap import files, show
-    from airtouch.gap import measure
-    from airtouch.gap.sealed import on_cluster
-
     check_free(report, json_path, force)
-    flights, nominal = files.Flights(real), files.Flights(baseline)
-    vehicle = files.vehicle_of(vehicle_name, flights)
-    run = on_cluster.mapper(dask) if dask else map
-    with show.Bar(len(flights) + bool(baseline)) as bar:
+    with Bar() as bar:
+        from airtouch.cli.gap import files, show
+        from airtouch.gap import measure
+        from airtouch.gap.sealed import on_cluster
+
+        flights, nominal = files.Flights(real), files.Flights(baseline)
+        vehicle = files.vehicle_of(vehicle_name, flights)
+        run = on_cluster.mapper(dask) if dask else map
+        bar.expect(len(flights) + bool(baseline))
         measurement = measure.measure(flights, vehicle, nominal, progress=bar, run=run)
     failed = (*flights.failed.values(), *nominal.failed.values())
     measurement = replace(measurement, left_out=(*failed, *measurement.left_out))

@@ -1,12 +1,9 @@
-"""The output of `airtouch gap`: tables, sentences, and a progress bar for long work."""
+"""The output of `airtouch gap`: tables and sentences."""
 
-import threading
-import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from airtouch.gap.answer import words
@@ -15,79 +12,36 @@ from airtouch.gap.result import Cell, Diagnosis
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import CHANNEL_WORDS, interval, ratio, short
 
-PATIENCE_S = 2.0
 MOST_CELLS = 16
 
 
-class Bar:
-    """A progress bar on stderr that appears when the work takes more than two seconds.
-
-    Call it with a description of each step. total: number of steps, None if unknown.
-    """
-
-    def __init__(self, total: int | None = None) -> None:
-        self.progress = Progress(SpinnerColumn(), TextColumn("{task.description}"), BarColumn(),
-                                 TimeElapsedColumn(), console=Console(stderr=True), transient=True)
-        self.task = self.progress.add_task("", total=total)
-        self.timer = threading.Timer(PATIENCE_S, self.progress.start)
-        self.timer.daemon = True
-
-    def __enter__(self) -> "Bar":
-        self.timer.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.timer.cancel()
-        self.progress.stop()
-
-    def __call__(self, text: str) -> None:
-        self.progress.update(self.task, advance=1, description=text[-60:])
+#: column of a table of cells -> (text of a cell, columns of the narrowest terminal that shows it)
+CELL_COLUMNS: dict[str, tuple[Callable[[Cell], str], int]] = {
+    "phase": (lambda c: c.phase, 0),
+    "regime": (lambda c: "" if c.regime == "all" else c.regime, 0),
+    "channel": (lambda c: CHANNEL_WORDS[c.channel], 0),
+    "band, Hz": (lambda c: f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", 0),
+    "gap": (lambda c: short(c.gap), 0),
+    "interval": (interval, 125),
+    "unit": (lambda c: c.unit, 100),
+    "floor": (lambda c: short(c.floor), 100),
+    "gap/floor": (lambda c: short(ratio(c)), 0),
+    "after": (lambda c: "" if c.after is None else short(c.after), 0),
+}
+NUMBERS = ("gap", "floor", "gap/floor", "after")
 
 
-class Steps:
-    """Prints the seconds since the start and the present step every LINE_S. Call it with each step."""
-
-    LINE_S = 1.5
-
-    def __init__(self, began: float) -> None:
-        self.began, self.last, self.text = began, 0.0, ""
-        self.stopped = threading.Event()
-        self.thread = threading.Thread(target=self._tick, daemon=True)
-
-    def __enter__(self) -> "Steps":
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stopped.set()
-        self.thread.join()
-
-    def __call__(self, text: str) -> None:
-        self.text = text
-
-    def _tick(self) -> None:
-        """Print a line every LINE_S, also during a long step."""
-        while not self.stopped.wait(self.LINE_S):
-            click.echo(f"[{time.monotonic() - self.began:4.0f} s] {self.text}", err=True)
-
-
-def cells(some: Iterable[Cell], title: str) -> Table:
-    """A table of cells of a gap map."""
-    some = list(some)[:MOST_CELLS]
-    after = any(c.after is not None for c in some)
+def cells(found: Iterable[Cell], title: str, width: int) -> Table:
+    """A table of cells of a gap map for a terminal of a width; a column that says nothing is left out."""
+    found = list(found)[:MOST_CELLS]
     table = Table(title=title, title_justify="left", caption_justify="left",
                   caption="90 % intervals; a cell is listed when its interval clears the floor's")
-    for name in ("phase", "regime", "channel", "band, Hz", "gap", "interval", "unit", "floor", "gap/floor"):
-        right = name in ("gap", "floor", "gap/floor")
-        table.add_column(name, justify="right" if right else "left", no_wrap=name != "regime")
-    if after:
-        table.add_column("after", justify="right")
-    for c in some:
-        row = [c.phase, "" if c.regime == "all" else c.regime, CHANNEL_WORDS[c.channel],
-               f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", f"{short(c.gap)}",
-               interval(c), c.unit, f"{short(c.floor)}",
-               short(ratio(c))]
-        table.add_row(*row, *([("" if c.after is None else f"{short(c.after)}")] if after else []))
+    columns = [(name, text) for name, (text, least) in CELL_COLUMNS.items()
+               if width >= least and any(text(cell) for cell in found)]
+    for name, _ in columns:
+        table.add_column(name, justify="right" if name in NUMBERS else "left", no_wrap=name != "regime")
+    for cell in found:
+        table.add_row(*(text(cell) for _, text in columns))
     return table
 
 
@@ -97,7 +51,7 @@ def measurement(screen: Console, found: Measurement) -> None:
     screen.print(f"{count} flight{'s' * (count != 1)} against {found.vehicle}; floor: {found.map.floor_from}"
                  + (f" ({len(found.baseline)})" if found.baseline else ""))
     if found.where:
-        screen.print(cells(found.where, "Largest cells of the gap"))
+        screen.print(cells(found.where, "Largest cells of the gap", screen.width))
     else:
         screen.print("No cell of the gap stands out of its floor.")
     screen.print(words.overall(found.gap))
@@ -123,12 +77,18 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
     for group in found.indistinguishable:
         screen.print(f"cannot be told apart here: {', '.join(group)}")
     if found.where:
-        screen.print(cells(found.where, "Where"))
+        screen.print(cells(found.where, "Where", screen.width))
     remarks(screen, "What stays open", [words.open_in_words(u) for u in found.unexplained])
     if found.unexplained:
         remarks(screen, "Nearest effects", words.nearest_in_words(found.unexplained[0]))
-    remarks(screen, "Next", [s.text + (f" (host/docs/effects.md, {s.page!r})" if s.page else "")
-                             + (f"\n      {s.command}" if s.command else "") for s in found.next])
+    if found.next:
+        screen.print("Next:")
+    for step in found.next:
+        page = f" (host/docs/effects.md, {step.page!r})" if step.page else ""
+        screen.print(f"  - {step.text}{page}", highlight=False)
+        if step.command:
+            # Not wrapped: a line break within a copied command would end it.
+            screen.print(f"      {step.command}", highlight=False, soft_wrap=True)
     remarks(screen, "What these logs cannot say", found.cannot)
     remarks(screen, "Notes", found.notes)
 

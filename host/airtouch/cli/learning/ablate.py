@@ -8,6 +8,7 @@ from rich.table import Table
 
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import need_flights
+from airtouch.cli.shared.help import examples
 from airtouch.detector.evaluation import ablation
 from airtouch.detector.evaluation.ablation import ABLATIONS
 from airtouch.detector.evaluation.data import dataset
@@ -15,10 +16,11 @@ from airtouch.logs.files import check_free
 
 
 def _names() -> str:
-    return "\n".join(f"  {name:16} {a.what}" for name, a in ABLATIONS.items())
+    return "\n".join(f"  {name:16} {a.title}" for name, a in ABLATIONS.items())
 
 
-@click.command(name="ablate", epilog="\b\nAblations:\n" + _names())
+@click.command(name="ablate", epilog=examples(
+    "airtouch ablate my-flights --only best --only imu-only") + "\n\n\b\nAblations:\n" + _names())
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--only", multiple=True, type=click.Choice(list(ABLATIONS)), metavar="NAME",
               help="Run this one; may be given several times. All of them if left out.")
@@ -45,7 +47,7 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
     screen = show.console()
     for group in dict.fromkeys(row["group"] for row in results.values()):
         rows = {row["what"]: row for row in results.values() if row["group"] == group}
-        screen.print(show.table(rows, f"ablation: {group}"))
+        show.print_table(screen, rows, f"ablation: {group}")
         if any("converged_after_epochs" in f["parameters"] for row in rows.values() for f in row["folds"]):
             screen.print(_training(rows))
         if any("parameter_bytes" in f["parameters"] for row in rows.values() for f in row["folds"]):

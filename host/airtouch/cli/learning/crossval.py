@@ -9,6 +9,7 @@ import click
 
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import need_flights
+from airtouch.cli.shared.help import examples
 from airtouch.detector.best import free_air as free_air_flights
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -18,7 +19,10 @@ from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 
 
-@click.command(name="crossval")
+@click.command(name="crossval", epilog=examples(
+    "airtouch crossval my-flights --json scores.json",
+    "airtouch crossval my-flights --detector paper --by day",
+    "airtouch crossval my-flights --silence acceleration"))
 @click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
@@ -77,8 +81,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     result = evaluate.as_json(title, scores, left_out, [f["lag_s"] for f in folds], {})
     result["folds"] = folds
     screen = show.console()
-    screen.print(show.table({title: result, **result["by_height"]},
-                            f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}"))
+    show.print_table(screen, {title: result, **result["by_height"]},
+                     f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}")
     if random_windows:
         from airtouch.detector.evaluation import variants
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from airtouch import vehicle as vehicles
+from airtouch.cli.shared.help import examples
 from airtouch.detector.best import model as best_model
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper import rolling
@@ -14,7 +15,11 @@ from airtouch.kernels.network import parameter_bytes
 Trained = model_file.Model | best_model.BestModel
 
 
-@click.command(name="export")
+@click.command(name="export", epilog=examples(
+    "airtouch export --force                  # the shipped networks, to gap8/model",
+    "airtouch export mine.npz --out model",
+    "airtouch export --vehicle mine.toml       # a header of firmware/app/vehicles",
+    "airtouch export --check"))
 @click.argument("model", required=False, type=click.Path(path_type=Path))
 @click.option("--vehicle", metavar="NAME", help="Write a vehicle's header for the STM32 app instead: a name, or a "
               ".toml file.")

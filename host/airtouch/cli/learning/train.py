@@ -13,6 +13,7 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from airtouch.cli.shared.flights import need_flights
+from airtouch.cli.shared.help import examples
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
 from airtouch.detector.evaluation import crossval, evaluate
@@ -24,7 +25,10 @@ from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 
 
-@click.command(name="train")
+@click.command(name="train", epilog=examples(
+    "airtouch train my-flights --out mine.npz",
+    "airtouch train --simulated 200 --detector paper --out paper.npz",
+    "airtouch train my-flights --start mine.npz --out further.npz"))
 @click.argument("flights", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--detector", default="best", show_default=True,
               help="Which detector to train: best, paper or paper-stream.")
@@ -80,14 +84,14 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         options["free_air"] = air.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True))
     began = time.monotonic()
     if not simulated:
-        chosen, failures = _read(flights, evaluate.spare_of(module))
+        training, failures = _read(flights, evaluate.spare_of(module))
     with _progress_bars() as progress:
         if simulated:
-            chosen, what = _simulate(simulated, scenario, without, seed, progress)
+            training, what = _simulate(simulated, scenario, without, seed, progress)
             failures = 0
         if detector == "best":
             options["work"] = out.with_suffix(".training")
-        model = module.fit([sensors.without(log, silence) for log in chosen], seed=seed, progress=progress,
+        model = module.fit([sensors.without(log, silence) for log in training], seed=seed, progress=progress,
                            command=_command(), **options)
     if what:
         model = replace(model, metadata={**model.metadata, "simulated": what})
@@ -98,7 +102,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     _report(model.metadata, time.monotonic() - began)
     click.echo(f"written: {out} ({out.stat().st_size} bytes)")
     if failures:
-        click.echo(f"airtouch: {len(chosen)} flights used, {failures} left out (see above)", err=True)
+        click.echo(f"airtouch: {len(training)} flights used, {failures} left out (see above)", err=True)
         sys.exit(2)
 
 
@@ -133,10 +137,10 @@ def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
     logs, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
-    chosen, failures = list(logs.values()), len(left_out)
-    if not chosen:
+    training, failures = list(logs.values()), len(left_out)
+    if not training:
         raise AirTouchError("no flight that can be trained on")
-    return chosen, failures
+    return training, failures
 
 
 def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: int,
@@ -149,14 +153,14 @@ def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: 
 
 
 def _report(metadata: dict, seconds: float) -> None:
-    held = set(metadata.get("held_out", ()))
-    fitted = [name for name in metadata["flights"][metadata.get("flights_before", 0):] if name not in held]
+    held_out = set(metadata.get("held_out", ()))
+    fitted = [name for name in metadata["flights"][metadata.get("flights_before", 0):] if name not in held_out]
     click.echo(f"trained on {len(fitted)} flights in {seconds:.0f} s; lag {metadata.get('lag_s', 0.0):.2f} s")
-    if held:
-        click.echo(f"held out ({len(held)}): {', '.join(sorted(held))}")
+    if held_out:
+        click.echo(f"held out ({len(held_out)}): {', '.join(sorted(held_out))}")
     if "simulated" in metadata:
-        flown = metadata["simulated"]
-        click.echo(f"simulated: {flown['scenario']}, seed {flown['seed']}, effects: {', '.join(flown['effects'])}")
+        batch = metadata["simulated"]
+        click.echo(f"simulated: {batch['scenario']}, seed {batch['seed']}, effects: {', '.join(batch['effects'])}")
     score = metadata.get("held_out_accuracy", {})
     if score.get("float") is not None:
         click.echo(f"balanced window accuracy on held-out flights: float {score['float']:.1%}, "

@@ -78,8 +78,9 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
     summary = _summary(comparison, by_name, fitted.history, recorded, typed)
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
-    twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flown), fitted.levers,
-                             fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
+    with Bar("report"):
+        twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flown), fitted.levers,
+                                 fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
     _say(comparison, len(recorded.courses), fitted.history[0]["misfit"])
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 

@@ -1,7 +1,7 @@
 """Output that `evaluate`, `crossval` and `demo` share."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,18 +12,40 @@ from rich.table import Table
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
+CAPTION = ("second line: 95 % interval, bootstrap by flight. A miss has no detection within 1.5 s; a detection serves "
+           "one edge, the others are false. Hits: share of all true edges.")
+WIDE = 150  #: columns of a terminal on which a row of figures fits
+SUMMARY_WIDTH, NAME_WIDTH = 17, 22  #: columns of a summary, and of the figures' names, where they stand side by side
+SIDE_BY_SIDE = [{"s": "mean |error|, s"}.get(name, name) for name in ("flights", "edges", *COLUMNS)]
 
-def table(rows: Mapping[str, dict[str, Any]], title: str) -> Table:
-    """A table with a row of figures and intervals for each summary."""
-    result = Table(title=title, title_justify="left", show_lines=True, caption_justify="left",
-                   caption="second line: 95 % interval, bootstrap by flight. A miss has no detection within "
-                           "1.5 s; a detection serves one edge, the others are false. "
-                           "Hits: share of all true edges.")
-    for name in ("", "flights", "edges", *COLUMNS):
-        result.add_column(name, justify="left" if not name else "right")
-    for name, row in rows.items():
-        cells = (cell(row, *how) for how in COLUMNS.values())
-        result.add_row(name, str(row["flights"]), str(row["edges"]), *cells)
+
+def print_table(screen: Console, rows: Mapping[str, dict[str, Any]], title: str) -> None:
+    """Print figures and intervals of each summary: a row for each, or on a narrow terminal a column for each."""
+    if screen.width >= WIDE:
+        screen.print(_table(title, ["", "flights", "edges", *COLUMNS],
+                            [[name, *_cells(row)] for name, row in rows.items()], CAPTION))
+        return
+    names = list(rows)
+    count = max((screen.width - NAME_WIDTH) // SUMMARY_WIDTH, 1)
+    for first in range(0, len(names), count):
+        shown = names[first:first + count]
+        last = first + count >= len(names)
+        screen.print(_table(title if first == 0 else "", ["", *shown],
+                            zip(SIDE_BY_SIDE, *(_cells(rows[name]) for name in shown), strict=True),
+                            CAPTION if last else ""))
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    return [str(row["flights"]), str(row["edges"]), *(cell(row, *form) for form in COLUMNS.values())]
+
+
+def _table(title: str, head: Sequence[str], lines: Iterable[Sequence[str]], caption: str) -> Table:
+    result = Table(title=title or None, title_justify="left", show_lines=True, caption_justify="left",
+                   caption=caption or None)
+    for name in head:
+        result.add_column(name, justify="right" if name else "left")
+    for line in lines:
+        result.add_row(*line)
     return result
 
 

@@ -95,8 +95,8 @@ def hold(times_s: np.ndarray, slow_times_s: np.ndarray,
     last = np.searchsorted(sorted_times, np.asarray(times_s) + 1e-9, side="right") - 1
     fresh = (last >= 0) & (times_s - sorted_times[np.maximum(last, 0)] <= HELD_S + 1e-9) if len(order) \
         else np.zeros(len(times_s), bool)
-    held = {}
+    columns = {}
     for name, values in slow.items():
         at = np.asarray(values)[order][np.maximum(last, 0)] if len(order) else np.full(len(times_s), np.nan)
-        held[name] = np.where(fresh, at, np.nan)
-    return held
+        columns[name] = np.where(fresh, at, np.nan)
+    return columns

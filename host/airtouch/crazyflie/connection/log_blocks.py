@@ -50,7 +50,7 @@ class Attempt:
     config: Any  #: cflib's LogConfig
     answers: "queue.SimpleQueue[tuple[int, int] | None]" = field(default_factory=queue.SimpleQueue)
     repeated: set[int] = field(default_factory=set)
-    whole: bool = False
+    delivered: bool = False  #: a packet of data came
 
 
 class LogBlocks:
@@ -101,8 +101,8 @@ class LogBlocks:
 
         def take(stamp: int, values: dict[str, float], _: Any) -> None:
             if self._newest.get(block.name) is attempt:
-                if not attempt.whole:
-                    attempt.whole = True
+                if not attempt.delivered:
+                    attempt.delivered = True
                     attempt.answers.put(None)
                 self._samples.put(Sample(block.name, stamp, time.monotonic(), values))
 

@@ -42,7 +42,7 @@ class HostDetector:
         """
         log = FlightLog(dict(columns), {"source": "live"})
         for sensor in set(sensors.SENSORS) - set(self._missing):
-            log.require(*sensors.needed(log, sensor))
+            log.require(*sensors.required_columns(log, sensor))
         logged = sensors.signals(log, self._rates)
         self._rates = np.vstack([self._rates, logged.gyro])[-sensors.FLYING_WINDOW - 1:]
         events = self._session.next(logged.acc, logged.gyro, logged.pwm)

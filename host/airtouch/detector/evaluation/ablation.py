@@ -25,15 +25,15 @@ class Ablation:
     """One row: a detector and how it is changed; the registered one of this name, or a variant."""
 
     group: str
-    what: str
+    title: str
     variant: Detector | None = None
     name: str = "best"
     options: dict[str, Any] = field(default_factory=dict)
 
 
-def _only(group: str, what: str, *kept: str) -> Ablation:
+def _only(group: str, title: str, *kept: str) -> Ablation:
     muted = tuple(i for i, name in enumerate(NAMES[:-1]) if name not in kept)
-    return Ablation(group, what, options={"muted": muted})
+    return Ablation(group, title, options={"muted": muted})
 
 
 #: name -> ablation; the first of each group is what the others are held against
@@ -84,13 +84,13 @@ def ablate(
     results = {}
     for number, name in enumerate(names, start=1):
         ablation = ABLATIONS[name]
-        tell(f"{number}/{len(names)} {name}: {ablation.what}")
+        tell(f"{number}/{len(names)} {name}: {ablation.title}")
         detector = ablation.variant or get(ablation.name)
         shared = best_options if ablation.variant is None and ablation.name == "best" else paper_options
         scores, folds, left_out = crossval.crossval(
             name if ablation.variant else ablation.name, files, out, seed=seed,
             options={**(shared or {}), **ablation.options}, detector=detector, tell=tell)
-        results[name] = {"group": ablation.group, "what": ablation.what, **summary.summarise(scores),
+        results[name] = {"group": ablation.group, "what": ablation.title, **summary.summarise(scores),
                          "by_height": summary.by_height(scores), "folds": folds,
                          "seconds": sum(f["seconds"] for f in folds), "left_out": len(left_out)}
         if ablation.group == "size":

@@ -104,10 +104,10 @@ class _Study:
 def _score_fold(study: _Study, fold: int, key: str, files: Sequence[FlightFile], members: Sequence[FlightFile],
                 readable: dict[Path, FlightLog], tell: Tell) -> dict[str, Any]:
     """A fold's entry: a model of the other flights, its settings, and the scores of the members."""
-    detector, held = study.detector, {f.path for f in members}
+    detector, test_paths = study.detector, {f.path for f in members}
     test = [f for f in members if f.path in readable]
     train = [sensors.without(readable[f.path], study.silenced if study.silent_training else ())
-             for f in files if f.path in readable and f.path not in held]
+             for f in files if f.path in readable and f.path not in test_paths]
     tell(f"fold {fold}: training on {len(train)} flights, {len(test)} held out")
     started, cpu_before = time.monotonic(), time.process_time()
     path = study.out / f"{study.name}_fold{fold}_{key}.npz"
@@ -151,14 +151,14 @@ def model_of_fold(detector: Detector, flights: Sequence[FlightLog], path: Path, 
     return model
 
 
-def cache_key(name: str, files: Sequence[FlightFile], held: Sequence[FlightFile], seed: int,
+def cache_key(name: str, files: Sequence[FlightFile], test: Sequence[FlightFile], seed: int,
               options: dict[str, Any]) -> str:
     """Twelve hexadecimal digits that change with anything a fold's result depends on."""
     total = hashlib.sha256(f"{__version__} {name} {seed} {sorted(options.items())}".encode())
     for file in files:
         stat = os.stat(file.path) if file.path.exists() else None
         content = stat and (stat.st_size, stat.st_mtime_ns)
-        total.update(f"{file.path.name} {file.condition} {content} {file in held}".encode())
+        total.update(f"{file.path.name} {file.condition} {content} {file in test}".encode())
     return total.hexdigest()[:12]
 
 

@@ -45,8 +45,8 @@ class Platform:
     outline is None where a single pass crossed it: two points span no area.
     """
 
-    near: LineString | Point
-    far: LineString | Point
+    near_side: LineString | Point
+    far_side: LineString | Point
     outline: Polygon | None
     rectangle: Polygon | None
     sigma_m: float
@@ -162,12 +162,12 @@ def platforms(points: list[EdgePoint]) -> list[Platform]:
     """
     crossed = passes(points)
     groups: list[list[tuple[EdgePoint, EdgePoint]]] = []
-    gaps = np.array([_apart(a, b) for a, b in pairwise(crossed)])
+    gaps = np.array([_distance(a, b) for a, b in pairwise(crossed)])
     rows = gaps[gaps > 0.3 * np.quantile(gaps, 0.9)] if len(gaps) else gaps
     reach = 4.0 * float(np.median(rows)) if len(rows) else 0.0
     for crossing in crossed:
         for group in groups:
-            if any(_beside(other, crossing, reach) for other in group[-2:]):
+            if any(_adjacent(other, crossing, reach) for other in group[-2:]):
                 group.append(crossing)
                 break
         else:
@@ -175,7 +175,7 @@ def platforms(points: list[EdgePoint]) -> list[Platform]:
     return [_fit(group) for group in groups]
 
 
-def _apart(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint]) -> float:
+def _distance(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint]) -> float:
     """Distance between two passes across the direction of the first, metres."""
     a, b = _ends(one), _ends(other)
     direction, between = a[1] - a[0], (b - a).mean(axis=0)
@@ -187,14 +187,14 @@ def _ends(crossing: tuple[EdgePoint, EdgePoint]) -> np.ndarray:
     return np.array([[p.x_m, p.y_m] for p in crossing])
 
 
-def _beside(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint], reach: float) -> bool:
+def _adjacent(one: tuple[EdgePoint, EdgePoint], other: tuple[EdgePoint, EdgePoint], reach: float) -> bool:
     a, b = _ends(one), _ends(other)
     direction = a[1] - a[0]
     length = float(np.hypot(*direction))
     if length == 0.0:
         return False
     shadow = np.sort((b - a[0]) @ direction / length)
-    return bool(shadow[0] < length and shadow[1] > 0 and _apart(one, other) <= reach)
+    return bool(shadow[0] < length and shadow[1] > 0 and _distance(one, other) <= reach)
 
 
 def _fit(group: list[tuple[EdgePoint, EdgePoint]]) -> Platform:
@@ -227,7 +227,7 @@ def geojson(points: list[EdgePoint], platforms: list[Platform], properties: dict
     for number, platform in enumerate(platforms):
         shared = {"platform": number, "sigma_m": round(platform.sigma_m, 4)}
         features += [_feature(line, role=role, **shared)
-                     for role, line in (("near side", platform.near), ("far side", platform.far))
+                     for role, line in (("near side", platform.near_side), ("far side", platform.far_side))
                      if isinstance(line, LineString)]
         for role, polygon in (("outline", platform.outline), ("rectangle", platform.rectangle)):
             if polygon is not None:

@@ -70,7 +70,7 @@ def score_report(scores: Mapping[str, Sequence[FlightScore]], flights: Sequence[
     first = next(iter(scores))
     return ScoreReport(
         {name: summary.summarise(some) for name, some in scores.items()},
-        {f"{first} by height": summary.by_height(scores[first]),
+        {f"{first} by height": summary.by_centimetre(scores[first]),
          f"{first} by approach angle, degrees": summary.by_angle(scores[first]),
          f"{first} by wind": summary.by_wind(scores[first])},
         {name: hit_curve(some) for name, some in scores.items()},

@@ -1,6 +1,7 @@
 """Scores of many flights as one table, each figure with its interval."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -65,6 +66,18 @@ def by_height(scores: Sequence[FlightScore]) -> dict[str, dict]:
     groups = breakdown(scores, lambda s: s.condition.height)
     high = [s for s in scores if s.condition.height in HIGH]
     return {**groups, "+".join(HIGH): summarise(high)} if high else groups
+
+
+def by_centimetre(scores: Sequence[FlightScore]) -> dict[str, dict]:
+    """As `by_height`; heights in millimetres in whole centimetres, for simulated ones are drawn and all differ."""
+    def rounded(score: FlightScore) -> FlightScore:
+        digits = (score.condition.height or "").removesuffix("mm")
+        if not digits.isdigit():
+            return score
+        return replace(score, condition=replace(score.condition, height=f"{int(digits) / 10:.0f}"))
+
+    groups = by_height([rounded(score) for score in scores])
+    return {f"{value} cm" if value.isdigit() else value: row for value, row in groups.items()}
 
 
 def by_angle(scores: Sequence[FlightScore]) -> dict[str, dict]:

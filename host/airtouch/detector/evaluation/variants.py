@@ -47,12 +47,12 @@ class Variant:
         parts = [self._windows(log, index) for index, log in enumerate(flights)]
         windows = training.Windows(*(np.concatenate([getattr(p, name) for p in parts])
                                   for name in ("x", "over", "alert", "flight")))
-        held = training.held_out(len(flights), seed)
-        used = ~np.isin(windows.flight, held)
+        validation = training.held_out(len(flights), seed)
+        used = ~np.isin(windows.flight, validation)
         network, losses = training.fit_keras(windows.select(used), windows.select(~used), epochs, 0.0, BLOCK,
                                           self.df_lambda, lambda *_: None)
         converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
-        unseen = [flights[i] for i in held] or list(flights)
+        unseen = [flights[i] for i in validation] or list(flights)
         model = VariantModel(network, DEFAULT, 0.0, converged)
         settings, lag, _ = paper.choose_decoding([self._decoding_inputs(log, model) for log in unseen],
                                                  [logs.true_edges(log) for log in unseen], self.physical_filter)

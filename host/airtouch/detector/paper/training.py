@@ -83,23 +83,23 @@ def train_paper(
     if fixed_scale:
         scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features, strict=True)])
     windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features, strict=True))])
-    held = held_out(len(flights), seed)
-    kept = ~np.isin(windows.flight, held)
-    if not kept.any() or len(np.unique(windows.over[kept])) < 2:
+    validation = held_out(len(flights), seed)
+    in_training = ~np.isin(windows.flight, validation)
+    if not in_training.any() or len(np.unique(windows.over[in_training])) < 2:
         raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
                             "give more flights")
-    weights, ran = fit_windows(windows.select(kept), windows.select(~kept), epochs, sparsity, block,
+    weights, ran = fit_windows(windows.select(in_training), windows.select(~in_training), epochs, sparsity, block,
                                df_lambda, report, conv_sparsity)
-    int8, tflite = quantisation.quantise(weights, windows.x[kept])
+    int8, tflite = quantisation.quantise(weights, windows.x[in_training])
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),
         "seed": seed, "epochs": epochs, "epochs_run": ran, "sparsity": sparsity, "block": block,
         "lambda": df_lambda, "conv_sparsity": conv_sparsity,
         "flights": [os.path.basename(log.source) for log in flights],
-        "held_out": [os.path.basename(flights[i].source) for i in held], "data_sha256": data_hash(windows),
+        "held_out": [os.path.basename(flights[i].source) for i in validation], "data_sha256": data_hash(windows),
     }, scale)
-    judged = accuracy(model, windows.select(~kept & (np.arange(len(kept)) % STRIDE == 0)))
-    return replace(model, metadata={**model.metadata, "held_out_accuracy": judged})
+    score = accuracy(model, windows.select(~in_training & (np.arange(len(in_training)) % STRIDE == 0)))
+    return replace(model, metadata={**model.metadata, "held_out_accuracy": score})
 
 
 def features_of(flights: Sequence[FlightLog], progress: Progress) -> list[Features]:
@@ -179,14 +179,14 @@ def one_cycle(step: float, steps: float, peak: float = PEAK_RATE) -> float:
     return stop + (start - stop) * 0.5 * (1.0 + float(np.cos(np.pi * part)))
 
 
-def fit_windows(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+def fit_windows(train: Windows, validation: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
                 progress: Progress, conv_sparsity: float = 0.0) -> tuple[dict[str, np.ndarray], int]:
     """The trained weights and the number of epochs."""
-    model, losses = fit_keras(train, held, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
+    model, losses = fit_keras(train, validation, epochs, sparsity, block, df_lambda, progress, conv_sparsity)
     return network.weights_of_keras(model), len(losses)
 
 
-def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
+def fit_keras(train: Windows, validation: Windows, epochs: int, sparsity: float, block: int, df_lambda: float,
               progress: Progress, conv_sparsity: float = 0.0):
     """The trained Keras model, and the loss on the held-out windows after each epoch.
 
@@ -194,7 +194,7 @@ def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block
     """
     import keras
 
-    train, held = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, held))
+    train, validation = (part.select(np.arange(len(part.x)) % STRIDE == 0) for part in (train, validation))
     batches = max(len(train.x) // BATCH, 1)
     pruned_epochs = max(int(np.ceil(PRUNED_BY * epochs)), 1)
     constraints, callbacks = {}, []
@@ -210,12 +210,12 @@ def fit_keras(train: Windows, held: Windows, epochs: int, sparsity: float, block
     stopping = keras.callbacks.EarlyStopping(patience=PATIENCE, restore_best_weights=True,
                                              start_from_epoch=pruned_epochs)
     report = keras.callbacks.LambdaCallback(
-        on_epoch_end=lambda epoch, seen: progress("epochs", epoch + 1, epochs, f"loss {seen['loss']:.3f}"))
-    callbacks += [report] + ([stopping] if len(held.x) else [])
+        on_epoch_end=lambda epoch, logs: progress("epochs", epoch + 1, epochs, f"loss {logs['loss']:.3f}"))
+    callbacks += [report] + ([stopping] if len(validation.x) else [])
     history = model.fit(_batches(train, shuffle=True), epochs=epochs, verbose=0, callbacks=callbacks,
                         shuffle=False,
-                        validation_data=_batches(held, shuffle=False) if len(held.x) else None)
-    return model, history.history["val_loss" if len(held.x) else "loss"]
+                        validation_data=_batches(validation, shuffle=False) if len(validation.x) else None)
+    return model, history.history["val_loss" if len(validation.x) else "loss"]
 
 
 def _rate_table(steps: int):

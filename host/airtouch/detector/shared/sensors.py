@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airtouch.detector.shared.channels import level_acceleration
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import unknown
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
 from airtouch.reference.motion_channels import ACCELERATION, CHANNEL_TABLE, MOTORS, RATES, MotionConfig
 
@@ -33,7 +33,7 @@ class Signals:
     missing: tuple[str, ...]
 
 
-def needed(log: FlightLog, sensor: str) -> tuple[str, ...]:
+def required_columns(log: FlightLog, sensor: str) -> tuple[str, ...]:
     """The columns of a sensor, as this log would have them."""
     acceleration = ACC_WORLD if log.has(*ACC_WORLD) else ACC
     return {ACCELERATION: acceleration, RATES: GYRO, MOTORS: PWM}[sensor]
@@ -41,7 +41,7 @@ def needed(log: FlightLog, sensor: str) -> tuple[str, ...]:
 
 def missing(log: FlightLog) -> tuple[str, ...]:
     """The sensors, of SENSORS, whose columns the log lacks."""
-    return tuple(sensor for sensor in SENSORS if not log.has(*needed(log, sensor)))
+    return tuple(sensor for sensor in SENSORS if not log.has(*required_columns(log, sensor)))
 
 
 def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals:
@@ -52,7 +52,7 @@ def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals
     """
     absent = missing(log)
     if len(absent) > 1:
-        log.require(*(name for sensor in absent for name in needed(log, sensor)))
+        log.require(*(name for sensor in absent for name in required_columns(log, sensor)))
     n = len(log)
     acc = np.tile([0.0, 0.0, GRAVITY_MPS2], (n, 1)) if ACCELERATION in absent else level_acceleration(log)
     gyro = np.zeros((n, 3)) if RATES in absent else log.stack(GYRO)
@@ -81,17 +81,17 @@ def without(log: FlightLog, sensors: tuple[str, ...]) -> FlightLog:
     columns = {ACCELERATION: (*ACC, *ACC_WORLD), RATES: GYRO, MOTORS: PWM}
     for sensor in sensors:
         if sensor not in columns:
-            raise AirTouchError(f"no sensor {sensor!r}{nearest(sensor, SENSORS)}; known: {', '.join(SENSORS)}")
+            raise unknown("sensor", sensor, SENSORS)
     dropped = {name for sensor in sensors for name in columns[sensor]}
     return FlightLog({name: values for name, values in log.columns.items() if name not in dropped}, log.meta)
 
 
 def flying(gyro: np.ndarray) -> np.ndarray:
     """Whether the drone flies, (n,) bool, from its rates (n, 3) rad/s alone; causal. The rotors shake it."""
-    held = np.nan_to_num(gyro)
-    change = np.zeros(len(held))
-    change[1:] = np.square(np.diff(held, axis=0)).sum(axis=1)
+    rates = np.nan_to_num(gyro)
+    change = np.zeros(len(rates))
+    change[1:] = np.square(np.diff(rates, axis=0)).sum(axis=1)
     total = np.cumsum(np.r_[0.0, change])
-    first = np.maximum(np.arange(len(held)) + 1 - FLYING_WINDOW, 0)
+    first = np.maximum(np.arange(len(rates)) + 1 - FLYING_WINDOW, 0)
     mean = (total[1:] - total[first]) / FLYING_WINDOW
     return mean > FLYING_CHANGE_RADPS**2

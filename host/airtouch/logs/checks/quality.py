@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.channel_faults import duplicates, saturated, spikes, stuck
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
@@ -59,7 +59,7 @@ def summary(log: FlightLog) -> dict[str, Any]:
         "channels": [name for name, column in GROUPS.items() if log.has(column)],
         "entries": sum(edge.kind == "entry" for edge in report.edges),
         "exits": sum(edge.kind == "exit" for edge in report.edges),
-        "condition": shown(str(log.meta.get("condition", ""))), "warnings": len(report.warnings),
+        "condition": printable(str(log.meta.get("condition", ""))), "warnings": len(report.warnings),
     }
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.clock import FASTEST_S, LATEST_S, SLOWEST_S
 from airtouch.logs.flight_log import FlightLog
 
@@ -69,9 +69,9 @@ def _checked_meta(meta: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     meta, warnings = dict(meta), list(meta["warnings"])
     period = meta.get("sample_period_s", 0.01)
     if isinstance(period, bool) or not isinstance(period, (int, float)) or not FASTEST_S <= period <= SLOWEST_S:
-        warnings.append(f"sample_period_s: {shown(str(period))} is not {FASTEST_S:g} to {SLOWEST_S:g} s; left out")
+        warnings.append(f"sample_period_s: {printable(str(period))} is not {FASTEST_S:g} to {SLOWEST_S:g} s; left out")
         del meta["sample_period_s"]
     if meta.get("acc_frame", "body") not in ("body", "world"):
-        warnings.append(f"acc_frame: {shown(str(meta['acc_frame']))} is neither body nor world; taken as body")
+        warnings.append(f"acc_frame: {printable(str(meta['acc_frame']))} is neither body nor world; taken as body")
         meta["acc_frame"] = "body"
     return meta, warnings

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.logs.table import Sheet, named_table
 
@@ -31,7 +31,7 @@ def read(text: Sheet, source: str) -> FlightLog:
             meta[key.strip()] = json_value(value.strip())
     warnings = stored_warnings(meta)
     columns = named_table(text, source, warnings)
-    unknown = [shown(name) for name in columns if name not in COLUMNS]
+    unknown = [printable(name) for name in columns if name not in COLUMNS]
     if unknown:
         note = f"columns not in the schema, kept as they are: {', '.join(unknown[:8])}"
         if note not in warnings:
@@ -106,7 +106,7 @@ def json_value(text: str) -> Any:
 def stored_warnings(meta: dict[str, Any]) -> list[str]:
     """The warnings that were stored with a log, each printable and at most 400 characters long."""
     stored = meta.get("warnings")
-    return [shown(str(w), LONGEST_WARNING) for w in stored] if isinstance(stored, list) else []
+    return [printable(str(w), LONGEST_WARNING) for w in stored] if isinstance(stored, list) else []
 
 
 def plain(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import COLUMNS, LARGEST_BYTES, FlightLog
 from airtouch.logs.formats.canonical import json_value, ordered_names, plain, stored_meta, stored_warnings
 from airtouch.logs.table import check_names
@@ -54,7 +54,7 @@ def _damage(arrow: Any, source: str) -> Iterator[None]:
     try:
         yield
     except (arrow.ArrowException, OSError, ValueError, TypeError, MemoryError) as error:
-        reason = shown(str(error).partition("\n")[0] or type(error).__name__, 120)
+        reason = printable(str(error).partition("\n")[0] or type(error).__name__, 120)
         raise AirTouchError(f"{source}: damaged Parquet file ({reason}); copy or write it again") from None
 
 
@@ -64,8 +64,8 @@ def _check(schema: Any, footer: Any, types: Any, source: str) -> None:
     for field in schema:
         if not any(check(field.type) for check in (types.is_integer, types.is_floating, types.is_boolean,
                                                    types.is_decimal, types.is_null)):
-            raise AirTouchError(f"{source}: column '{shown(field.name)}' holds {shown(str(field.type))}, not numbers; "
-                                "leave it out")
+            raise AirTouchError(f"{source}: column '{printable(field.name)}' holds {printable(str(field.type))}, not "
+                                "numbers; leave it out")
     if not set(schema.names) & set(COLUMNS) or not footer.num_rows:
         raise AirTouchError(f"{source}: no known column or no row in this Parquet file; "
                             "name the columns as in the table of columns")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.table import MOST_COLUMNS
 from airtouch.logs.variables import to_columns
@@ -61,7 +61,7 @@ def read(data: bytes, source: str) -> FlightLog:
             "warnings": warnings}
     columns = to_columns(table, meta)
     if not columns:
-        names = ", ".join(shown(name) for name in event.variables[:6])
+        names = ", ".join(printable(name) for name in event.variables[:6])
         raise AirTouchError(f"{source}: none of its variables is known ({names}); "
                             "log acc, gyro, motor and range")
     return FlightLog({"t_s": records["time"] * (1e-3 if version == 1 else 1e-6)} | columns, meta)
@@ -110,7 +110,7 @@ def _event(name: str, declared: list[str], version: int, source: str) -> Event:
     for i, text in enumerate(declared):
         letter = text[-2:-1]
         if len(text) < 4 or text[-3] != "(" or text[-1] != ")" or letter not in TYPES:
-            raise AirTouchError(f"{source}: damaged uSD header: variable '{shown(text, 30)}' has no known type; "
+            raise AirTouchError(f"{source}: damaged uSD header: variable '{printable(text, 30)}' has no known type; "
                                 "copy it from the card again")
         fields.append((f"v{i}", TYPES[letter]))
     return Event(name, tuple(text[:-3] for text in declared), np.dtype(fields))

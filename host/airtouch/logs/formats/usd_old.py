@@ -12,7 +12,7 @@ import zlib
 
 import numpy as np
 
-from airtouch.errors import AirTouchError, shown
+from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.usd import TYPES
 from airtouch.logs.variables import to_columns
@@ -50,7 +50,7 @@ def read(data: bytes, source: str) -> FlightLog:
     meta = {"source": source, "format": "usd-0", "vehicle": "crazyflie-2.1", "condition": "", "warnings": warnings}
     columns = to_columns(table, meta)
     if not columns:
-        known = ", ".join(shown(name) for name in names[:6])
+        known = ", ".join(printable(name) for name in names[:6])
         raise AirTouchError(f"{source}: none of its variables is known ({known}); log acc, gyro, motor and range")
     return FlightLog({"t_s": table[TIME] * _seconds(table[TIME])} | columns, meta)
 

@@ -81,7 +81,7 @@ def derivative(plant, body):
     """Fill body.slope, the present d(state)/dt of a BODY."""
     fixed = constants(plant)
     rotors = _rotors(plant, fixed, body, 1.0, 1.0)
-    _put(body.slope, _slope(plant, fixed, _numbers(body.state), rotors, body.wrench))
+    _assign(body.slope, _slope(plant, fixed, _numbers(body.state), rotors, body.wrench))
 
 
 @jit
@@ -104,8 +104,8 @@ def advance(plant, fixed, body):
     k3 = _slope(plant, fixed, _along(start, 0.5 * h, k2), rotors, body.wrench)
     rotors = _rotors(plant, fixed, body, fixed.rise_half * fixed.rise_half, fixed.fall_half * fixed.fall_half)
     k4 = _slope(plant, fixed, _along(start, h, k3), rotors, body.wrench)
-    _put(body.slope, k1)
-    _put(body.state, _along(start, h / 6.0, _along(_along(k1, 2.0, _along(k2, 1.0, k3)), 1.0, k4)))
+    _assign(body.slope, k1)
+    _assign(body.state, _along(start, h / 6.0, _along(_along(k1, 2.0, _along(k2, 1.0, k3)), 1.0, k4)))
     for i in range(4):
         body.rotor_speed[i] = rotors.speed[i]
     normalise(body.state[6:10])
@@ -166,6 +166,6 @@ def _numbers(x):
 
 
 @jit
-def _put(out, x):
+def _assign(out, x):
     for i in range(STATE_SIZE):
         out[i] = x[i]

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from airtouch.errors import AirTouchError, nearest
+from airtouch.errors import AirTouchError, unknown
 from airtouch.simulation.effects import names
 from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
@@ -57,7 +57,7 @@ def unregister(name: str) -> None:
 def get(name: str) -> Effect:
     """The effect of that name; AirTouchError names the known ones."""
     if name not in EFFECTS:
-        raise AirTouchError(f"no effect {name!r}{nearest(name, EFFECTS)}; known: {', '.join(EFFECTS)}")
+        raise unknown("effect", name, EFFECTS)
     return EFFECTS[name]
 
 

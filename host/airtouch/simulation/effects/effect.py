@@ -67,26 +67,26 @@ class Effect:
     wrench: Any = None
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  #: values measured together
 
-    def values(self, given: Mapping[str, float | str] | None = None) -> dict[str, float]:
-        """Every parameter: what is given, else what the preset says, else its default.
+    def values(self, overrides: Mapping[str, float | str] | None = None) -> dict[str, float]:
+        """Every parameter: what is overridden, else what the preset says, else its default.
 
-        given: {parameter: value}, and under "preset" the name of one of `presets`.
+        overrides: {parameter: value}, and under "preset" the name of one of `presets`.
         Raises AirTouchError for an unknown name and for values out of bounds.
         """
-        given = dict(given or {})
-        preset = given.pop("preset", None)
+        overrides = dict(overrides or {})
+        preset = overrides.pop("preset", None)
         if preset is not None:
             if preset not in self.presets:
                 listed = ", ".join(self.presets) or "it has none"
                 raise AirTouchError(f"{self.name} has no preset {preset!r}; known: {listed}")
-            given = {**self.presets[str(preset)], **given}
+            overrides = {**self.presets[str(preset)], **overrides}
         known = {p.name: p for p in self.parameters}
-        for name in given:
+        for name in overrides:
             if name not in known:
                 raise AirTouchError(f"{self.name} has no parameter {name!r}; it has {', '.join(known)}")
         result = {}
         for p in self.parameters:
-            value = float(given.get(p.name, p.default))
+            value = float(overrides.get(p.name, p.default))
             if not p.low <= value <= p.high:
                 raise AirTouchError(f"{self.name}: {p.name} = {value:g} {p.unit} is out of bounds, "
                                     f"{p.low:g} to {p.high:g} {p.unit}")

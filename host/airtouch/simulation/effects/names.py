@@ -22,7 +22,7 @@ def check(text: str, source: str) -> None:
     known = set(_signal_modules(tree))
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in known:
-            _known(node.attr, SIGNALS, "signal", source, node.lineno)
+            _check(node.attr, SIGNALS, "signal", source, node.lineno)
     parameters = tuple(_parameters(tree))
     for function in _settings(tree):
         row, values = (a.arg for a in function.args.args[:2])
@@ -31,12 +31,12 @@ def check(text: str, source: str) -> None:
                     and isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, str)):
                 continue
             if node.value.id == row:
-                _known(node.slice.value, (*FIELDS, "firmware"), "plant field", source, node.lineno)
+                _check(node.slice.value, (*FIELDS, "firmware"), "plant field", source, node.lineno)
             elif node.value.id == values and parameters:
-                _known(node.slice.value, parameters, "parameter of this file", source, node.lineno)
+                _check(node.slice.value, parameters, "parameter of this file", source, node.lineno)
 
 
-def _known(name: str, names: tuple[str, ...], what: str, source: str, line: int) -> None:
+def _check(name: str, names: tuple[str, ...], what: str, source: str, line: int) -> None:
     if name not in names:
         raise AirTouchError(f"{source}:{line}: no {what} "
                             f"{name!r}{nearest(name, names) or '; the page on effects lists them'}")

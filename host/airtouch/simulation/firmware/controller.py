@@ -80,9 +80,9 @@ def _heading(state, setpoint, dt):
 
 
 @jit
-def _run_loop(plant, state, which, how, desired, measured):
-    """Output of one of the twelve loops (a place of settings.LOOPS), run as pid.How says."""
-    return pid.run(plant.firmware.loops[which], state.loops[which], how, desired, measured)
+def _run_loop(plant, state, which, options, desired, measured):
+    """Output of one of the twelve loops (a place of settings.LOOPS), run as pid.Options says."""
+    return pid.run(plant.firmware.loops[which], state.loops[which], options, desired, measured)
 
 
 @jit
@@ -99,7 +99,7 @@ def _velocity(plant, state, setpoint, estimate, across):
     if setpoint.mode[Y] == ABSOLUTE:
         left = _run_loop(plant, state, place.POSITION_Y, across, c * p[1] - n * p[0], c * at[1] - n * at[0])
     if setpoint.mode[Z] == ABSOLUTE:
-        up = pid.How(across.dt, plant.height_gain, across.on_error, False)
+        up = pid.Options(across.dt, plant.height_gain, across.on_error, False)
         climb = _run_loop(plant, state, place.POSITION_Z, up, p[2], at[2])
     return ahead, left, climb
 
@@ -109,8 +109,8 @@ def _position(plant, state, setpoint, estimate):
     """Position and velocity loops: desired roll, pitch and thrust."""
     settings, s = plant.firmware, plant.firmware.controller
     dt, on_error = 0.001 * settings.periods.position_ms, bool(s.derivative_on_error)
-    across = pid.How(dt, plant.position_gain, on_error, False)
-    up = pid.How(dt, plant.height_gain, on_error, False)
+    across = pid.Options(dt, plant.position_gain, on_error, False)
+    up = pid.Options(dt, plant.height_gain, on_error, False)
     yaw = math.radians(estimate.attitude[2])
     c, n = math.cos(yaw), math.sin(yaw)
     w = estimate.velocity
@@ -130,15 +130,15 @@ def _attitude(plant, state, setpoint, estimate, dt):
     on_error = bool(settings.controller.derivative_on_error)
     rate = state.rate
     for i in range(3):
-        how = pid.How(dt, plant.attitude_gain, on_error, i == 2)
-        rate[i] = _run_loop(plant, state, place.ROLL + i, how, state.attitude[i], estimate.attitude[i])
+        options = pid.Options(dt, plant.attitude_gain, on_error, i == 2)
+        rate[i] = _run_loop(plant, state, place.ROLL + i, options, state.attitude[i], estimate.attitude[i])
         if i < 2 and setpoint.mode[ROLL + i] == VELOCITY:
             rate[i] = setpoint.rate[i]
             if settings.controller.reset_in_rate_mode:
                 pid.reset(state.loops[place.ROLL + i], 0.0)
-    how = pid.How(dt, plant.rate_gain * plant.rate_scale, on_error, False)
+    options = pid.Options(dt, plant.rate_gain * plant.rate_scale, on_error, False)
     for i in range(3):
         measured = -estimate.rate[1] if i == 1 else estimate.rate[i]
-        out = _run_loop(plant, state, place.RATE_ROLL + i, how, rate[i], measured)
-        state.command[i] = mixer.whole(out)
+        out = _run_loop(plant, state, place.RATE_ROLL + i, options, rate[i], measured)
+        state.command[i] = mixer.to_int16(out)
     state.command[2] = -state.command[2]

@@ -7,8 +7,8 @@ MOST_TURN = 32767.0  #: its largest roll, pitch or yaw command, INT16_MAX
 
 
 @jit
-def whole(value):
-    """A command as the firmware keeps it: cut to 16 bits, then to a whole number towards zero."""
+def to_int16(value):
+    """A command as the firmware keeps it: cut to the range of an int16, then to a whole number towards zero."""
     return float(int(min(max(value, -MOST_TURN), MOST_TURN)))
 
 

@@ -9,8 +9,8 @@ from airtouch.simulation.compiled import jit
 STATE = np.dtype([("integral", np.float64), ("previous", np.float64)])
 
 
-class How(NamedTuple):
-    """How a loop is run."""
+class Options(NamedTuple):
+    """What a loop is run with, beside its gains."""
 
     dt: float  #: s since its last run
     scale: float  #: all its gains are multiplied by it
@@ -42,26 +42,26 @@ def reset(state, measured):
 
 
 @jit
-def run(gains, state, how, desired, measured):
+def run(gains, state, options, desired, measured):
     """The loop's output.
 
-    gains: settings.GAINS; state: STATE; how: How; desired and measured: in the loop's own unit.
+    gains: settings.GAINS; state: STATE; options: Options; desired and measured: in the loop's own unit.
     """
     error = desired - measured
-    if how.turns:
+    if options.turns:
         error = wrapped(error)
-    if how.on_error:
+    if options.on_error:
         change = error - state.previous
         state.previous = error
     else:
         change = state.previous - measured
-        if how.turns:
+        if options.turns:
             change = wrapped(change)
         state.previous = measured
-    state.integral += error * how.dt
+    state.integral += error * options.dt
     if gains.integral_limit > 0.0:
         state.integral = limit(state.integral, gains.integral_limit)
-    out = how.scale * (gains.p * error + gains.d * (change / how.dt) + gains.i * state.integral)
+    out = options.scale * (gains.p * error + gains.d * (change / options.dt) + gains.i * state.integral)
     if gains.output_limit > 0.0:
         out = limit(out, gains.output_limit)
     return out

@@ -27,7 +27,7 @@ def flights(client: Any, scenario: Scenario, numbers: Sequence[int], *, vehicle:
 
     def send() -> Any:
         number = waiting.pop()
-        return client.submit(_one, scenario, vehicle, seed, number, effects, tuple(without), tuple(plugins),
+        return client.submit(_fly, scenario, vehicle, seed, number, effects, tuple(without), tuple(plugins),
                              pure=False, retries=3, key=f"airtouch-{scenario.name}-{seed}-{number}")
 
     with client.as_current():
@@ -52,7 +52,7 @@ def connect(address: str) -> Any:
         raise AirTouchError(f"no dask scheduler answers at {address}: {error}") from None
 
 
-def _one(scenario: Scenario, vehicle: Vehicle, seed: int, number: int, effects: Chosen,
+def _fly(scenario: Scenario, vehicle: Vehicle, seed: int, number: int, effects: Chosen,
          without: Sequence[str],
          plugins: Sequence[str]) -> FlightLog | Diverged:
     from airtouch.simulation import effects as registry

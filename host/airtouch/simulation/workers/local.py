@@ -28,13 +28,13 @@ def write(folder: Path, scenario: Scenario, numbers: Sequence[int], *, vehicle: 
     """
     job = (folder, scenario, vehicle, effects, tuple(without), seed)
     if workers == 1:
-        yield from (_one(job, n) for n in numbers)
+        yield from (_fly(job, n) for n in numbers)
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_start,
                              initargs=(tuple(plugins),)) as pool:
         try:
-            yield from in_order(lambda n: pool.submit(_one, job, n), numbers, AHEAD * workers)
+            yield from in_order(lambda n: pool.submit(_fly, job, n), numbers, AHEAD * workers)
         except BrokenProcessPool:
             raise AirTouchError("a worker process died; call the same command again to continue") from None
 
@@ -55,7 +55,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _one(job: tuple, number: int) -> Diverged | None:
+def _fly(job: tuple, number: int) -> Diverged | None:
     folder, scenario, vehicle, effects, without, seed = job
     result = fly(scenario, vehicle, seed, number, effects=effects, without=without)
     if isinstance(result, Diverged):

@@ -18,17 +18,17 @@ GENERATED, SCENARIO = 32, "paper-low"  #: number and scenario of the simulated f
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """Training flights, held-out flights, and a description of their source for the report."""
+class DemoFlights:
+    """Training flights, held-out flights, and their origin in words, for the report."""
 
     train: list[FlightFile]
     test: list[FlightFile]
-    where: str
+    origin: str
 
 
 def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
            tell: Callable[[str], None] = lambda _: None,
-           progress: Callable[[int, int], None] = lambda *_: None) -> Chosen:
+           progress: Callable[[int, int], None] = lambda *_: None) -> DemoFlights:
     """The recorded flights of `folder`, or for None simulated flights, which are written to the folder `simulated`.
 
     speed_mps: speed of flights whose manifest has none. tell: called with a line for each simulated flight that
@@ -36,22 +36,22 @@ def choose(folder: Path | None, simulated: Path, speed_mps: float | None = None,
     Raises AirTouchError for fewer than FEWEST flights.
     """
     if folder is not None:
-        files, where = dataset.collect([folder], speed_mps), f"recorded flights in {folder}"
+        files, origin = dataset.collect([folder], speed_mps), f"recorded flights in {folder}"
     else:
-        files, where = generated(simulated, tell, progress), f"flights of the simulator ({simulated})"
+        files, origin = generated(simulated, tell, progress), f"flights of the simulator ({simulated})"
     if len(files) < FEWEST:
         raise AirTouchError(f"{folder or simulated}: {len(files)} flights are too few to train and to test; "
                             f"at least {FEWEST} are needed")
     train, test = split(files)
-    return Chosen(spread(train, TRAIN), spread(test, TEST), where)
+    return DemoFlights(spread(train, TRAIN), spread(test, TEST), origin)
 
 
 def split(files: Sequence[FlightFile]) -> tuple[list[FlightFile], list[FlightFile]]:
     """(training flights, held-out flights). Folds stay whole; a flight without one counts by its index."""
     fold = [i if f.condition.fold is None else f.condition.fold for i, f in enumerate(files)]
-    held = [k % HELD_OUT == 0 for k in fold]
-    return ([f for f, out in zip(files, held, strict=True) if not out],
-            [f for f, out in zip(files, held, strict=True) if out])
+    in_test = [k % HELD_OUT == 0 for k in fold]
+    return ([f for f, out in zip(files, in_test, strict=True) if not out],
+            [f for f, out in zip(files, in_test, strict=True) if out])
 
 
 def generated(folder: Path, tell: Callable[[str], None] = lambda _: None,
@@ -64,13 +64,13 @@ def generated(folder: Path, tell: Callable[[str], None] = lambda _: None,
     scene = scenario.load(SCENARIO)
     folder.mkdir(parents=True, exist_ok=True)
     progress(0, GENERATED)
-    for number, flown in enumerate(batch.flights(scene, GENERATED)):
+    for number, flight in enumerate(batch.flights(scene, GENERATED)):
         path = store.path_of(folder, scene.name, 0, number)
         path.unlink(missing_ok=True)
-        if isinstance(flown, Diverged):
-            tell(str(flown))
+        if isinstance(flight, Diverged):
+            tell(str(flight))
         else:
-            logs.write(flown, path)
+            logs.write(flight, path)
         progress(number + 1, GENERATED)
     store.write_manifest(folder, scene, 0, GENERATED)
     return dataset.collect([folder])

@@ -41,9 +41,9 @@ def training_flights(
         raise AirTouchError(f"{absent[0]} is off in {scene.name} already; on are: {', '.join(on) or 'none'}")
     usable: list[FlightLog] = []
     left_out = 0
-    for flown in batch.flights(scene, range(SPARE * count), vehicle=vehicle, without=without, seed=seed):
-        if isinstance(flown, FlightLog) and _usable(flown):
-            usable.append(flown)
+    for flight in batch.flights(scene, range(SPARE * count), vehicle=vehicle, without=without, seed=seed):
+        if isinstance(flight, FlightLog) and _usable(flight):
+            usable.append(flight)
             report("simulated flights", len(usable), count, "")
         else:
             left_out += 1
@@ -56,11 +56,11 @@ def training_flights(
                   "effects": [effect for effect in on if effect not in without], "without": list(without)}
 
 
-def _usable(flown: FlightLog | Diverged) -> bool:
-    if isinstance(flown, Diverged) or not logs.true_edges(flown):
+def _usable(flight: FlightLog | Diverged) -> bool:
+    if isinstance(flight, Diverged) or not logs.true_edges(flight):
         return False
     try:
-        evaluate.check(flown)
+        evaluate.check(flight)
     except AirTouchError:
         return False
     return True

@@ -1,0 +1,62 @@
+"""What commands print fits the terminal: nothing is cut off, and a command can be copied."""
+
+import io
+import subprocess
+import sys
+
+import pytest
+from rich.console import Console
+
+from airtouch.cli.gap import show
+from airtouch.cli.shared import scores
+from airtouch.gap import diagnose, example
+from airtouch.logs import read
+from airtouch.report.columns import COLUMNS
+from airtouch.vehicle import load
+
+
+def summary(missed):
+    figures = {key.split("/")[0]: 0.5 for key, _ in COLUMNS.values()}
+    hits = {"0.05": 0.25, "0.10": 0.5, "0.25": 1.0}
+    interval = {"0.05": (0.1, 0.4), "0.10": (0.3, 0.7), "0.25": (0.9, 1.0)}
+    return {**figures, "flights": 87, "edges": 174, "hit": hits, "missed": missed,
+            "intervals": {**dict.fromkeys(figures, (0.25, 0.75)), "hit": interval}}
+
+
+def printed(width, show_on):
+    screen = Console(file=io.StringIO(), width=width)
+    show_on(screen)
+    return screen.file.getvalue()
+
+
+@pytest.mark.parametrize("width", [80, 100, 149, 150, 200])
+@pytest.mark.parametrize("count", [1, 3, 7])
+def test_every_figure_of_every_summary_is_printed(width, count):
+    rows = {f"case {n}": summary(n / 100) for n in range(count)}
+    text = printed(width, lambda screen: scores.print_table(screen, rows, "a title"))
+    assert "\u2026" not in text and max(map(len, text.splitlines())) <= width
+    assert all(f"case {n}" in text and f"{n}%" in text for n in range(count))
+    assert text.count("90% - 100%") == count and text.count("a title") == text.count("95 % interval") == 1
+
+
+@pytest.fixture(scope="module")
+def diagnosis():
+    nominal = [read(path) for path in example.nominal()]
+    return diagnose.diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal)
+
+
+@pytest.mark.parametrize("width", [80, 100, 170])
+def test_a_diagnosis_fits(diagnosis, width):
+    text = printed(width, lambda screen: show.diagnosis(screen, diagnosis))
+    command, = (step.command for step in diagnosis.next if step.command)
+    assert "\u2026" not in text and command in text
+    assert max(len(line) for line in text.splitlines() if command not in line) <= width
+    head, = (line for line in text.splitlines() if "phase" in line and "gap/floor" in line)
+    assert "after" in head and "regime" not in head  # all cells are of one regime
+
+
+def test_the_bar_of_a_long_command_needs_nothing_slow():
+    asked = ("import sys, airtouch.cli.gap.progress\n"
+             "print(sorted({'scipy', 'numba', 'airtouch.gap'} & set(sys.modules)))")
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
