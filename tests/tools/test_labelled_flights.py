@@ -63,7 +63,7 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
         logs.write(made_flight(20 + i), beside / f"g{i}.csv")
     best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
     asked, fit = [], best.fit
-    monkeypatch.setattr(adapt, "TWIN_STEPS", {"shipped": 3, "scratch": 3})
+    monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
     monkeypatch.setattr(best, "fit", lambda flights, *a, **o: asked.append((len(flights), o)) or fit(flights, *a, **o))
     call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
             "--draws", 1, "--seeds", 1, "--alone-steps", 0, "--speed", 0.3)
@@ -78,7 +78,7 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
     """One labelled flight, the other of its day without down range; the scored day is in neither training."""
     best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
     monkeypatch.setattr(labelled_flights, "simulated", lambda folder, pool: adapt.Flown([made_flight(20)], [None]))
-    monkeypatch.setattr(adapt, "TWIN_STEPS", {"shipped": 3, "scratch": 3})
+    monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
     taught = []
 
     def self_trained(start, teacher, labelled, others, *rest):

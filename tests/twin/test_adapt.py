@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from airtouch import logs
 from airtouch import vehicle as vehicles
 from airtouch.cli import airtouch
 from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.detector.shared import sensors
+from airtouch.detector.trace import Detection
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.twin import adapt
@@ -26,8 +29,7 @@ pytestmark = needs("tensorflow")
 @pytest.fixture
 def quick(monkeypatch):
     """Stages of a few seconds."""
-    for name, value in (("SIMULATED", 4), ("TWIN_STEPS", {"shipped": 5, "scratch": 5}), ("TUNE_STEPS", 5), ("MIXED", 2),
-                        ("FOLDS", 2)):
+    for name, value in (("SIMULATED", 4), ("STEPS", {"shipped": 5, "scratch": 5}), ("FOLDS", 2)):
         monkeypatch.setattr(adapt, name, value)
 
 
@@ -153,38 +155,56 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     assert max(sizes[1::2]) <= min(sizes[0::2]) // 2 + 1
 
 
+def trained(number, lag_s=0.2):
+    """A model without a network: `number` of its training."""
+    return BestModel(None, {}, {}, b"", {"lag_s": lag_s, "number": number})
+
+
 @pytest.fixture
 def trainings(monkeypatch):
-    """What every training is asked for; each returns another object, which labels every second flight in full."""
+    """What every training is asked for. Its model labels every second flight in full, and detects edges 0.3 s late."""
     asked = []
 
     def fit(flights, seed, **options):
         asked.append({**options, "flights": flights})
-        return f"model {len(asked)}"
+        return trained(len(asked))
 
     def labels(flights, model):
-        asked.append(model)
+        if flights:
+            asked.append(model)
         edge = [logs.Edge(100 * (i + 1), kind, np.nan, np.nan) for i, kind in enumerate(("entry", "exit", "entry"))]
         return [(edge[:2], [], edge)[i % 3] for i in range(len(flights))]
 
-    monkeypatch.setattr(best, "fit", fit)
-    monkeypatch.setattr(best, "pseudo_labels", labels)
+    def run(log, model):
+        true = logs.true_edges(log) if "zrange_m" in log.columns else ()
+        return SimpleNamespace(edges=[Detection(e.sample + 30, e.kind) for e in true])
+
+    for name, value in (("fit", fit), ("pseudo_labels", labels), ("run", run)):
+        monkeypatch.setattr(best, name, value)
     return asked
 
 
 def test_labelled_flights_are_half_of_what_is_learnt(made, trainings):
-    """From `start`, with the twin's flights beside them; flights without labels go on from the twin's detector."""
+    """From `start`, with the twin's flights beside them, and with the lag of the recorded flights."""
     simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
     labelled, start, twin = flights_of(made, 2), object(), object()
-    assert adapt.together(start, twin, labelled, simulated, 0, None, "") == "model 1"
-    (asked, *_) = trainings
+    model = adapt.together(start, twin, labelled, simulated, 0, None, "")
+    (asked,) = trainings
+    assert model.metadata == {"number": 1, "lag_s": pytest.approx(0.3)}
     assert asked["start"] is start and len(asked["flights"]) == 7 and asked["pseudo_labels"] == [None] * 7
     assert sum(asked["emphasis"][:2]) == pytest.approx(sum(asked["emphasis"][2:]))
-    trainings.clear()
-    adapt.together(None, twin, flights_of(made, 2, down=False), simulated, 0, None, "")
-    assert trainings[0] is twin and trainings[1]["start"] is twin and "emphasis" not in trainings[1]
-    assert len(trainings[1]["pseudo_labels"]) == len(trainings[1]["flights"]) == 2 + 5
     assert adapt.together(start, twin, [], simulated, 0, None, "") is twin
+
+
+def test_flights_without_labels_get_those_of_the_twins_detector(made, trainings):
+    """Three flights, the second without an edge that it sees, the third with an entry alone: the first is learnt."""
+    simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
+    start, twin = object(), object()
+    adapt.together(start, twin, flights_of(made, 3, down=False), simulated, 0, None, "")
+    teacher, asked = trainings
+    assert teacher is twin and asked["start"] is start
+    assert [len(x) if x else x for x in asked["pseudo_labels"]] == [2] + [None] * 5
+    assert asked["emphasis"] == [5.0] + [1.0] * 5
 
 
 def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
@@ -192,8 +212,8 @@ def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
     simulated = adapt.Flown([log for _, log, _ in made[:4]], [None] * 4)
     flights = [*flights_of(made, 3), *flights_of(made, 8, down=False)[3:]]
     model = adapt.together(None, object(), flights, simulated, 0, None, "")
-    first, teacher, second = (x for x in trainings if not isinstance(x, list))
-    assert len(first["flights"]) == 3 + 4 and teacher == "model 1" and model == "model 3"
+    first, teacher, second = trainings
+    assert len(first["flights"]) == 3 + 4 and teacher.metadata["number"] == 1 and model.metadata["number"] == 3
     assert second["flights"][3:5] == [flights[3].log, flights[6].log] and len(second["flights"]) == 3 + 2 + 4
     assert [len(x) if x else x for x in second["pseudo_labels"]] == [None] * 3 + [2, 2] + [None] * 4
     thirds = [sum(second["emphasis"][i:k]) for i, k in ((0, 3), (3, 5), (5, 9))]
@@ -204,7 +224,18 @@ def test_a_teacher_that_sees_nothing_is_the_detector(made, trainings, monkeypatc
     monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
     simulated = adapt.Flown([made[0][1]], [None])
     flights = [*flights_of(made, 2), *flights_of(made, 4, down=False)[2:]]
-    assert adapt.together(None, object(), flights, simulated, 0, None, "") == "model 1" and len(trainings) == 1
+    model = adapt.together(None, object(), flights, simulated, 0, None, "")
+    assert model.metadata["number"] == len(trainings) == 1
+
+
+def test_the_lag_is_that_of_recorded_flights(made, trainings):
+    """Down range and pseudo-labels alike; a model that detects none of their edges keeps its own."""
+    log = made[0][1]
+    edges = logs.true_edges(log)
+    early = [replace(e, sample=e.sample - 10) for e in edges]
+    assert adapt.timed(trained(0), [log], [None]).metadata["lag_s"] == pytest.approx(0.3)
+    assert adapt.timed(trained(0), [log], [early]).metadata["lag_s"] == pytest.approx(0.4)
+    assert adapt.timed(trained(0, 0.7), [log], [[]]).metadata["lag_s"] == 0.7
 
 
 def score(error_m):

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import logs
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
-from airtouch.detector.evaluation import evaluate, summary
+from airtouch.detector.evaluation import evaluate, summary, tuning
 from airtouch.detector.evaluation.data import simulated
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
@@ -31,12 +32,12 @@ from airtouch.simulation.scenario import Scenario
 from airtouch.twin import edge_strength, overlay
 from airtouch.vehicle import Vehicle
 
-SIMULATED = 150  #: flights of the twin to train on
-TWIN_STEPS = {"shipped": 400, "scratch": 1000}  #: training steps on the twin's flights, from given or random weights
-TUNE_STEPS = 300  #: further training steps on flights without labels
-MIXED = 12  #: least number of simulated flights among the recorded ones in those steps
+SIMULATED = 450  #: flights of the twin to train on
+STEPS = {"shipped": 400, "scratch": 2500}  #: of a training from given or random weights
+#: Augmentation of recorded and simulated flights together: twice the recipe's, as few flights are seen for longer.
+STRONG = {"gain": 0.3, "warp": 0.15, "noise": 0.1, "offset": 0.2, "yaw_deg": 40.0}
 FOLDS = 4
-STAGES = 3  #: changes with what the stages do, so that stored ones of another version are not taken
+STAGES = 4  #: changes with what the stages do, so that stored ones of another version are not taken
 FEWEST = 4  #: least number of labelled flights for a hold-out
 #: Decoder of a detector that has been trained on the twin alone: its logits are lower over recorded edges than over
 #: simulated ones, and recorded free air leaves room below. Chosen on folds 0 to 2 with two trainings out of nine
@@ -100,11 +101,11 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     key = _key(flights, scene, vehicle, start, seed)
     flown, what = simulated_flights(flights, scene, vehicle, seed, progress)
     flown = replace(flown, logs=[sensors.without(log, absent) for log in flown.logs])
-    twin = kept_model(work / f"twin_{key}.npz", lambda: best.fit(
-        flown.logs, seed, start=start, pseudo_labels=flown.edges, decoder=None if start else DECODER,
-        steps=TWIN_STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"),
-        command=command))
     labelled = [f for f in flights if f.labelled]
+    twin = kept_model(work / f"twin_{key}.npz", lambda: timed(best.fit(
+        flown.logs, seed, start=start, pseudo_labels=flown.edges, decoder=None if start else DECODER,
+        steps=STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"),
+        command=command), [f.log for f in labelled], [None] * len(labelled)))
     twin_only = kept_scores(work / f"twin_{key}.json", labelled, twin)
     held, half = [], []
     if hold_out and len(labelled) >= FEWEST:
@@ -140,33 +141,37 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
     return Flown(laid, list(edges)), what
 
 
+def timed(model: BestModel, recorded: Sequence[FlightLog], labels: Sequence[Sequence[Edge] | None]) -> BestModel:
+    """The model with the lag that it has on recorded flights; its own where it finds none of their edges.
+
+    Recorded edges are detected later than simulated ones. labels: edges of each flight, None where its down range
+    shows them.
+    """
+    pairs = [(logs.true_edges(log) if edges is None else edges, best.run(log, model).edges)
+             for log, edges in zip(recorded, labels, strict=True)]
+    return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(pairs, best.lag_s(model))})
+
+
 def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], flown: Flown, seed: int,
              progress: Progress | None, command: str) -> BestModel:
     """A detector trained on recorded and simulated flights; the twin's detector itself without recorded ones.
 
     With labelled flights it is trained from `start` on both kinds, each with half of the crops: a network that is
     trained further on a few labelled flights alone forgets the edges that those lack. Flights without labels are then
-    labelled by it (`self_trained`). Without labelled flights the twin's detector is trained further with pseudo-labels.
+    labelled by it, or by the twin's detector where no flight is labelled (`self_trained`).
     """
-    if not flights:
-        return twin
     labelled = [f for f in flights if f.labelled]
     others = [f for f in flights if not f.labelled]
-    if labelled:
-        model = _mixed(start, labelled, [], [], flown, seed, progress, command)
-        return self_trained(start, model, labelled, others, flown, seed, progress, command)
-    logs = [f.log for f in flights]
-    count = min(max(MIXED, len(logs)), len(flown.logs))
-    return best.fit([*logs, *flown.logs[:count]], seed, start=twin, progress=progress, command=command,
-                    pseudo_labels=[*best.pseudo_labels(logs, twin), *flown.edges[:count]], steps=TUNE_STEPS)
+    teacher = _mixed(start, labelled, [], [], flown, seed, progress, command) if labelled else twin
+    return self_trained(start, teacher, labelled, others, flown, seed, progress, command)
 
 
 def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence[Flight], others: Sequence[Flight],
                  flown: Flown, seed: int, progress: Progress | None, command: str) -> BestModel:
     """A detector trained from `start` on labelled flights, flights that the teacher labels, and simulated ones.
 
-    Each kind has a third of the crops. Flights in which the teacher sees no platform, or not both edges of each, are
-    left out: they may be over one that it missed. The teacher itself where none is left.
+    Each kind has the same share of the crops. Flights in which the teacher sees no platform, or not both edges of
+    each, are left out: they may be over one that it missed. The teacher itself where none is left.
     """
     labels = best.pseudo_labels([f.log for f in others], teacher)
     sure = [(f, edges) for f, edges in zip(others, labels, strict=True)
@@ -182,11 +187,12 @@ def _mixed(start: BestModel | None, labelled: Sequence[Flight], taught: Sequence
            command: str) -> BestModel:
     """One training on labelled flights, flights `taught` with the edges `seen`, and simulated ones, alike in weight."""
     count = len(flown.logs)
-    weights = [count / len(labelled)] * len(labelled) + [count / max(len(taught), 1)] * len(taught) + [1.0] * count
-    return best.fit([*(f.log for f in (*labelled, *taught)), *flown.logs], seed, start=start,
-                    pseudo_labels=[*[None] * len(labelled), *seen, *flown.edges], emphasis=weights,
-                    decoder=None if start else MIXED_DECODER, progress=progress, command=command,
-                    steps=TWIN_STEPS["shipped" if start else "scratch"])
+    recorded, labels = [f.log for f in (*labelled, *taught)], [*[None] * len(labelled), *seen]
+    weights = [count / len(some) for some in (labelled, taught) for _ in some] + [1.0] * count
+    made = best.fit([*recorded, *flown.logs], seed, start=start, pseudo_labels=[*labels, *flown.edges],
+                    emphasis=weights, decoder=None if start else MIXED_DECODER, progress=progress, command=command,
+                    steps=STEPS["shipped" if start else "scratch"], **STRONG)
+    return timed(made, recorded, labels)
 
 
 def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
@@ -262,7 +268,7 @@ def _named(progress: Progress | None, name: str) -> Progress | None:
 
 def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
-    settings = (STAGES, scene.table, vehicle, seed, SIMULATED, TWIN_STEPS, TUNE_STEPS, MIXED, DECODER, MIXED_DECODER,
+    settings = (STAGES, scene.table, vehicle, seed, SIMULATED, STEPS, STRONG, DECODER, MIXED_DECODER,
                 edge_strength.LEAST, edge_strength.MOST)
     total = hashlib.sha256(repr(settings).encode())
     for flight in flights:
@@ -276,7 +282,6 @@ def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: Be
 def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
              progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
     """Flights that can be used, and the others with the reason. A speed that is not stated comes from the log."""
-    from airtouch import logs
     from airtouch.twin.recorded.course import course
 
     usable, left_out = [], []

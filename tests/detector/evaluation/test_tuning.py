@@ -17,7 +17,7 @@ def at(*samples):
 
 def test_lag_is_the_median_delay_and_late_is_positive():
     assert lag([(EDGES, at(1010, 1430)), (EDGES, at(1020))]) == pytest.approx(0.2)
-    assert lag([(EDGES, at())]) == 0.0
+    assert lag([(EDGES, at())]) == 0.0 and lag([(EDGES, at())], 0.4) == 0.4
 
 
 def test_timed_f1_by_hand():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import csd, welch
+from scipy.signal import csd, spectrogram
 
 from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import channels
@@ -36,16 +36,21 @@ def long_flight(made):
                               landing=read.landing + extra)
 
 
-def test_spectra_are_those_of_welch(long_flight):
+def test_spectra_are_scipys_of_the_calm_half(long_flight):
+    """SciPy's spectrogram, averaged over the half of the blocks with the least roll and pitch rate."""
     log, read = long_flight
     rng = np.random.default_rng(0)
-    rate = rng.normal(0.0, 3.0, len(log))
-    values = features(noise_log(log, rng.normal(0.0, 800.0, len(log)), rate), read)
-    f, density = welch(rate[read.free], fs=100.0, window="hann", nperseg=LENGTH, detrend="linear")
+    rates = {f"gyro_{axis}_radps": np.deg2rad(rng.normal(0.0, 3.0, len(log))) for axis in "xy"}
+    values = features(log.with_columns(rates), read)
+    f, _, density = spectrogram(channels(log.with_columns(rates))[read.free], fs=100.0, window=np.hanning(LENGTH),
+                                nperseg=LENGTH, noverlap=LENGTH - LENGTH // 2, detrend="linear", axis=0)
+    moved = density[:, [ch.GYRO_X, ch.GYRO_Y]].sum(axis=(0, 1))
+    calm = density[..., np.argsort(moved)[:(len(moved) + 1) // 2]].mean(axis=-1)
     scale = 10 * np.log10(100.0 * (np.hanning(LENGTH) ** 2).sum() / 2.0)  # one-sided density to |FFT|^2
-    for a, b in BANDS_HZ[1:-1]:
-        expected = 10 * np.log10(density[(f >= a) & (f < b)].mean()) + scale
-        assert values[NAMES.index(f"gyro x {a:g}-{b:g} Hz")] == pytest.approx(expected, abs=0.8)
+    for k, name in ((ch.GYRO_X, "gyro x"), (ch.YAW, "motor yaw")):
+        for a, b in BANDS_HZ[1:-1]:
+            expected = 10 * np.log10(calm[(f >= a) & (f < b), k].mean()) + scale
+            assert values[NAMES.index(f"{name} {a:g}-{b:g} Hz")] == pytest.approx(expected, abs=0.01)
 
 
 def test_coherency_has_the_phase_of_a_delay(long_flight):
@@ -69,6 +74,18 @@ def test_channels_that_have_nothing_to_do_with_each_other_are_incoherent(long_fl
     some = [values[k] for k in rows("coherency") if NAMES[k].startswith("gyro x with motor roll")]
     f, cross = csd(rng.normal(size=4000), rng.normal(size=4000), fs=100.0, nperseg=LENGTH)
     assert np.abs(some).mean() < 0.1 and len(f) == len(cross)
+
+
+def test_spectra_are_those_of_the_calm_half_of_a_hover(long_flight):
+    """A push by hand in one block of three, twenty times as strong as the air, changes no spectrum by 2 dB."""
+    log, read = long_flight
+    rng = np.random.default_rng(3)
+    rate, command = rng.normal(0.0, 3.0, len(log)), rng.normal(0.0, 800.0, len(log))
+    pushed = rate.copy()
+    pushed[read.free.start + 2 * LENGTH::6 * LENGTH] += 400.0
+    calm, steered = (features(noise_log(log, command, r), read) for r in (rate, pushed))
+    some = [k for k in rows("spectrum") if NAMES[k].startswith("gyro x")]
+    assert np.abs(steered[some] - calm[some]).max() < 2.0
 
 
 def test_edge_means_are_those_of_the_channels(made):

@@ -12,14 +12,14 @@ Settings = TypeVar("Settings")
 Flight = tuple[Sequence[TrueEdge], Sequence[Detection]]
 
 
-def lag(flights: Iterable[Flight]) -> float:
-    """Median seconds from a true edge to its detection (positive is late); 0 without any match."""
+def lag(flights: Iterable[Flight], otherwise: float = 0.0) -> float:
+    """Median seconds from a true edge to its detection (positive is late); `otherwise` without any match."""
     delays = []
     for true, detections in flights:
         places = [d.sample for d in detections]
         for i, j in match([e.sample for e in true], places, TOLERANCE_S / SAMPLE_PERIOD_S):
             delays.append((detections[j].sample - true[i].sample) * SAMPLE_PERIOD_S)
-    return float(np.median(delays)) if delays else 0.0
+    return float(np.median(delays)) if delays else otherwise
 
 
 def timed_f1(flights: Iterable[Flight], lag_s: float = 0.0) -> float:

@@ -14,6 +14,9 @@ from airtouch.vehicle import Vehicle
 VEHICLE, MISSION = "vehicle", "mission"
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"
+#: kg m², of a Crazyflie's rotor and propeller: `tools/rotor_inertia.py` on imrclab's brushed_jana04
+ROTOR_INERTIA = 4e-8
+ACC_LOWPASS_HZ = 30.0  #: of the Crazyflie's firmware, through which the logged acceleration passes
 #: effects that every twin has: a log's rows are at any phase of the controllers' cycle, another one in each flight
 FIXED: dict[str, Any] = {"time_jitter": {"rms": 0.0, "behind": {"low": 0.0, "high": 0.01}}}
 
@@ -63,7 +66,10 @@ def _of_vehicle(vehicle: Vehicle) -> tuple[Lever, ...]:
         Lever("battery_sag", "charge", 0.7, 0.3, 1.0, 0.1, "1", 0.2),
         Lever("motor_lag", "factor", 1.0, 0.4, 2.0, 0.1, "1"),
         Lever("actuator_delay", "delay", 0.004, 0.0, 0.03, 0.002, "s"),
+        Lever("sensor_latency", "delay", 0.001, 0.0, 0.006, 0.0005, "s"),
         Lever(VEHICLE, "yaw_torque_over_thrust_m", yaw, 0.3 * yaw, 3 * yaw, 0.15 * yaw, "m"),
+        Lever(VEHICLE, "rotor_inertia_kg_m2", vehicle.rotor_inertia_kg_m2 or ROTOR_INERTIA, 0.0, 3e-7, 1e-8, "kg m²"),
+        Lever(VEHICLE, "acc_lowpass_hz", vehicle.acc_lowpass_hz or ACC_LOWPASS_HZ, 15.0, 80.0, 2.0, "Hz"),
         *(Lever(VEHICLE, f"inertia_kg_m2.{i}", value, 0.5 * value, 2.0 * value, 0.06 * value, "kg m²")
           for i, value in enumerate(vehicle.inertia_kg_m2)),
     )
@@ -73,7 +79,7 @@ def _of_free_air() -> tuple[Lever, ...]:
     """Noise of the motors, gusts, drag and flapping."""
     return (
         Lever("motor_noise", "rms", 0.006, 0.0, 0.05, 0.0015, "1"),
-        Lever("motor_noise", "time", 0.8, 0.05, 3.0, 0.15, "s"),
+        Lever("motor_noise", "time", 0.8, 0.05, 2.0, 0.15, "s"),
         Lever("motor_noise", "fast", 0.005, 0.0, 0.05, 0.0015, "1"),
         Lever("motor_noise", "fast_time", 0.005, 0.002, 0.1, 0.002, "s"),
         Lever("gust", "rms", 0.1, 0.0, 1.0, 0.03, "m/s"),

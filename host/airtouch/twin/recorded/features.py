@@ -16,7 +16,6 @@ from airtouch.twin.recorded.course import Course
 
 BANDS_HZ = ((0.3, 1), (1, 2), (2, 4), (4, 6), (6, 9), (9, 13), (13, 22), (22, 35), (35, 50))
 OVER_BANDS_HZ = ((1.5, 4), (4, 9), (9, 20), (20, 45))
-COHERENT_BANDS = 7  #: of BANDS_HZ: coherency up to 22 Hz
 #: channels whose coherency shows the loops
 PAIRS = ((ch.GYRO_X, ch.ROLL), (ch.GYRO_Y, ch.PITCH), (ch.GYRO_Z, ch.YAW), (ch.AZ, ch.MEAN),
          (ch.AX, ch.PITCH), (ch.AY, ch.ROLL), (ch.AX, ch.GYRO_Y), (ch.AY, ch.GYRO_X))
@@ -55,7 +54,7 @@ def names() -> tuple[Feature, ...]:
     out += [Feature(f"trim {NAMES[k]}", "trim", "PWM", 100.0) for k in (ch.ROLL, ch.PITCH, ch.YAW)]
     out += [Feature(f"{NAMES[k]} {a:g}-{b:g} Hz", "spectrum", "dB", 1.0) for k in range(ch.DOWN) for a, b in BANDS_HZ]
     out += [Feature(f"{NAMES[i]} with {NAMES[k]} {a:g}-{b:g} Hz {part}", "coherency", "1", 0.08)
-            for i, k in PAIRS for a, b in BANDS_HZ[:COHERENT_BANDS] for part in ("re", "im")]
+            for i, k in PAIRS for a, b in BANDS_HZ for part in ("re", "im")]
     out += [Feature(f"{c} {NAMES[k]} {a:g}-{b:g} Hz", "over", "dB", 1.5)
             for c in CLASSES for k in range(ch.DOWN) for a, b in OVER_BANDS_HZ]
     least = [0.1] * 3 + [3.0] * 2 + [1.5] + [500.0] * 3 + [200.0, 0.1, 0.3]
@@ -112,17 +111,27 @@ def _bins(length: int, bands: tuple) -> list[np.ndarray]:
 def _free_spectra(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     blocks = _blocks(free[:, :ch.DOWN], LENGTH, LENGTH // 2)
     if blocks is None:
-        return (np.full(ch.DOWN * len(BANDS_HZ), np.nan), np.full(2 * len(PAIRS) * COHERENT_BANDS, np.nan))
-    power = np.median(np.abs(blocks) ** 2, axis=0) / np.log(2.0)  # the median ignores a velocity step in one block
+        return (np.full(ch.DOWN * len(BANDS_HZ), np.nan), np.full(2 * len(PAIRS) * len(BANDS_HZ), np.nan))
+    blocks = _calm(blocks)
+    power = (np.abs(blocks) ** 2).mean(axis=0)
     bins = _bins(LENGTH, BANDS_HZ)
     spectrum = [_decibel(power[b].mean(axis=0)) for b in bins]
     coherency = []
     for i, k in PAIRS:
-        for b in bins[:COHERENT_BANDS]:
+        for b in bins:
             cross = (blocks[:, b, i] * np.conj(blocks[:, b, k])).mean()
             size = np.sqrt((np.abs(blocks[:, b, i]) ** 2).mean() * (np.abs(blocks[:, b, k]) ** 2).mean())
             coherency += [cross.real / max(size, 1e-12), cross.imag / max(size, 1e-12)]
     return np.array(spectrum).T.ravel(), np.array(coherency)
+
+
+def _calm(blocks: np.ndarray) -> np.ndarray:
+    """The half of the blocks (blocks, frequencies, channels) with the least roll and pitch rate: without set-points.
+
+    A hover of the authors is steered by hand, in steps and pulses that no twin repeats.
+    """
+    steered = (np.abs(blocks[:, :, [ch.GYRO_X, ch.GYRO_Y]]) ** 2).sum(axis=(1, 2))
+    return blocks[np.argsort(steered)[:(len(blocks) + 1) // 2]]
 
 
 def _over(x: np.ndarray, course: Course) -> np.ndarray:
