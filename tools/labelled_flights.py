@@ -117,7 +117,7 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
              [f.path.name for f in held], [f.log.source for f in pool]]
     if flown and row in ("labelled", "unlabelled"):
-        asked += [bool(options.beside), adapt.STEPS, sorted(adapt.STRONG.items()), repr(adapt.MIXED_DECODER),
+        asked += [bool(options.beside), adapt.STEPS, sorted(adapt.STRONG.items()), repr(adapt.DECODER),
                   [training_set.flight_hash(log) for log in flown.logs]]
     path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named(asked)}.json"
     if path.is_file():

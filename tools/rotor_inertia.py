@@ -80,8 +80,8 @@ def report(log: FlightLog, craft: Vehicle) -> str:
     jz = craft.inertia_kg_m2[2]
     lever = jz * speed / (2.0 * craft.mass_kg * craft.gravity_mps2 / 4.0)  # of torque over thrust to the steady gain
     return (f"{Path(log.source).name}: I/Jz {ratio:.2e} ({low[1]:.2e} to {high[1]:.2e}), I {ratio * jz:.1e} kg m² for "
-            f"Jz {jz:.3g}, torque over thrust {gain * lever:.4f} m ({low[0] * lever:.4f} to {high[0] * lever:.4f}), delay "
-            f"{1000 * delay:.0f} ms, {len(blocks)} blocks; explained {share:.0%}, without inertia "
+            f"Jz {jz:.3g}, torque over thrust {gain * lever:.4f} m ({low[0] * lever:.4f} to {high[0] * lever:.4f}), "
+            f"delay {1000 * delay:.0f} ms, {len(blocks)} blocks; explained {share:.0%}, without inertia "
             f"{fit(f, blocks, False)[1]:.0%}")
 
 
