@@ -1,7 +1,7 @@
 """What a few flights of one's own, labelled by their own down range, are worth to the `best` detector.
 
     python tools/labelled_flights.py FOLDER... --start MODEL.npz --by halves --out out/labelled
-        [--twin FOLDER [--unlabelled] | --beside FOLDER]
+        [--twin FOLDER | --beside FOLDER] [--unlabelled]
         [--labelled 2 --labelled 5] [--draws 5] [--seeds 2] [--steps 300] [--alone-steps 1000] [--speed 0.3]
 
 Every group of flights (--by halves: the manifest's folds 0 to 2, and 3 and up; --by day: each day) is scored by models
@@ -141,7 +141,7 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     if row == "unlabelled" and flown:
         names = {f.log.source for f in some}
         others = [adapt.without_range(f) for f in pool if f.log.source not in names]
-        model = adapt.self_trained(None, model, some, others, flown, seed, None, COMMAND)
+        model = adapt.self_trained(start if options.beside else None, model, some, others, flown, seed, None, COMMAND)
     scores = scored(model, held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), path, force=True)
     return scores
@@ -198,7 +198,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--beside", type=Path, action="append", default=[],
                         help="folder of labelled flights to learn beside the K; none of them may be scored")
     parser.add_argument("--unlabelled", action="store_true",
-                        help="with --twin: a row more, with the other flights learnt without their labels")
+                        help="with --twin or --beside: a row more, with the other flights learnt without their labels")
     parser.add_argument("--by", choices=("halves", "day"), default="halves")
     parser.add_argument("--out", type=Path, default=Path("out/labelled"))
     parser.add_argument("--labelled", type=int, action="append", metavar="K", help="default 2, 5, 10, 20")
@@ -218,8 +218,8 @@ def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
     if len(options.twin) not in (0, len(options.start)):
         raise SystemExit(f"{len(options.twin)} twins for {len(options.start)} models to start from; give one for each, "
                          "or none")
-    if options.unlabelled and not options.twin:
-        raise SystemExit("--unlabelled learns beside a twin's edges: give --twin")
+    if options.unlabelled and not (options.twin or options.beside):
+        raise SystemExit("--unlabelled learns beside other flights: give --twin or --beside")
     if options.beside and (options.twin or not options.start):
         raise SystemExit("--beside goes on from a model: give --start, and no --twin")
 

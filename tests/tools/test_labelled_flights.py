@@ -79,11 +79,12 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
     best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
     monkeypatch.setattr(labelled_flights, "simulated", lambda folder, pool: adapt.Flown([made_flight(20)], [None]))
     monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
-    taught = []
+    taught, begun = [], []
 
     def self_trained(start, teacher, labelled, others, *rest):
         taught.append(([f.file.path.name for f in labelled], [f.file.path.name for f in others]))
-        assert start is None and all(not f.labelled for f in others)
+        begun.append(start)
+        assert all(not f.labelled for f in others)
         return teacher
 
     monkeypatch.setattr(adapt, "self_trained", self_trained)
@@ -96,7 +97,13 @@ def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monk
     assert sorted(sorted(a + b) for a, b in late) == [["f0.csv", "f2.csv"], ["f1.csv", "f3.csv"]]
     assert trained == [2, 2], "the last row goes on from the models of the row before"
     assert "| and 1 labelled, the others without labels | 1 | 4 / 8 |" in capsys.readouterr().out
-    with pytest.raises(SystemExit, match="give --twin"):
+    assert begun == [None] * 4, "random weights with a twin"
+    beside = tmp_path / "beside"
+    beside.mkdir()
+    logs.write(made_flight(21), beside / "g.csv")
+    run(monkeypatch, *call, "--speed", 0.3, "--beside", beside)
+    assert all(x is not None for x in begun[4:]) and len(begun) == 8, "the given model's, beside other flights"
+    with pytest.raises(SystemExit, match="give --twin or --beside"):
         run(monkeypatch, *call)
 
 
