@@ -119,7 +119,8 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     if flown and row in ("labelled", "unlabelled"):
         asked += [bool(options.beside), adapt.STEPS, sorted(adapt.STRONG.items()), repr(adapt.DECODER),
                   [training_set.flight_hash(log) for log in flown.logs]]
-    path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named(asked)}.json"
+    rounds = [adapt.ROUNDS] if row == "unlabelled" else []
+    path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named([*asked, *rounds])}.json"
     if path.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
     some = drawn(pool, count, draw)

@@ -201,8 +201,8 @@ def test_flights_without_labels_get_those_of_the_twins_detector(made, trainings)
     simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
     start, twin = object(), object()
     adapt.together(start, twin, flights_of(made, 3, down=False), simulated, 0, None, "")
-    teacher, asked = trainings
-    assert teacher is twin and asked["start"] is start
+    teacher, asked, again, *_ = trainings
+    assert teacher is twin and asked["start"] is start and again.metadata["number"] == 2
     assert [len(x) if x else x for x in asked["pseudo_labels"]] == [2] + [None] * 5
     assert asked["emphasis"] == [5.0] + [1.0] * 5
 
@@ -212,8 +212,9 @@ def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
     simulated = adapt.Flown([log for _, log, _ in made[:4]], [None] * 4)
     flights = [*flights_of(made, 3), *flights_of(made, 8, down=False)[3:]]
     model = adapt.together(None, object(), flights, simulated, 0, None, "")
-    first, teacher, second = trainings
-    assert len(first["flights"]) == 3 + 4 and teacher.metadata["number"] == 1 and model.metadata["number"] == 3
+    first, teacher, second, better, third = trainings
+    assert len(first["flights"]) == 3 + 4 and teacher.metadata["number"] == 1 and better.metadata["number"] == 3
+    assert model.metadata["number"] == 5 and third["flights"] == second["flights"]
     assert second["flights"][3:5] == [flights[3].log, flights[6].log] and len(second["flights"]) == 3 + 2 + 4
     assert [len(x) if x else x for x in second["pseudo_labels"]] == [None] * 3 + [2, 2] + [None] * 4
     thirds = [sum(second["emphasis"][i:k]) for i, k in ((0, 3), (3, 5), (5, 9))]

@@ -36,8 +36,9 @@ SIMULATED = 450  #: flights of the twin to train on
 STEPS = {"shipped": 400, "scratch": 2500}  #: of a training from given or random weights
 #: Augmentation of recorded and simulated flights together: twice the recipe's, as few flights are seen for longer.
 STRONG: dict[str, Any] = {"gain": 0.3, "warp": 0.15, "noise": 0.1, "offset": 0.2, "yaw_deg": 40.0}
+ROUNDS = 2  #: in which flights without labels are labelled, each by the detector of the one before
 FOLDS = 4
-STAGES = 4  #: changes with what the stages do, so that stored ones of another version are not taken
+STAGES = 5  #: changes with what the stages do, so that stored ones of another version are not taken
 FEWEST = 4  #: least number of labelled flights for a hold-out
 #: Decoder of a detector that has been trained on simulated edges: its entry logit hardly rises over high platforms, so
 #: that the "over" logit has a large share, smoothed over 0.1 s. Chosen on folds 0 to 2 out of 220, for the least cost
@@ -168,15 +169,18 @@ def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence
     """A detector trained from `start` on labelled flights, flights that the teacher labels, and simulated ones.
 
     Each kind has the same share of the crops. Flights in which the teacher sees no platform, or not both edges of
-    each, are left out: they may be over one that it missed. The teacher itself where none is left.
+    each, are left out: they may be over one that it missed. The teacher itself where none is left. In each of ROUNDS
+    the detector of the round before is the teacher.
     """
-    labels = best.pseudo_labels([f.log for f in others], teacher)
-    sure = [(f, edges) for f, edges in zip(others, labels, strict=True)
-            if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
-    if not sure:
-        return teacher
-    taught, seen = zip(*sure, strict=True)
-    return _mixed(start, labelled, taught, seen, flown, seed, progress, command)
+    for _ in range(ROUNDS):
+        labels = best.pseudo_labels([f.log for f in others], teacher)
+        sure = [(f, edges) for f, edges in zip(others, labels, strict=True)
+                if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
+        if not sure:
+            break
+        taught, seen = zip(*sure, strict=True)
+        teacher = _mixed(start, labelled, taught, seen, flown, seed, progress, command)
+    return teacher
 
 
 def _mixed(start: BestModel | None, labelled: Sequence[Flight], taught: Sequence[Flight],
@@ -265,7 +269,7 @@ def _named(progress: Progress | None, name: str) -> Progress | None:
 
 def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
-    settings = (STAGES, scene.table, vehicle, seed, SIMULATED, STEPS, STRONG, DECODER,
+    settings = (STAGES, scene.table, vehicle, seed, SIMULATED, STEPS, STRONG, ROUNDS, DECODER,
                 edge_strength.LEAST, edge_strength.MOST)
     total = hashlib.sha256(repr(settings).encode())
     for flight in flights:
