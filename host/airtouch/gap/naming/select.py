@@ -25,6 +25,7 @@ from airtouch.gap.naming.judging import (
     price_of,
     trial_of,
 )
+from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
@@ -57,7 +58,13 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
     need = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
+    inference = inference_of(data, list(candidates))
+    told = related(on, candidates, alone, inference, progress) if inference is not None else None
+    if told is not None and told.explained:
+        return told
     passing = _passing(on, alone, need, without)
+    if told is not None and passing is None:
+        return told
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
     if passing is not None and any(s.named and s.name == passing.name
                                    and _news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
