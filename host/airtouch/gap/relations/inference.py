@@ -19,9 +19,10 @@ LEAST_LEFT = 10.0
 #: nats by which two effects must be likelier than one with a disturbance that has no name beside it: of 44 wrong pairs
 #: that were found where the right effect was left out, 36 were not
 OVER_NAMELESS = 30.0
-#: of the evidence of any effects, beside what their classes ask for, that may be left as no curve is exact, and that a
-#: of the evidence of any effects, beside what their classes ask for, that may be left as no curve is exact, and that
-#: a flight may lie off; the same for two effects, which are no sum of each; by what that distance is multiplied. Of 100
+#: of the evidence of any effects, beside what their classes ask for, that may be left as no curve is exact, and by
+#: which a flight may lie off; the same for two effects, which are no sum of each; by what that distance is
+#: multiplied. Of 100 flights with an effect 95 are named right so, and 16 get a wrong name where it is left out
+#: (`learning.SEED`)
 CRUDE_LEFT, CRUDE_FAR, PAIR_LEFT, PAIR_FAR, FAR = 0.01, 0.02, 0.01, 0.07, 1.5
 MOST_EFFECTS = 3
 BEAM = 3  #: hypotheses beside which another effect is looked for, and of what is found those that are fitted in turn
