@@ -7,7 +7,7 @@ Where each decision is made; a folder imports only those above it:
 
 - `flights`, a log made ready: `flight`, `motion`; how hard it is flown: `hardness`.
 - `signatures`, what is known of each effect: `candidates` says how it is fitted, `nominal_scatter` how strong it seems
-  where there is none.
+  where there is none, `drawn` how simulated flights with it are drawn.
 - `loop`, the closed loop: `controller`, its transfer functions `loop_model`, what noise and set-points make of the
   commands, `noise_spectra` and `turning`, what a torque from outside leaves: `disturbed`; `command_spectra` of flights,
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
@@ -16,14 +16,19 @@ Where each decision is made; a folder imports only those above it:
   `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.
+- `relations`, what a flight's signals do to one another, compared with simulated flights of each effect: `features` of
+  a flight (`flight_signals`, `coherence`, `moments`, `edge_steps`), their `space`; each effect an `effect_class`; how
+  likely a flight is under it, `density`, under several or something without a name, `hypotheses`; a `library` holds
+  what `build` learned by `learning` flights and `exposure` to what has no name; `inference` names the effects.
 - `naming`, which effect: `screen` takes a first look, `judging` fits on one half and judges on the other, `rounds` does
-  both for every candidate, `select` adds effects one by one; `selection` holds what was found, with its probabilities.
+  both for every candidate, `select` adds effects one by one, unless the relations of signals name them: `related`;
+  `selection` holds what was found, with its probabilities.
 - `nominal`, what the baseline flights say: `calibrate` (vehicle, floors), `apparent` (strengths where there is none).
 - `where` the gap lies: `band_sums`, `cell_tables`, `gap_map`, `summary`; without a diagnosis: `measure`.
 - `answer`: the verdict and the `ranking`; the `named_effects` with their intervals; how far: `shrink`; what stays
   open: `unexplained`; what to fly next: `advice`; `words`, `pictures`.
 - `balance`, flights without a gyro: `hover_balance`, `balance_result`.
-- `sealed`, withheld effects: `blind`, `blind_draw`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
+- `sealed`, withheld effects: `blind`, `blind_run`, `blind_score`, `blind_severity`; on a cluster:
   `on_cluster`.
 - `diagnose` calls them all and fills a `result`; what is worked out once stands in a `workspace`.
 """

@@ -24,6 +24,8 @@ def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> s
     calmer than nominal ones and others less calm: effects that bring them nearer to the floor are there; and no nominal
     flight has odd times. A recorded one had calm air or a poor link.
     """
+    if selection.inference is not None:
+        return "unknown" if not selection.explained else "none" if selection.chosen is None else "effect"
     apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
     if gap.before <= AT_FLOOR and not apart:
         odd_times = selection.of_times > selection.allowed
@@ -50,7 +52,7 @@ def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked]
             share = overall.share
         elif one is not None and one.full and one.gain > FIRST_GAIN:
             share = shrink_of(data, parts, one, cells).share
-        nats = None if one is None else float(one.gain)
+        nats = None if one is None else selection.gained(one)
         out.append(Ranked(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
@@ -74,7 +76,9 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
         return ()
     groups = []
     best = selection.named[0]
-    same = [n for n, j in selection.singles.items() if j.full and best.gain - j.gain < CLOSE]
+    first = selection.singles[best.name] if selection.inference is not None else best
+    same = [n for n, j in selection.singles.items() if (j.full or selection.inference is not None)
+            and selection.gained(first) - selection.gained(j) < CLOSE]
     if len(same) > 1:
         groups.append(tuple(sorted(same)))
     for step in selection.named:

@@ -10,6 +10,7 @@ from airtouch.gap.evidence.data import Study
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.motion import held
 from airtouch.gap.naming.selection import Judged, Selection
+from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Cell
 from airtouch.gap.signals.channels import CHANNELS, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, starts
@@ -51,12 +52,15 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
 
 def nearest(selection: Selection) -> list[dict[str, str]]:
     """The effects that gain most, each with what speaks against it where the verdict is `unknown`."""
-    most = sorted((j for j in selection.singles.values() if j.gain > 0.0), key=lambda j: -j.gain)
+    gaining = (j for j in selection.singles.values() if selection.gained(j) > 0.0)
+    most = sorted(gaining, key=lambda j: -selection.gained(j))
     return [{"name": j.name, "fails": fails(selection, j)} for j in most[:NEAREST]]
 
 
 def fails(selection: Selection, judged: Judged) -> str:
     """Why a candidate is not the answer, in nats of held-out log likelihood."""
+    if selection.inference is not None:
+        return related_fails(selection, selection.inference, judged.name)
     least = selection.least[judged.name]
     if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
         return against(selection)
@@ -69,6 +73,19 @@ def fails(selection: Selection, judged: Judged) -> str:
         return (f"gains {judged.gain:.0f} nats, {' and '.join(s.name for s in selection.named)} "
                 f"{selection.chosen.gain:.0f}")
     return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
+
+
+def related_fails(selection: Selection, found: Inference, name: str) -> str:
+    """Why the relations of the signals do not name an effect, in nats."""
+    gains = found.evidence[name]
+    first = [s.name for s in selection.named]
+    if name in first:
+        return against(selection)
+    if gains < LEAST_EVIDENCE:
+        return f"the relations of the signals gain {gains:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
+    if not first:
+        return f"the relations of the signals gain {gains:.1f} nats by it, and more by a model without names"
+    return f"the relations of the signals gain {gains:.0f} nats by it, {found.evidence[first[0]]:.0f} by {first[0]}"
 
 
 def against(selection: Selection) -> str:
@@ -87,6 +104,8 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
     step = next((s for s in selection.named[1:] if s.name == name), None)
     if name == verdict or (verdict == "effect" and name == first):
         return ""
+    if step is not None and verdict == "effect" and selection.inference is not None:
+        return f"named beside {first}: the probability is that it acts alone"
     if step is not None and verdict == "effect":
         before = selection.steps[selection.steps.index(step) - 1].gain
         return f"named beside {first}: adds {step.gain - before:.0f} nats to it; the probability is that it acts alone"
@@ -95,7 +114,9 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
                 "may be left"
                 if selection.explained else "the gap as a whole is at its floor")
     if name == "none":
-        return (f"{first} gains {selection.chosen.gain:.0f} nats over it" if selection.chosen else
+        gains = selection.inference.evidence[first] if selection.inference and first else \
+            selection.chosen.gain if selection.chosen else 0.0
+        return (f"{first} gains {gains:.0f} nats over it" if selection.chosen else
                 f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
                 "left")
     return fails(selection, selection.singles[name])

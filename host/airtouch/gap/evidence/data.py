@@ -33,6 +33,7 @@ class Study:
     usual: Any = None  #: generic.Usual of the nominal flights
     nominal: int = 0  #: how many there were
     scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
+    relations: Any = None  #: relations.library.Library that holds for the nominal flights, if there is one
 
     @property
     def simulated(self) -> bool:

@@ -1,6 +1,7 @@
 """A flight made ready for the diagnosis: a regular clock, what effects see, what was measured."""
 
-from dataclasses import dataclass, field
+from collections.abc import Container
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -108,6 +109,15 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     usable &= ~_jolts(force, rates, phase != GROUND)
     return Flight(name, log, signals, force, rates, pwm, turn, phase, usable, clock, lost,
                   touching, tuple(notes), cannot)
+
+
+def less(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
+    """The flight as it would be made ready from a log without some columns, which are neither commands nor motion."""
+    log = FlightLog({k: v for k, v in flight.log.columns.items() if k not in columns}, flight.log.meta)
+    if len(log.columns) == len(flight.log.columns):
+        return flight
+    angles = motion.attitude(log, PERIOD_S)
+    return replace(flight, log=log, signals=_signals(log, angles, flight.turn, flight.phase, vehicle)[0])
 
 
 def _stamped_at_arrival(log: FlightLog) -> bool:

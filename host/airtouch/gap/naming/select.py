@@ -25,6 +25,7 @@ from airtouch.gap.naming.judging import (
     price_of,
     trial_of,
 )
+from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
@@ -44,6 +45,8 @@ CERTAIN = 20.0  #: evidence beyond which more says no more
 CHANCE_LOSS = 1.0  #: log likelihood that a right effect may lose in a cell by chance
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
+#: an effect of so many parameters (place, width, turbulence) that its class in the library holds few of its flights
+NOT_A_CURVE = "downwash"
 WORTH_AGAIN = 0.25  #: of what the first effect must gain; candidates below it are not judged again beside a deviation
 
 
@@ -52,13 +55,20 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     """Judge every candidate, then add effects one by one while held-out data ask for them.
 
     Effects that come and go are tried first (gap.evidence.gates), but those of `without`. One that adds no more to the
-    effects found after it than it does in nominal flights is taken back.
+    effects found after it than it does in nominal flights is taken back. Where a library of the signals' relations
+    holds and leaves nothing unexplained it decides alone (naming.related).
     """
     on = trial_of(data)
     alone = round_of(on, candidates, None, progress)
     need = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
+    inference = inference_of(data, list(candidates))
+    told = related(on, candidates, alone, inference, progress) if inference is not None else None
+    if told is not None and told.explained:
+        return told
     passing = _passing(on, alone, need, without)
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
+    if told is not None and passing is None and [s.name for s in steps if s.named][:1] != [NOT_A_CURVE]:
+        return told
     if passing is not None and any(s.named and s.name == passing.name
                                    and _news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
         singles, least, steps = _steps(on, candidates, alone, need, None, progress)

@@ -7,6 +7,7 @@ import numpy as np
 
 from airtouch.gap.evidence.fit import Fit
 from airtouch.gap.evidence.problem import Part
+from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, Term
 
 #: gain of a nameless model over the effects named, for `unknown`, where many nominal flights gave the floor, and else
@@ -84,6 +85,7 @@ class Selection:
     same_models: bool = False  #: whether the flights come from the models that effects are fitted with
     of_times: float = 0.0
     contradicted: tuple[float, str] = (0.0, "")
+    inference: Inference | None = None  #: what named the effects, where the relations of signals did
 
     @property
     def whole(self) -> Judged | None:
@@ -107,12 +109,18 @@ class Selection:
         fits = (replace(f, terms=tuple(t)) for f, t in zip(whole.fits, fitted, strict=True))
         return replace(whole, terms=tuple(terms), fits=tuple(fits))
 
+    def gained(self, one: Judged) -> float:
+        """Nats that an effect gains alone: of held-out data, or of the relations of signals where these decide."""
+        return float(self.inference.evidence[one.name] if self.inference is not None else one.gain)
+
     @property
     def allowed(self) -> float:
         """Log likelihood that a nameless model may gain on top of the effects named where they are right.
 
         The fewer nominal flights there are, the farther off may another one lie.
         """
+        if self.inference is not None:
+            return self.inference.allowed
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         gained = self.whole.gain if self.whole else 0.0
@@ -171,8 +179,12 @@ def probabilities(selection: Selection, at_floor: bool = False) -> dict[str, flo
     `unknown` has one half where as much speaks against the effects as may, and odds that grow with its square.
     """
     names = list(selection.singles)
-    score = np.array([*_scores(selection, names), 0.0])
-    weight = np.exp((score - score.max()) / TEMPERATURE)
+    if selection.inference is not None:
+        alone = selection.inference.probabilities()
+        weight = np.array([alone[n] for n in (*names, "none")])
+    else:
+        score = np.array([*_scores(selection, names), 0.0])
+        weight = np.exp((score - score.max()) / TEMPERATURE)
     odds = selection.unlike ** 2
     unknown = odds / (1.0 + odds)
     if selection.chosen is not None and selection.explained:  # not above the effect that is the answer

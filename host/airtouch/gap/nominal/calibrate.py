@@ -19,6 +19,8 @@ from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.disturbed import disturbed
 from airtouch.gap.nominal.apparent import apparent
+from airtouch.gap.relations.features import features
+from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.lost_rows import bridging_power
@@ -82,7 +84,8 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         study = replace(study, scatter=scatter_of([apparent(Data(study, [f]), without) for f in _some(flights)],
                                                     any(_recorded(f) for f in flights), vehicle.name))
         if study.simulated:  # where every flight has the same trim: chance is in the lowest bin already
-            study = replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond))
+            study = replace(study, floor=replace(study.floor, offset=study.floor.offset_beyond),
+                            relations=library_for(vehicle, [features(f, vehicle) for f in flights]))
     return study, Calibration(study.calibration, _quantities(chosen, found.scaled, found.covariance),
                               (*odd, *_inconsistent(study, flights)), None if odd else as_declared)
 

@@ -20,8 +20,9 @@ from airtouch.errors import AirTouchError
 from airtouch.gap import measure
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.blind_draw import KINDS, Kind
 from airtouch.gap.sealed.blind_severity import log_ratio, severities, weakest
+from airtouch.gap.signatures.candidates import alike
+from airtouch.gap.signatures.drawn import KINDS, Kind
 from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
@@ -42,7 +43,7 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
          kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
     """Write a sealed set to the folder `out` and its key apart; returns the key's path.
 
-    kinds: of `blind_draw.KINDS` to draw from, all of them by default. Raises AirTouchError when
+    kinds: of `drawn.KINDS` to draw from, all of them by default. Raises AirTouchError when
     there is a set or a key already and `force` is not given.
     """
     out, key = Path(out), Path(key) if key else key_of(Path(out))
@@ -171,14 +172,6 @@ def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Gener
         cases.append([(n, int(rng.choice(PAIR_LEVELS))) for n in (a, b)])
     cases += [[] for _ in range(none)]
     return [cases[i] for i in rng.permutation(len(cases))]
-
-
-def alike(one: str, other: str) -> bool:
-    """Whether two names stand for one thing in these logs."""
-    from airtouch.gap.signatures.candidates import names_alike
-
-    group = names_alike(one)
-    return one == other or (group is not None and other in group[0])
 
 
 def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], levels: Mapping[str, Sequence[float]], seed: int,

@@ -10,9 +10,8 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
-from airtouch.gap.sealed.blind import alike
 from airtouch.gap.sealed.blind_severity import SEEN
-from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.candidates import alike, terms
 
 Case = Mapping[str, Any]
 LEVELS = ("weakest", "2x", "4x")

@@ -129,7 +129,7 @@ class Term:
 
         other: the value of those that this variant leaves alone. A random part has its own alone.
         """
-        names = _free(self.effect)
+        names = free_of(self.effect)
         if not set(names) & set(self.free):
             return np.array(x[:len(self.free)])
         out = np.full(len(names), other)
@@ -172,14 +172,14 @@ def _neutral(p) -> float:
 def terms(name: str) -> list[Term]:
     """The hypotheses of one effect: one for each variant, all free parameters at neutral."""
     effect = get(name)
-    free = _free(effect)
+    free = free_of(effect)
     kind = _KIND.get(name) or (MEAN if name in _FREE or not _random(effect) else SPECTRUM)
     base = effect.scaled(effect.values(), 0.0) | _FIXED.get(name, {})
     alone = [Term(effect, kind, (p,), base) for p in free] if name in _ONE_BY_ONE else []
     return [Term(effect, kind, free, base | variant) for variant in _VARIANTS.get(name, ({},))] + alone
 
 
-def _free(effect: Effect) -> tuple[str, ...]:
+def free_of(effect: Effect) -> tuple[str, ...]:
     """Names of the parameters of an effect that a fit begins with."""
     return _FREE.get(effect.name) or tuple(p.name for p in effect.parameters if p.neutral is not None)
 
@@ -245,6 +245,12 @@ def term_of(effect: Found) -> Term:
 def names_alike(name: str) -> tuple[frozenset[str], str] | None:
     """The set that an effect cannot be told from in these logs, and what would separate it."""
     return next(((group, advice) for group, advice in ALIKE if name in group), None)
+
+
+def alike(one: str, other: str) -> bool:
+    """Whether two names stand for one thing in these logs."""
+    group = names_alike(one)
+    return one == other or (group is not None and other in group[0])
 
 
 def _random(effect: Effect) -> bool:

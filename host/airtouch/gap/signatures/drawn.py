@@ -1,12 +1,16 @@
-"""What a blind set draws from: for every effect a direction and a strength within a plausible range."""
+"""How each effect is drawn where flights with it are simulated: a direction and a strength within a plausible range.
+
+Sealed sets draw from it, and so do the flights by which the diagnosis learns what an effect does to the signals.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.gap.signatures.candidates import free_of, unit
 from airtouch.simulation import effects
-from airtouch.simulation.effects import Active
+from airtouch.simulation.effects import Active, Effect
 
 Values = dict[str, float]
 
@@ -77,3 +81,34 @@ KINDS: dict[str, Kind] = {
     **{f"controller_gain {loop}": Kind("controller_gain", 1.0, _times(loop))
        for loop in ("rate", "attitude", "position", "height")},
 }
+
+
+STEPS = 3.0  #: natural steps of a parameter up to which an effect that KINDS lacks is drawn
+#: parameters of a kind that shape it, not scale it: each of the values that the diagnosis tries is a class of its own
+SHAPED = {"weak_motor": "rotor", "gust": "length", "motor_noise": "time", "slung_load": "length"}
+
+
+def kinds_of(effect: Effect) -> dict[str, Kind]:
+    """The kinds of an effect by their names; for one that KINDS lacks, such as a user's own, all its free parameters
+
+    together, up to STEPS natural steps in any direction.
+    """
+    known = {name: kind for name, kind in KINDS.items() if kind.effect == effect.name}
+    return known or {effect.name: Kind(effect.name, STEPS, _any(effect))}
+
+
+def _any(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
+    """Values of an effect at a strength in natural steps: a random direction of its free parameters."""
+    free = [p for p in effect.parameters if p.name in free_of(effect)]
+
+    def make(s: float, rng: np.random.Generator) -> Values:
+        way = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
+        way /= np.linalg.norm(way)
+        out = {}
+        for p, x in zip(free, way, strict=True):
+            signed = -abs(x) if p.high <= (p.neutral or 0.0) else abs(x) if p.low >= (p.neutral or 0.0) else \
+                x * rng.choice([-1.0, 1.0])
+            out[p.name] = float(np.clip((p.neutral or 0.0) + s * signed * unit(p), p.low, p.high))
+        return out
+
+    return make

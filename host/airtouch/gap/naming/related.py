@@ -1,0 +1,54 @@
+"""The effects that the relations of signals name, fitted and judged as every other hypothesis is."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.judging import FIRST_GAIN, Trial
+from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.naming.selection import Hypothesis, Judged, Selection
+from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.features import features
+from airtouch.gap.relations.inference import Inference, infer
+from airtouch.gap.signatures.drawn import SHAPED
+
+
+def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
+    """What the relations of signals say of flights, among these effects.
+
+    None where no library holds for the study's nominal flights, where it lacks an effect, or a log a column.
+    """
+    library = data.study.relations
+    if library is None or not data.study.simulated or not set(names) <= library.effects:
+        return None
+    own = [features(f, data.study.vehicle) for f in data.flights]
+    known = [f for f in own if f is not None]
+    if len(known) < len(own):
+        return None
+    return infer(library.without(library.effects - set(names)), library.coordinates(known))
+
+
+def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Mapping[str, Judged],
+            found: Inference, progress: Callable[[str], None]) -> Selection:
+    """The selection of the effects that an inference names, each fitted beside those before it.
+
+    alone: every candidate judged alone.
+    """
+    steps: list[Judged] = []
+    for of in found.classes:
+        variants = {of.effect: matching(of, candidates[of.effect])}
+        judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(of.effect,))
+        if of.effect in judged:
+            steps.append(replace(judged[of.effect], named=True, evidence=found.evidence[of.effect]))
+    return Selection(alone, tuple(steps), found.left_before, found.left, on.parts, dict.fromkeys(alone, FIRST_GAIN),
+                     on.data.study.nominal, False, 0.0, True, True, inference=found)
+
+
+def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The variants of an effect that are of a class: with its shape, or with the one parameter that it is named by."""
+    alone = of.name.partition(" ")[2]
+    if alone:
+        return [v for v in variants if v[0].free == (alone,)]
+    if of.shape is None:
+        return list(variants)
+    return [v for v in variants if v[0].values[SHAPED[of.name]] == of.shape]

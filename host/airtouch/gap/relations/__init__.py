@@ -1,0 +1,1 @@
+"""What a flight's logged signals do to one another, compared with simulated flights of each effect."""

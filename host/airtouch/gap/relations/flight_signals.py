@@ -1,0 +1,84 @@
+"""The signals of one flight whose relations are looked at: commands, motion, what model and estimator leave open."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.motion import held
+from airtouch.gap.loop.command_spectra import MIX
+from airtouch.gap.signals.channels import FORCE, TORQUE, angular_acceleration, residual
+from airtouch.logs.flight_log import ATTITUDE, GYRO, VELOCITY, FlightLog
+from airtouch.simulation import signals as at
+from airtouch.simulation.flight import prepare
+from airtouch.vehicle import Vehicle
+
+NEEDED = (*GYRO, *VELOCITY, *ATTITUDE, "zrange_m", "z_m")  #: columns beside commands and accelerations
+#: columns of `FlightSignals.table`
+COMMAND, TURN, LIFT, FORCE_LEFT, TORQUE_LEFT, SPEED_LEFT, ANGLE_LEFT, RANGE_LEFT = (
+    slice(0, 4), slice(4, 7), slice(7, 8), slice(8, 11), slice(11, 14), slice(14, 17), slice(17, 20), slice(20, 21))
+COUNT = 21
+#: down range over standing below which legs may touch in flight, and for how long around it
+CONTACT_M, CONTACT_S = 0.012, 0.15
+JUMP_MPS = 4.0  #: of the down range: another surface came below
+
+
+@dataclass(frozen=True)
+class FlightSignals:
+    """Signals of a flight, bridged over lost rows.
+
+    table (n, COUNT): collective, roll, pitch and yaw command, N per motor; angular acceleration, rad/s^2; force along
+    the thrust, m/s^2; what the model leaves of force and torque (`channels.residual`); what estimated velocity,
+    attitude and the down range change beyond what acceleration, gyro and estimated climb say (m/s^2, rad/s, m/s).
+    velocity (n, 3) m/s, body axes; angles (n, 3) rad; height (n,) m, estimated; air, rest (n,): samples in flight and
+    standing that nothing touches and no row lacks; flight: without the moments of contact.
+    """
+
+    flight: Flight
+    table: np.ndarray
+    velocity: np.ndarray
+    angles: np.ndarray
+    height: np.ndarray
+    air: np.ndarray
+    rest: np.ndarray
+
+
+def readable(log: FlightLog) -> bool:
+    """Whether a log has every column that the signals need."""
+    return log.has(*NEEDED)
+
+
+def signals_of(flight: Flight, vehicle: Vehicle) -> FlightSignals:
+    """The signals of a flight whose log is `readable`; vehicle: as declared, not as calibrated."""
+    log = flight.log
+    angles, velocity = held(log.stack(ATTITUDE)), flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
+    force = np.nan_to_num(residual(flight, vehicle))
+    gravity = flight.turn[:, 2, :] * vehicle.gravity_mps2
+    assert flight.rates is not None  # `NEEDED` has the gyro
+    rates = 0.5 * (flight.rates + np.roll(flight.rates, -1, axis=0))
+    down = _rate(held(log["zrange_m"])[:, None])
+    down = np.where(np.abs(down) > JUMP_MPS, 0.0, down) - held(log["vz_mps"])[:, None]
+    table = np.column_stack([
+        vehicle.thrust(flight.pwm) @ MIX.T, angular_acceleration(flight), flight.acceleration[:, 2],
+        force[:, FORCE], force[:, TORQUE], _rate(velocity) - (flight.acceleration - gravity), _rate(angles) - rates,
+        down])
+    if flight.bridged.any():
+        table = held(np.where(flight.bridged[:, None], np.nan, table))
+    touched = _touched(flight, vehicle)
+    good = flight.usable & ~flight.bridged & ~touched
+    rest = flight.on_ground & good
+    return FlightSignals(replace(flight, usable=flight.usable & ~touched), table, velocity, angles, held(log["z_m"]),
+                         (flight.phase != GROUND) & good, rest if rest.any() else flight.on_ground)
+
+
+def _rate(values: np.ndarray) -> np.ndarray:
+    """Differences (n, c) to the next sample, per second; 0 in the last row."""
+    return np.diff(values, axis=0, append=values[-1:]) / PERIOD_S
+
+
+def _touched(flight: Flight, vehicle: Vehicle) -> np.ndarray:
+    """Samples (n,) in flight around those at which the legs may touch what is below."""
+    standing = float(prepare(vehicle, ())[0][0]["leg_below_range"])
+    low = (flight.phase != GROUND) & (held(flight.log["zrange_m"]) < standing + CONTACT_M)
+    wide = int(CONTACT_S / PERIOD_S)
+    return np.convolve(low, np.ones(2 * wide + 1), "same") > 0.5

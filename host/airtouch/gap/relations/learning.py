@@ -1,0 +1,85 @@
+"""Flights simulated to learn from: nominal ones, ones with each effect, ones with something that has no name."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.gap.flights.flight import ready
+from airtouch.gap.relations import exposure
+from airtouch.gap.relations.features import features
+from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of
+from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.batch import flights as flown
+from airtouch.simulation.effects import Active, get
+from airtouch.vehicle import Vehicle
+
+SEED = 8_000_000  #: of all flights that are learned from; nobody draws sealed sets from it
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is flown: a scenario and the vehicle as declared."""
+
+    scenario: str
+    vehicle: Vehicle
+
+
+def fly(scene: Scene, number: int, active: Sequence[Active] = ()) -> np.ndarray | None:
+    """Features of flight number `number` with effects; None where it does not end well."""
+    log = next(iter(flown(scene.scenario, [number], vehicle=scene.vehicle, effects=list(active), seed=SEED, workers=1)))
+    if not isinstance(log, FlightLog):
+        return None
+    try:
+        return features(ready(log, scene.vehicle), scene.vehicle)
+    except AirTouchError:
+        return None
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One class of flights: a kind of effect in one of its shapes, and how it is drawn.
+
+    name: of the kind; shape: value of the parameter that shapes it, None where none does.
+    """
+
+    name: str
+    kind: Kind
+    shape: float | None = None
+
+    def active(self, strength: float, rng: np.random.Generator) -> Active:
+        """The effect at a strength, its direction drawn."""
+        drawn = self.kind.active(strength, rng)
+        return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, SHAPED[self.name]: self.shape})
+
+
+def drawings(effect: str) -> list[Drawing]:
+    """The classes of flights of an effect."""
+    out = []
+    for name, kind in kinds_of(get(effect)).items():
+        parameter = SHAPED.get(name)
+        own = [t for v in every()[effect] for t in v if t.name == effect and not t.companion]
+        shapes = sorted({t.values[parameter] for t in own}) if parameter else [None]
+        out += [Drawing(name, kind, s) for s in shapes]
+    return out
+
+
+def drawn_flights(scene: Scene, drawing: Drawing, strengths: tuple[float, float], count: int,
+                  ) -> Iterator[tuple[int, Active, np.ndarray]]:
+    """Number, effect and features of flights with an effect whose strengths are log-uniform between two."""
+    for number in range(count):
+        rng = np.random.default_rng([SEED, number, *drawing.name.encode(), int(1e6 * (drawing.shape or 0.0))])
+        active = drawing.active(float(np.exp(rng.uniform(*np.log(strengths)))), rng)
+        made = fly(scene, number, [active])
+        if made is not None:
+            yield number, active, made
+
+
+def disturbed_flights(scene: Scene, count: int) -> Iterator[tuple[int, np.ndarray]]:
+    """Number and features of flights in which something acts that has no name."""
+    for number in range(count):
+        made = fly(scene, number, exposure.draw(np.random.default_rng([SEED, number, 1])))
+        if made is not None:
+            yield number, made

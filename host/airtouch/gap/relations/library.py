@@ -1,0 +1,129 @@
+"""What was learned of one vehicle in one scenario, as a file: coordinates of its flights and classes of effects."""
+
+import io
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.hypotheses import Learned
+from airtouch.gap.relations.space import Standard
+from airtouch.logs.files import write_bytes
+from airtouch.vehicle import Vehicle, load
+
+SHIPPED = "diagnosis.npz"
+USUAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none
+STORED = np.float16  #: numbers of a file; their rounding moves a coordinate by less than a tenth of its deviation
+
+
+@dataclass(frozen=True)
+class Library:
+    """vehicle: its name; projection (features, Q), middle (Q,): coordinates of a flight are its standardised features
+
+    times the projection, less the middle. distance: median and deviation of the squared size of coordinates of nominal
+    flights that were not learned from. Shares (classes,) of its evidence, which four of five flights with a class keep:
+    `left`, what a disturbance without a name gains beside it; `more`, what a second effect gains; `far`, how much
+    farther from it than nominal flights from none the flight lies, in nats.
+    """
+
+    scenario: str
+    vehicle: str
+    standard: Standard
+    projection: np.ndarray
+    middle: np.ndarray
+    learned: Learned
+    distance: tuple[float, float]
+    left: np.ndarray
+    more: np.ndarray
+    far: np.ndarray
+
+    def coordinates(self, features: np.ndarray) -> np.ndarray:
+        """Coordinates (n, Q) of features (n, features)."""
+        return self.standard(features) @ self.projection - self.middle
+
+    @property
+    def usual(self) -> float:
+        """Nats by which nominal flights, but for a few odd ones, lie no farther from none than most do."""
+        return 0.5 * USUAL * self.distance[1]
+
+    def beyond(self, squared: float) -> float:
+        """Nats by which a flight at a squared distance lies farther off than nominal flights from none."""
+        return 0.5 * (squared - self.distance[0])
+
+    def nominal(self, coordinates: np.ndarray) -> bool:
+        """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
+        return bool(len(coordinates)) and self.beyond(float(np.median((coordinates ** 2).sum(axis=1)))) < self.usual
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """Names of the effects of the registry that it has classes of."""
+        return frozenset(c.effect for c in self.learned.classes)
+
+    def without(self, names: Iterable[str]) -> "Library":
+        """The library with effects left out."""
+        out = frozenset(names)
+        keep = np.array([c.effect not in out for c in self.learned.classes])
+        classes = tuple(c for c in self.learned.classes if c.effect not in out)
+        return replace(self, learned=replace(self.learned, classes=classes), left=self.left[keep],
+                       more=self.more[keep], far=self.far[keep])
+
+
+def save(library: Library, path: Path) -> None:
+    """Write a library as npz, numbers in half precision."""
+    write_bytes(packed(library), path, True)
+
+
+def packed(library: Library) -> bytes:
+    """The bytes of a library's file."""
+    learned = library.learned
+    arrays = {"standard.middle": library.standard.middle, "standard.deviation": library.standard.deviation,
+              "projection": library.projection, "middle": library.middle, "together": learned.together,
+              "nameless": learned.nameless, "left": library.left, "more": library.more, "far": library.far}
+    for i, c in enumerate(learned.classes):
+        arrays |= {f"{i}.knots": c.knots, f"{i}.table": c.table, f"{i}.ways": c.ways, f"{i}.spread": c.spread}
+    words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
+             "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in learned.classes]}
+    exact = ("knots", "spread", "standard.middle", "standard.deviation")
+    kept: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(exact) else STORED) for k, v in arrays.items()}
+    file = io.BytesIO()
+    np.savez_compressed(file, **kept, words=np.array(json.dumps(words)))
+    return file.getvalue()
+
+
+def read(content: bytes) -> Library:
+    """The library in the bytes of a file."""
+    with np.load(io.BytesIO(content)) as file:
+        words = json.loads(str(file["words"]))
+        a = {k: file[k].astype(float) for k in file.files if k != "words"}
+    classes = tuple(EffectClass(name, effect, shape, parameters, signed, a[f"{i}.knots"], a[f"{i}.table"],
+                                a[f"{i}.ways"], a[f"{i}.spread"])
+                    for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
+    middle, spread = words["distance"]
+    return Library(words["scenario"], words["vehicle"], Standard(a["standard.middle"], a["standard.deviation"]),
+                   a["projection"], a["middle"], Learned(classes, a["together"], a["nameless"]), (middle, spread),
+                   a["left"], a["more"], a["far"])
+
+
+@cache
+def shipped() -> Library:
+    """The library that comes with the package."""
+    return read((resources.files("airtouch.gap.relations") / SHIPPED).read_bytes())
+
+
+def library_for(vehicle: Vehicle, nominal: Sequence[np.ndarray | None]) -> Library | None:
+    """The library for flights of a vehicle whose nominal flights have these features; None where there is none.
+
+    It must be of the same vehicle as declared, and the nominal flights must lie where simulated ones lie: those of
+    another mission, of another simulator or of a real vehicle do not.
+    """
+    known = [f for f in nominal if f is not None]
+    found = shipped()
+    if not known or len(known) < len(nominal) or replace(load(found.vehicle), name=vehicle.name) != vehicle:
+        return None
+    return found if found.nominal(found.coordinates(np.array(known))) else None

@@ -1,0 +1,106 @@
+"""Means, variances and regressions of one flight's signals, in the air, by phase and at rest; the log's times."""
+
+from functools import cache
+
+import numpy as np
+
+from airtouch.gap.relations.flight_signals import (
+    COMMAND,
+    COUNT,
+    FORCE_LEFT,
+    RANGE_LEFT,
+    SPEED_LEFT,
+    TORQUE_LEFT,
+    FlightSignals,
+)
+from airtouch.gap.unnamed.basis import BASIS, basis
+from airtouch.logs.segments import KINDS
+from airtouch.vehicle import Vehicle
+
+REGRESSED = {"force": FORCE_LEFT, "torque": TORQUE_LEFT, "speed": SPEED_LEFT}
+OF_MEANS = slice(FORCE_LEFT.start, SPEED_LEFT.stop)  #: columns of the table whose means are looked at
+FEWEST = 20  #: samples of a phase; else the whole flight stands in for it
+FEWEST_AT_REST = 4  #: samples
+FAST_SAMPLES = 50  #: what changes faster than a mean over so many is fast
+LEAST_VARIANCE = 1e-14
+CLOCK_S = 2e-4  #: of the logged times, added to their rms: less is none
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Names of what `moments` gives."""
+    means = [f"mean {i}" for i in range(OF_MEANS.stop - OF_MEANS.start + 4 + 3 + 3 + 3 + 1)]
+    of_phase = [*means, *(f"variance {i}" for i in range(COUNT))]
+    return (*(f"follows {what} {axis} {b}" for what in REGRESSED for axis in "xyz" for b in BASIS),
+            *(f"{phase} {what}" for phase in KINDS[1:] for what in of_phase),
+            *(f"later {i}" for i in range(OF_MEANS.stop - OF_MEANS.start + 4)),
+            *(f"rest {what} {i}" for what in ("mean", "fast variance", "variance") for i in range(6)),
+            "clock rms", "clock steps", "clock lost", "clock runs")
+
+
+def moments(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
+    """Numbers (len(names()),) of a flight: what force, torque and estimated speed have of the flight's own signals
+
+    (`unnamed.basis`), means and logarithms of variances in each phase, what the second half has over the first, means
+    and noise at rest, and what the log did to its times. NaN where there is nothing to tell by.
+    """
+    return np.concatenate([_followed(signals, vehicle), *(_of_phase(signals, k) for k in range(1, len(KINDS))),
+                           _later(signals), _at_rest(signals), _clock(signals)])
+
+
+def _followed(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
+    """Scores of each force, torque and speed on each column of the basis: products, over the column's own size."""
+    own, out = basis(signals.flight, vehicle)[signals.air], []
+    many = np.sqrt(signals.air.sum() + 1.0)
+    for place in REGRESSED.values():
+        left = signals.table[signals.air, place]
+        out += [own[:, :, a].T @ left[:, a] / np.sqrt((own[:, :, a] ** 2).sum(axis=0) + 1e-9) / many for a in range(3)]
+    return np.concatenate(out)
+
+
+def _means(signals: FlightSignals, some: np.ndarray) -> np.ndarray:
+    return np.concatenate([signals.table[some, OF_MEANS].mean(axis=0), signals.table[some, COMMAND].mean(axis=0)])
+
+
+def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
+    """Means of what is left, commands, angles, velocity, rates and range; logarithm of the variance of what is fast."""
+    own = signals.air & (signals.flight.phase == phase)
+    some = own if own.sum() > FEWEST else signals.air
+    assert signals.flight.rates is not None
+    slow = [x[some].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
+                                           signals.table[:, RANGE_LEFT])]
+    fast = (signals.table - _smoothed(signals.table))[some].var(axis=0)
+    return np.concatenate([_means(signals, some), *slow, np.log(fast + LEAST_VARIANCE)])
+
+
+def _smoothed(table: np.ndarray) -> np.ndarray:
+    """Means (n, c) over FAST_SAMPLES around each sample, fewer at the ends."""
+    sums = np.cumsum(np.vstack([np.zeros(table.shape[1]), table]), axis=0)
+    place = np.arange(len(table))
+    low, high = np.maximum(place - FAST_SAMPLES // 2, 0), np.minimum(place + FAST_SAMPLES // 2, len(table))
+    return (sums[high] - sums[low]) / (high - low)[:, None]
+
+
+def _later(signals: FlightSignals) -> np.ndarray:
+    """Means of the second half of the flight less those of the first."""
+    place = np.flatnonzero(signals.air)
+    first, second = np.array_split(place, 2)
+    return _means(signals, second) - _means(signals, first)
+
+
+def _at_rest(signals: FlightSignals) -> np.ndarray:
+    """Means and logarithms of variances, of differences and of values, of accelerations and rates."""
+    assert signals.flight.rates is not None
+    own = np.column_stack([signals.flight.acceleration, signals.flight.rates])[signals.rest]
+    if len(own) < FEWEST_AT_REST:
+        return np.full(18, np.nan)
+    return np.concatenate([own.mean(axis=0), np.log(np.diff(own, axis=0).var(axis=0) + LEAST_VARIANCE),
+                           np.log(own.var(axis=0) + LEAST_VARIANCE)])
+
+
+def _clock(signals: FlightSignals) -> np.ndarray:
+    """Logarithms of the rms of the logged times and of their steps, and of the numbers of lost rows and of gaps."""
+    clock, lost = signals.flight.clock_s, signals.flight.lost
+    gaps = (np.diff(lost.astype(int), prepend=0) == 1).sum()
+    rms = [np.sqrt(np.mean(x ** 2)) if len(x) else 0.0 for x in (clock, np.diff(clock))]
+    return np.concatenate([np.log(np.array(rms) + CLOCK_S), np.log1p([lost.sum(), gaps])])

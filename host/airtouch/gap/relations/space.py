@@ -1,0 +1,73 @@
+"""Features in units of what nominal flights of a vehicle scatter by, along a few hundred directions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.relations import coherence, edge_steps, moments
+
+SQUASHED = 5.0  #: deviations beyond which a feature grows with the logarithm only
+#: no feature is taken to say more than this: coherence, logarithms of powers and of variances, of the clock
+LEAST_COHERENCE, LEAST_LOG, LEAST_CLOCK = 0.01, 0.03, 0.1
+LEAST_LOST = 0.5  #: the same of lost rows, in the logarithm of one more than their number: one by chance is no news
+DOUBT = 0.1  #: variance of every feature, in its nominal one, that no nominal flight knows of: see `whitening`
+SMALLEST = 1e-9  #: deviation of a feature that varies at all
+
+
+@dataclass(frozen=True)
+class Standard:
+    """Median and deviation (features,) of each feature among nominal flights; deviation 0: it says nothing."""
+
+    middle: np.ndarray
+    deviation: np.ndarray
+
+    def __call__(self, features: np.ndarray) -> np.ndarray:
+        """Deviations (n, features) from the median, squashed; 0 where there is nothing to tell by."""
+        known = self.deviation > 0.0
+        far = (np.where(np.isnan(features), self.middle, features) - self.middle) / np.where(known, self.deviation, 1.0)
+        size = np.abs(far)
+        squashed = np.sign(far) * SQUASHED * (1.0 + np.log(np.maximum(size, SQUASHED) / SQUASHED))
+        return np.where(known, np.where(size > SQUASHED, squashed, far), 0.0)
+
+
+def standard_of(nominal: np.ndarray) -> Standard:
+    """The standard of nominal flights' features (n, features): the middle two thirds of them give the deviation."""
+    middle = np.nanmedian(nominal, axis=0)
+    low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), [0.16, 0.84], axis=0)
+    deviation = np.hypot(0.5 * (high - low), _least())
+    return Standard(middle, np.where(deviation > SMALLEST, deviation, 0.0))
+
+
+def _least() -> np.ndarray:
+    """The least deviation (features,) of each feature."""
+    of_coherence = [LEAST_COHERENCE if " real " in n or " imaginary " in n else LEAST_LOG for n in coherence.names()]
+    clock = {"clock rms": LEAST_CLOCK, "clock steps": LEAST_CLOCK, "clock lost": LEAST_LOST, "clock runs": LEAST_LOST}
+    of_moments = [LEAST_LOG if "variance" in n else clock.get(n, 0.0) for n in moments.names()]
+    return np.array([*of_coherence, *of_moments, *(0.0 for _ in edge_steps.names())])
+
+
+def whitening(standard: np.ndarray, doubt: float = DOUBT) -> np.ndarray:
+    """Lower triangle L of the covariance L L' (features, features) of nominal flights (n, features), standardised.
+
+    Each feature has a variance of its own beside what nominal flights show: no simulated vehicle is as exact as the
+    cancellation of many features would need it, and few flights give fewer directions than features.
+    """
+    covariance = (1.0 - doubt) * np.cov(standard.T) + doubt * np.eye(standard.shape[1])
+    return np.linalg.cholesky(covariance)
+
+
+def directions(shifts: Sequence[np.ndarray], each: int, first: np.ndarray, common: int) -> np.ndarray:
+    """Orthonormal directions (features, d): `common` of `first` (n, features) and `each` of every other set of shifts.
+
+    All shifts are whitened; long ones count little more than short ones.
+    """
+    blocks = [_principal(first, common), *(_principal(s, each) for s in shifts)]
+    return np.linalg.qr(np.concatenate(blocks, axis=1))[0]
+
+
+def _principal(shifts: np.ndarray, many: int, least: float = 8.0) -> np.ndarray:
+    """The directions (features, many) in which shifts (n, features) lie, their lengths cut at `least`."""
+    scaled = shifts / np.maximum(np.linalg.norm(shifts, axis=1, keepdims=True), least)
+    _, size, ways = np.linalg.svd(scaled, full_matrices=False)
+    return ways[:many][size[:many] > 1e-6 * size[0]].T

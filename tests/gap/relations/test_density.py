@@ -1,0 +1,77 @@
+"""The likelihood of one class against the normal density and an integral over its strengths."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal
+
+from airtouch.gap.relations.density import coordinates_of, far, fit, plain
+from airtouch.gap.relations.effect_class import EffectClass
+
+Q = 6
+KNOTS = np.log([0.1, 1.0, 10.0])
+
+
+NONE = np.zeros((Q, 0)), np.zeros(0)
+
+
+def straight(way, ways=NONE[0], spread=NONE[1], signed=False):
+    """A class whose shift is its strength times `way` (Q,)."""
+    table = np.tile(way, (1, len(KNOTS), 1))
+    return EffectClass("one", "one", None, 1, signed, KNOTS,
+                       np.concatenate([table, np.zeros_like(table)]) if signed else table, ways, spread)
+
+
+@pytest.fixture
+def way():
+    return np.random.default_rng(3).normal(size=Q)
+
+
+def test_the_likeliest_strength_of_a_straight_line_is_the_projection(way):
+    values = 2.0 * way + np.random.default_rng(4).normal(size=Q)
+    found = fit(straight(way), values, plain(Q))
+    assert found.strength == pytest.approx([way @ values / (way @ way)], rel=1e-3)
+    assert found.level == pytest.approx(-0.5 * np.sum((values - found.strength * way) ** 2), rel=1e-6)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_evidence_is_the_likelihood_averaged_over_strengths(way, signed):
+    """Laplace's method against the integral: any strength as likely on a logarithmic scale, either sign too."""
+    values = 3.0 * way
+
+    def density(log_strength):
+        signs = (-1.0, 1.0) if signed else (1.0,)
+        return np.mean([np.exp(far(values - s * np.exp(log_strength) * way)) for s in signs])
+
+    exact = np.log(quad(density, KNOTS[0], KNOTS[-1], points=[np.log(3.0)], limit=200)[0] / (KNOTS[-1] - KNOTS[0]))
+    assert fit(straight(way, signed=signed), values, plain(Q)).evidence == pytest.approx(exact, abs=0.05)
+
+
+def test_scatter_about_the_curve_widens_the_density(way):
+    """Against SciPy's normal density with the covariance 1 + shift^2 ways spread ways'."""
+    rng = np.random.default_rng(5)
+    ways = np.linalg.qr(rng.normal(size=(Q, 2)))[0]
+    spread, values = np.array([0.3, 0.05]), 2.0 * way + rng.normal(size=Q)
+    found = fit(straight(way, ways, spread), values, plain(Q))
+    shift = found.strength * way
+    covariance = np.eye(Q) + (shift @ shift) * (ways * spread) @ ways.T
+    constant = 0.5 * Q * np.log(2.0 * np.pi)
+    assert found.level == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
+
+
+def test_coordinates_turn_a_covariance_into_one():
+    rng = np.random.default_rng(6)
+    factors, values = rng.normal(size=(Q, 2)), rng.normal(size=Q)
+    known = coordinates_of(factors)
+    exact = multivariate_normal(np.zeros(Q), np.eye(Q) + factors @ factors.T).logpdf(values)
+    assert known.level + far(known(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
+
+
+def test_several_parameters_are_solved_together():
+    """A plane: the least squares solution, within what was flown."""
+    rng = np.random.default_rng(7)
+    plane = rng.normal(size=(2, Q))
+    of = EffectClass("two", "two", None, 2, False, KNOTS, np.repeat(plane[:, None], len(KNOTS), axis=1),
+                     np.zeros((Q, 0)), np.zeros(0))
+    values = np.array([1.5, -0.7]) @ plane + 0.1 * rng.normal(size=Q)
+    assert fit(of, values, plain(Q)).strength == pytest.approx(np.linalg.lstsq(plane.T, values)[0], abs=1e-3)

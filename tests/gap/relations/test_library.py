@@ -1,0 +1,84 @@
+"""The shipped library: for which flights it holds, that it is no older than the code, and what it names end to end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.naming.related import inference_of
+from airtouch.gap.naming.select import select
+from airtouch.gap.relations import library
+from airtouch.gap.relations.features import features, names
+from airtouch.gap.relations.learning import drawings
+from airtouch.gap.signatures.candidates import every
+from airtouch.simulation import batch
+from airtouch.simulation.effects import NAMES
+from gap_flights import VEHICLE, flown, ready
+
+
+@pytest.fixture(scope="module")
+def nominal():
+    """Features of nominal flights of a seed that nothing was learned from."""
+    return [features(f, VEHICLE) for f in flown(5, 77)]
+
+
+def test_a_file_holds_what_was_saved(tmp_path):
+    shipped = library.shipped()
+    library.save(shipped, tmp_path / "one.npz")
+    again = library.read((tmp_path / "one.npz").read_bytes())
+    assert [c.name for c in again.learned.classes] == [c.name for c in shipped.learned.classes]
+    assert again.projection == pytest.approx(shipped.projection)
+    assert again.effects == shipped.effects
+
+
+def test_the_file_is_of_todays_features_and_effects():
+    """Else `python -m airtouch.gap.relations.build` makes a new one."""
+    shipped = library.shipped()
+    assert len(shipped.standard.middle) == len(names())
+    assert {(c.name, c.shape) for c in shipped.learned.classes} \
+        == {(d.name, d.shape) for e in NAMES for d in drawings(e)}
+
+
+def test_it_holds_for_nominal_flights_of_its_vehicle_and_scenario(nominal):
+    assert library.library_for(VEHICLE, nominal) is library.shipped()
+
+
+def test_it_does_not_hold_for_another_vehicle_mission_or_log(nominal):
+    heavier = replace(VEHICLE, mass_kg=1.05 * VEHICLE.mass_kg)
+    assert library.library_for(heavier, nominal) is None
+    hovering = [features(ready(log, VEHICLE), VEHICLE)
+                for log in batch.flights("hover", 2, vehicle=VEHICLE, seed=77, workers=1)]
+    assert library.library_for(VEHICLE, hovering) is None
+    assert library.library_for(VEHICLE, [*nominal, None]) is None
+    assert library.library_for(VEHICLE, []) is None
+
+
+def test_nominal_flights_lie_as_far_as_their_covariance_says(nominal):
+    """The squared distance of a nominal flight has about as many degrees of freedom as there are coordinates."""
+    shipped = library.shipped()
+    coordinates = shipped.coordinates(np.array(nominal))
+    assert np.median((coordinates ** 2).sum(axis=1)) == pytest.approx(shipped.distance[0], rel=0.15)
+    assert shipped.distance[0] == pytest.approx(coordinates.shape[1], rel=0.3)
+
+
+@pytest.mark.parametrize("effects", [{"weak_motor": {"rotor": 2.0, "thrust_loss": 0.002}},
+                                     {"controller_gain": {"position": 1.25}}, {"imu_noise": {"factor": 1.15}}])
+def test_weak_effects_are_named_and_withheld_ones_are_not(study, effects):
+    """Each too weak for the replay of a single flight; the other names of one that is withheld do not get it."""
+    data, candidates = Data(study, flown(1, 78, effects)), every()
+    chosen = select(data, candidates)
+    assert chosen.inference is not None and [s.name for s in chosen.named] == list(effects)
+    left_out = {n: v for n, v in candidates.items() if n not in effects}
+    found = inference_of(data, list(left_out))
+    assert not set(effects) & set(found.evidence)
+    assert max(found.evidence.values()) < chosen.inference.evidence[next(iter(effects))]
+
+
+def test_it_is_not_asked_where_it_cannot_answer(study):
+    """In recorded flights, and where an effect is a candidate that it has no class of."""
+    data = Data(study, flown(1, 79))
+    assert inference_of(data, list(every())) is not None
+    assert inference_of(data, [*every(), "an effect of one's own"]) is None
+    recorded = replace(study, scatter=replace(study.scatter, exact=False))
+    assert inference_of(replace(data, study=recorded), list(every())) is None
