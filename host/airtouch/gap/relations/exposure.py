@@ -14,7 +14,7 @@ from airtouch.simulation import plant
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, wrench
 from airtouch.simulation.effects import NAMES as PACKAGE
-from airtouch.simulation.random_stream import normal
+from airtouch.simulation.random_generator import normal
 from airtouch.vehicle import load
 
 KIND, FORCE, TIME, BEGIN, END = 0, 1, 7, 8, 9  #: places of the wrench's parameters; force and torque are six

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -89,3 +90,15 @@ def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAM
 def one(course: Course, effects: Mapping[str, Any], name: str = NAME, **mission: float) -> Scenario:
     """The scenario of one course. mission: arguments of `drawn`."""
     return Scenario(name, "", table([course], effects, name, **mission))
+
+
+def shortened(scene: Scenario, least: float, seed: int = 0) -> Scenario:
+    """The scenario with its platforms shorter: each course's length times a number between `least` and 1.
+
+    A detector of platforms that were all alike in length fails over shorter ones.
+    """
+    rng = np.random.default_rng([seed, 31])
+    course = scene.table["values"]["course"]
+    choice = [{**values, "length": values["length"] * float(rng.uniform(least, 1.0))} for values in course["choice"]]
+    values = {**scene.table["values"], "course": {**course, "choice": choice}}
+    return replace(scene, table={**scene.table, "values": values})
