@@ -64,7 +64,8 @@ def main() -> None:
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
     air = free_air.read(options.free_air) if options.free_air else []
-    fit([readable[f.path] for f in listed], options.twin, air, options.least, options.seed).save(options.out, options.force)
+    model = fit([readable[f.path] for f in listed], options.twin, air, options.least, options.seed)
+    model.save(options.out, options.force)
     print(f"written: {options.out}")
 
 
