@@ -41,8 +41,7 @@ def fit(flights: Sequence[FlightLog], twin: Path, air: Sequence[FlightLog], leas
     recorded, simulated = ([sensors.without(log, LACKED) for log in logs] for logs in (flights, laid))
     weights = [len(laid) / len(flights)] * len(flights) + [1.0] * len(laid)
     model = best.fit([*recorded, *simulated], seed, pseudo_labels=[*[None] * len(recorded), *edges], emphasis=weights,
-                     free_air=[sensors.without(log, LACKED) for log in air], decoder=adapt.DECODER, steps=STEPS,
-                     command=COMMAND)
+                     free_air=air, decoder=adapt.DECODER, steps=STEPS, command=COMMAND)
     return adapt.timed(model, recorded, [None] * len(recorded))
 
 
