@@ -34,11 +34,12 @@ from airtouch.vehicle import Vehicle
 
 SIMULATED = 450  #: flights of the twin to train on
 STEPS = {"shipped": 400, "scratch": 2500}  #: of a training from given or random weights
-#: Augmentation of recorded and simulated flights together: twice the recipe's, as few flights are seen for longer.
+#: Augmentation of recorded and simulated flights together from random weights: twice the recipe's, as few flights are
+#: seen for long. Given weights forget more by it (host/docs/twin-findings.md).
 STRONG: dict[str, Any] = {"gain": 0.3, "warp": 0.15, "noise": 0.1, "offset": 0.2, "yaw_deg": 40.0}
 ROUNDS = 2  #: in which flights without labels are labelled, each by the detector of the one before
 FOLDS = 4
-STAGES = 5  #: changes with what the stages do, so that stored ones of another version are not taken
+STAGES = 6  #: changes with what the stages do, so that stored ones of another version are not taken
 FEWEST = 4  #: least number of labelled flights for a hold-out
 #: Decoder of a detector that has been trained on simulated edges: its entry logit hardly rises over high platforms, so
 #: that the "over" logit has a large share, smoothed over 0.1 s. Chosen on folds 0 to 2 out of 220, for the least cost
@@ -192,7 +193,7 @@ def _mixed(start: BestModel | None, labelled: Sequence[Flight], taught: Sequence
     weights = [count / len(some) for some in (labelled, taught) for _ in some] + [1.0] * count
     made = best.fit([*recorded, *flown.logs], seed, start=start, pseudo_labels=[*labels, *flown.edges],
                     emphasis=weights, decoder=None if start else DECODER, progress=progress, command=command,
-                    steps=STEPS["shipped" if start else "scratch"], **STRONG)
+                    steps=STEPS["shipped" if start else "scratch"], **({} if start else STRONG))
     return timed(made, recorded, labels)
 
 

@@ -139,6 +139,7 @@ def test_levers_are_those_of_the_registry(vehicle):
 def test_craft_sets_fields_and_axes(vehicle):
     chosen = tuple(v for v in levers.default(vehicle) if v.of == levers.VEHICLE)
     values = levers.starts(chosen)
+    vehicle = replace(vehicle, rotor_inertia_kg_m2=levers.ROTOR_INERTIA, acc_lowpass_hz=levers.ACC_LOWPASS_HZ)
     assert levers.craft(vehicle, chosen, values) == vehicle
     values[[v.key for v in chosen].index("gyro_noise_ratio.2")] = 0.7
     changed = levers.craft(vehicle, chosen, values)

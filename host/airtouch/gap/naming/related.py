@@ -35,11 +35,12 @@ def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Ma
     alone: every candidate judged alone.
     """
     steps: list[Judged] = []
-    for of in found.classes:
-        variants = {of.effect: matching(of, candidates[of.effect])}
-        judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(of.effect,))
-        if of.effect in judged:
-            steps.append(replace(judged[of.effect], named=True, evidence=found.evidence[of.effect]))
+    for effect in dict.fromkeys(of.effect for of in found.classes):
+        own = [of for of in found.classes if of.effect == effect]
+        variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}
+        judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(effect,))
+        if effect in judged:
+            steps.append(replace(judged[effect], named=True, evidence=found.evidence[effect]))
     return Selection(alone, tuple(steps), found.left_before, found.left, on.parts, dict.fromkeys(alone, FIRST_GAIN),
                      on.data.study.nominal, False, 0.0, True, True, inference=found)
 

@@ -40,6 +40,11 @@ class EffectClass:
     spread: np.ndarray
 
     @property
+    def of_one_parameter(self) -> bool:
+        """Whether the effect has several parameters, each with a class of its own: its name is "effect parameter"."""
+        return self.name != self.effect and self.name.startswith(f"{self.effect} ")
+
+    @property
     def least(self) -> float:
         """The least strength that was flown."""
         return float(np.exp(self.knots[0]))

@@ -119,8 +119,12 @@ def _further(flown: Flown, held: list[Hypothesis]) -> list[Hypothesis]:
 
 
 def may_stand_beside(other: EffectClass, held: Hypothesis) -> bool:
-    """Whether a class is of another effect than those of a hypothesis, and no other name of one of them."""
-    return not any(alike(other.effect, e) for e in held.effects)
+    """Whether a class is of another effect than those of a hypothesis, and no other name of one of them.
+
+    Or of another parameter of one of them, where each parameter has a class of its own.
+    """
+    another = other.of_one_parameter and other.name not in held.names
+    return all(not alike(other.effect, e) or (another and other.effect == e) for e in held.effects)
 
 
 def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:
