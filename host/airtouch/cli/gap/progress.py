@@ -45,7 +45,7 @@ class Steps:
     LINE_S = 1.5
 
     def __init__(self, began: float) -> None:
-        self.began, self.last, self.text = began, 0.0, ""
+        self.began, self.text = began, ""
         self.stopped = threading.Event()
         self.thread = threading.Thread(target=self._tick, daemon=True)
 

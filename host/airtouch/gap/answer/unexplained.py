@@ -60,7 +60,7 @@ def nearest(selection: Selection) -> list[dict[str, str]]:
 def fails(selection: Selection, judged: Judged) -> str:
     """Why a candidate is not the answer, in nats of held-out log likelihood."""
     if selection.inference is not None:
-        return related_fails(selection, selection.inference, judged.name)
+        return fails_by_relations(selection, selection.inference, judged.name)
     least = selection.least[judged.name]
     if judged.name in {s.name for s in selection.named}:  # the best there is, and not enough
         return against(selection)
@@ -75,9 +75,9 @@ def fails(selection: Selection, judged: Judged) -> str:
     return f"gains {judged.gain:.0f} of the {selection.free_before:.0f} nats that a model without names gains"
 
 
-def related_fails(selection: Selection, found: Inference, name: str) -> str:
+def fails_by_relations(selection: Selection, inference: Inference, name: str) -> str:
     """Why the relations of the signals do not name an effect, in nats."""
-    gains = found.evidence[name]
+    gains = inference.evidence[name]
     first = [s.name for s in selection.named]
     if name in first:
         return against(selection)
@@ -85,7 +85,7 @@ def related_fails(selection: Selection, found: Inference, name: str) -> str:
         return f"the relations of the signals gain {gains:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
     if not first:
         return f"the relations of the signals gain {gains:.1f} nats by it, and more by a model without names"
-    return f"the relations of the signals gain {gains:.0f} nats by it, {found.evidence[first[0]]:.0f} by {first[0]}"
+    return f"the relations of the signals gain {gains:.0f} nats by it, {inference.evidence[first[0]]:.0f} by {first[0]}"
 
 
 def against(selection: Selection) -> str:

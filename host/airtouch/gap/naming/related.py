@@ -29,20 +29,21 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
 
 
 def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Mapping[str, Judged],
-            found: Inference, progress: Callable[[str], None]) -> Selection:
+            inference: Inference, progress: Callable[[str], None]) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
     alone: every candidate judged alone.
     """
     steps: list[Judged] = []
-    for effect in dict.fromkeys(of.effect for of in found.classes):
-        own = [of for of in found.classes if of.effect == effect]
+    for effect in dict.fromkeys(of.effect for of in inference.classes):
+        own = [of for of in inference.classes if of.effect == effect]
         variants = {effect: matching(own[0], candidates[effect]) if len(own) == 1 else list(candidates[effect])}
         judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(effect,))
         if effect in judged:
-            steps.append(replace(judged[effect], named=True, evidence=found.evidence[effect]))
-    return Selection(alone, tuple(steps), found.left_before, found.left, on.parts, dict.fromkeys(alone, FIRST_GAIN),
-                     on.data.study.nominal, False, 0.0, True, True, inference=found)
+            steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
+    return Selection(alone, tuple(steps), inference.left_before, inference.left, on.parts,
+                     dict.fromkeys(alone, FIRST_GAIN), on.data.study.nominal, False, 0.0, True, True,
+                     inference=inference)
 
 
 def matching(of: EffectClass, variants: Sequence[Hypothesis]) -> list[Hypothesis]:

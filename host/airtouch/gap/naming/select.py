@@ -62,13 +62,13 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     alone = round_of(on, candidates, None, progress)
     need = dict.fromkeys(alone, FIRST_GAIN if data.study.controller is not None else LEAST_GAIN)
     inference = inference_of(data, list(candidates))
-    told = related(on, candidates, alone, inference, progress) if inference is not None else None
-    if told is not None and told.explained:
-        return told
+    by_relations = related(on, candidates, alone, inference, progress) if inference is not None else None
+    if by_relations is not None and by_relations.explained:
+        return by_relations
     passing = _passing(on, alone, need, without)
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
-    if told is not None and passing is None and [s.name for s in steps if s.named][:1] != [NOT_A_CURVE]:
-        return told
+    if by_relations is not None and passing is None and [s.name for s in steps if s.named][:1] != [NOT_A_CURVE]:
+        return by_relations
     if passing is not None and any(s.named and s.name == passing.name
                                    and _news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
         singles, least, steps = _steps(on, candidates, alone, need, None, progress)

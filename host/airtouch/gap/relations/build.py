@@ -161,11 +161,11 @@ def _together(scene: Scene, library: Library, paired: Sequence[Paired]) -> np.nd
         f = fly(scene, i, [_drawn(paired[j], rng) for j in (a, b)])
         if f is None:
             continue
-        left, smaller = _beside(library, library.coordinates(f[None])[0], a, b)
+        residual, smaller = _residual_of_two(library, library.coordinates(f[None])[0], a, b)
         if smaller > CLEAR:
             noise.append(smaller ** -2.0)
-            if np.linalg.norm(left) < smaller:  # else the strengths found are not the right ones
-                relative.append(left / smaller)
+            if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
+                relative.append(residual / smaller)
     return _standing_out(np.array(relative), float(np.mean(noise)))
 
 
@@ -184,7 +184,7 @@ def _drawn(paired: Paired, rng: np.random.Generator) -> Active:
     return paired.drawing.active(float(np.exp(rng.uniform(0.5 * (low + high), high))), rng)
 
 
-def _beside(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
+def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
     """What two right classes leave of a flight (Q,), and the size of the smaller one's shift."""
     one, two = library.learned.classes[a], library.learned.classes[b]
     first = fit(one, values, plain(len(values)))
@@ -200,8 +200,8 @@ def checked(scene: Scene, library: Library) -> Library:
     squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, [0.16, 0.84])
     library = replace(library, distance=(float(np.median(squared)), float(0.5 * (high - low))))
-    every = {(d.name, d.shape): d for e in NAMES if e in EFFECTS for d in drawings(e)}
-    shares = [_shares(scene, library, i, every[c.name, c.shape]) for i, c in enumerate(library.learned.classes)]
+    drawing_of = {(d.name, d.shape): d for e in NAMES if e in EFFECTS for d in drawings(e)}
+    shares = [_shares(scene, library, i, drawing_of[c.name, c.shape]) for i, c in enumerate(library.learned.classes)]
     left, more, far = np.array(shares).T
     return replace(library, left=left, more=more, far=far)
 
