@@ -23,26 +23,23 @@ from airtouch.detector.shared import sensors
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from airtouch.twin import adapt, edge_strength, files, overlay
+from airtouch.twin import adapt, files
 from airtouch.twin.recorded.missions import shortened
 
 COMMAND = "tools/train_without_acceleration.py"
 LACKED = ("acceleration",)
-STEPS = 2500
 
 
-def fit(flights: Sequence[FlightLog], twin: Path, air: Sequence[FlightLog], least: float, seed: int) -> BestModel:
+def fit(flights: Sequence[adapt.Flight], twin: Path, air: Sequence[FlightLog], least: float, seed: int) -> BestModel:
     """The detector; its lag is that of the recorded flights. air: flights of any vehicle without edges."""
     scene, craft = scenario.load(twin / files.SCENARIO), vehicle.load(str(twin / files.VEHICLE))
-    weak = overlay.responses(shortened(scene, least, seed), craft, adapt.SIMULATED, seed)
-    factors = edge_strength.strengths(flights, weak)
-    strong = [edge_strength.as_strong(r, factors) for r in edge_strength.every_height(weak)]
-    laid, edges = overlay.flights(overlay.free_air(flights), strong, seed)
-    recorded, simulated = ([sensors.without(log, LACKED) for log in logs] for logs in (flights, laid))
-    weights = [len(laid) / len(flights)] * len(flights) + [1.0] * len(laid)
-    model = best.fit([*recorded, *simulated], seed, pseudo_labels=[*[None] * len(recorded), *edges], emphasis=weights,
-                     free_air=air, decoder=adapt.DECODER, steps=STEPS, command=COMMAND)
-    return adapt.timed(model, recorded, [None] * len(recorded))
+    flown, _ = adapt.simulated_flights(flights, shortened(scene, least, seed), craft, seed, None)
+    recorded, simulated = ([sensors.without(log, LACKED) for log in logs]
+                           for logs in ([f.log for f in flights], flown.logs))
+    own = [None] * len(recorded)
+    weights = [len(simulated) / len(recorded)] * len(recorded) + [1.0] * len(simulated)
+    return best.fit([*recorded, *simulated], seed, pseudo_labels=[*own, *flown.edges], emphasis=weights, free_air=air,
+                    decoder=adapt.DECODER, steps=adapt.STEPS["scratch"], command=COMMAND, lag_of=(recorded, own))
 
 
 def main() -> None:
@@ -63,7 +60,7 @@ def main() -> None:
     if left_out:
         raise SystemExit(f"not usable: {left_out[0][1]}")
     air = free_air.read(options.free_air) if options.free_air else []
-    model = fit([readable[f.path] for f in listed], options.twin, air, options.least, options.seed)
+    model = fit([adapt.Flight(f, readable[f.path]) for f in listed], options.twin, air, options.least, options.seed)
     model.save(options.out, options.force)
     print(f"written: {options.out}")
 

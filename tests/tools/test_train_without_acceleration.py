@@ -11,13 +11,19 @@ from airtouch.detector.evaluation import evaluate
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.simulation import scenario
-from airtouch.twin import edge_strength, overlay
+from airtouch.twin import adapt, edge_strength, overlay
 from airtouch.vehicle import load
 from made_flight import SMALL, made_flight
 from skips import needs
 from tools import train_without_acceleration as tool
 
 pytestmark = needs("tensorflow")
+
+
+class Shortened(tuple):
+    """(scenario, least share of a length), with the name that a scenario has."""
+
+    name = "short"
 
 
 @pytest.fixture
@@ -32,12 +38,12 @@ def trained(tmp_path, monkeypatch):
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     monkeypatch.setattr(scenario, "load", lambda path: str(path))
     monkeypatch.setattr(tool.vehicle, "load", lambda path: load())
-    monkeypatch.setattr(tool, "shortened", lambda scene, least, seed: (scene, least))
+    monkeypatch.setattr(tool, "shortened", lambda scene, least, seed: Shortened((scene, least)))
     monkeypatch.setattr(overlay, "responses", lambda scene, *_: asked.append(scene) or [])
-    monkeypatch.setattr(overlay, "free_air", lambda flights: [])
+    monkeypatch.setattr(overlay, "free_air", lambda flights: flights)
     monkeypatch.setattr(overlay, "flights", lambda *_: (laid, [evaluate.truth(log) for log in laid]))
     monkeypatch.setattr(edge_strength, "strengths", lambda flights, weak: {})
-    monkeypatch.setattr(tool, "STEPS", 3)
+    monkeypatch.setattr(adapt, "STEPS", {"scratch": 3})
     fit = best.fit
     monkeypatch.setattr(best, "fit", lambda flights, *a, **o: asked.append((flights, o)) or fit(flights, *a, **o))
     out = tmp_path / "without.npz"

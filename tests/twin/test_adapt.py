@@ -12,6 +12,7 @@ from airtouch import logs
 from airtouch import vehicle as vehicles
 from airtouch.cli import airtouch
 from airtouch.detector import best
+from airtouch.detector.best import detector
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
@@ -167,7 +168,7 @@ def trainings(monkeypatch):
 
     def fit(flights, seed, **options):
         asked.append({**options, "flights": flights})
-        return trained(len(asked))
+        return best.timed(trained(len(asked)), options["lag_of"])
 
     def labels(flights, model):
         if flights:
@@ -179,8 +180,9 @@ def trainings(monkeypatch):
         true = logs.true_edges(log) if "zrange_m" in log.columns else ()
         return SimpleNamespace(edges=[Detection(e.sample + 30, e.kind) for e in true])
 
-    for name, value in (("fit", fit), ("pseudo_labels", labels), ("run", run)):
+    for name, value in (("fit", fit), ("pseudo_labels", labels)):
         monkeypatch.setattr(best, name, value)
+    monkeypatch.setattr(detector, "run", run)
     return asked
 
 
@@ -234,9 +236,10 @@ def test_the_lag_is_that_of_recorded_flights(made, trainings):
     log = made[0][1]
     edges = logs.true_edges(log)
     early = [replace(e, sample=e.sample - 10) for e in edges]
-    assert adapt.timed(trained(0), [log], [None]).metadata["lag_s"] == pytest.approx(0.3)
-    assert adapt.timed(trained(0), [log], [early]).metadata["lag_s"] == pytest.approx(0.4)
-    assert adapt.timed(trained(0, 0.7), [log], [[]]).metadata["lag_s"] == 0.7
+    assert best.timed(trained(0), ([log], [None])).metadata["lag_s"] == pytest.approx(0.3)
+    assert best.timed(trained(0), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
+    assert best.timed(trained(0, 0.7), ([log], [[]])).metadata["lag_s"] == 0.7
+    assert best.timed(trained(0), ([log], [[]]), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
 
 
 def score(error_m):

@@ -18,7 +18,7 @@ import numpy as np
 from airtouch import logs
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
-from airtouch.detector.evaluation import evaluate, summary, tuning
+from airtouch.detector.evaluation import evaluate, summary
 from airtouch.detector.evaluation.data import simulated
 from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score import FlightScore
@@ -101,10 +101,10 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     flown, what = simulated_flights(flights, scene, vehicle, seed, progress)
     flown = replace(flown, logs=[sensors.without(log, absent) for log in flown.logs])
     labelled = [f for f in flights if f.labelled]
-    twin = kept_model(work / f"twin_{key}.npz", lambda: timed(best.fit(
+    twin = kept_model(work / f"twin_{key}.npz", lambda: best.fit(
         flown.logs, seed, start=start, pseudo_labels=flown.edges, decoder=None if start else DECODER,
-        steps=STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"),
-        command=command), [f.log for f in labelled], [None] * len(labelled)))
+        steps=STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"), command=command,
+        lag_of=([f.log for f in labelled], [None] * len(labelled))))
     twin_only = kept_scores(work / f"twin_{key}.json", labelled, twin)
     held, half = [], []
     if hold_out and len(labelled) >= FEWEST:
@@ -138,17 +138,6 @@ def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehic
     what = {"scenario": scene.name, "flights": len(laid), "seed": seed, "free_air_of": len(air),
             "strengths": {" ".join(key): round(value, 2) for key, value in factors.items()}}
     return Flown(laid, list(edges)), what
-
-
-def timed(model: BestModel, recorded: Sequence[FlightLog], labels: Sequence[Sequence[Edge] | None]) -> BestModel:
-    """The model with the lag that it has on recorded flights; its own where it finds none of their edges.
-
-    Recorded edges are detected later than simulated ones. labels: edges of each flight, None where its down range
-    shows them.
-    """
-    pairs = [(logs.true_edges(log) if edges is None else edges, best.run(log, model).edges)
-             for log, edges in zip(recorded, labels, strict=True)]
-    return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(pairs, best.lag_s(model))})
 
 
 def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], flown: Flown, seed: int,
@@ -187,14 +176,17 @@ def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence
 def _mixed(start: BestModel | None, labelled: Sequence[Flight], taught: Sequence[Flight],
            seen: Sequence[list[Edge] | None], flown: Flown, seed: int, progress: Progress | None,
            command: str) -> BestModel:
-    """One training on labelled flights, flights `taught` with the edges `seen`, and simulated ones, alike in weight."""
+    """One training on labelled flights, flights `taught` with the edges `seen`, and simulated ones, alike in weight.
+
+    The lag is that of the recorded ones: recorded edges are detected later than simulated ones.
+    """
     count = len(flown.logs)
     recorded, labels = [f.log for f in (*labelled, *taught)], [*[None] * len(labelled), *seen]
     weights = [count / len(some) for some in (labelled, taught) for _ in some] + [1.0] * count
-    made = best.fit([*recorded, *flown.logs], seed, start=start, pseudo_labels=[*labels, *flown.edges],
+    return best.fit([*recorded, *flown.logs], seed, start=start, pseudo_labels=[*labels, *flown.edges],
                     emphasis=weights, decoder=None if start else DECODER, progress=progress, command=command,
-                    steps=STEPS["shipped" if start else "scratch"], **({} if start else STRONG))
-    return timed(made, recorded, labels)
+                    steps=STEPS["shipped" if start else "scratch"], lag_of=(recorded, labels),
+                    **({} if start else STRONG))
 
 
 def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,

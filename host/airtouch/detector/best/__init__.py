@@ -28,6 +28,7 @@ from airtouch.detector.best.detector import (
     pseudo_labels,
     run,
     run_float,
+    timed,
     trace_of,
 )
 from airtouch.detector.best.model import BestModel
@@ -35,4 +36,4 @@ from airtouch.detector.best.recipe import Recipe
 
 __all__ = ["DECODER", "DECODER_WITHOUT", "FINE_TUNING", "KINDS", "SPARE_SENSORS", "TIMING_SIGMA_S", "BestModel",
            "Recipe", "fit", "flight_events", "lag_s", "load", "model_for", "parameters", "pseudo_labels", "run",
-           "run_float", "trace_of"]
+           "run_float", "timed", "trace_of"]

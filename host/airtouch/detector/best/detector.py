@@ -54,6 +54,8 @@ KINDS = {1: "entry", 2: "exit"}
 
 #: progress(stage, done, total, note), stage "features" (flights) or "steps"
 Progress = Callable[[str, int, int, str], None]
+#: Flights, and the edges of each, None where its down range shows them
+Labelled = tuple[Sequence[FlightLog], Sequence[Sequence[logs.Edge] | None]]
 
 
 def run(log: FlightLog, model: BestModel | None = None) -> Trace:
@@ -109,7 +111,7 @@ def fit(
     free_air: Sequence[FlightLog] = (),
     recipe: Recipe | None = None, decoder: DecoderConfig | None = None, most_flights: int | None = None,
     progress: Progress | None = None, command: str = "airtouch.detector.best.fit", work: Path | None = None,
-    **changes: Any
+    lag_of: Labelled | None = None, **changes: Any
 ) -> BestModel:
     """Train, prune and quantise; the lag is the median over the training flights. Same arguments, same bits.
 
@@ -120,6 +122,7 @@ def fit(
     recipe: shape and training, changed by `changes` (fields of `Recipe`: steps, peak_rate, ...). decoder: its settings;
     `start`'s, else DECODER. most_flights: train on so many at most, drawn by seed. A sensor that no flight has is
     silent for good. work: a folder in which the training is kept, so that the same call goes on after a stop.
+    lag_of: flights, and edges as in pseudo_labels, whose lag counts before that of the training flights (`timed`).
     The flights' names and hashes go into the model's metadata.
     Raises AirTouchError without TensorFlow, without flights with edges and for unknown fields.
     """
@@ -152,9 +155,21 @@ def fit(
         "detector": "best", "version": __version__, "command": command, "seed": seed, "lag_s": 0.0,
         "sigma_s": TIMING_SIGMA_S, **_decoders(decoder, start), **training_set.of(flights, start),
         "free_air": len(free_air)})
-    pairs = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
-             for log, edges in zip(flights, labels, strict=True)]
-    return replace(model, metadata={**model.metadata, "lag_s": tuning.lag(pairs)})
+    return timed(model, *([lag_of] if lag_of else []), (flights, labels))
+
+
+def timed(model: BestModel, *groups: Labelled) -> BestModel:
+    """The model with its lag on the first group of flights in which it finds an edge; its own lag where it finds none.
+
+    A group: logs, and the edges of each, None where its down range shows them.
+    """
+    for flights, labels in groups:
+        pairs = [(logs.true_edges(log) if edges is None else edges, run(log, model).edges)
+                 for log, edges in zip(flights, labels, strict=True)]
+        lag = tuning.lag(pairs, np.nan)
+        if np.isfinite(lag):
+            return replace(model, metadata={**model.metadata, "lag_s": lag})
+    return model
 
 
 def _examples(flights: Sequence[FlightLog], labels: Sequence[Sequence[logs.Edge] | None],
