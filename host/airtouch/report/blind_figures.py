@@ -35,8 +35,10 @@ def rows(score: Mapping[str, Any]) -> Rows:
     add("pairs: one right", score["pairs_one_right"], "at least 97 %")
     for group, part in score["unknown"].items():
         goals = ("at least 0.95", "at most 5 %") if group == "all" else ("", "")
-        out.append((f"effect left out, {group}: AUROC of unknown", f"{part['auroc']:.3f}" if part["auroc"] is not None
-                    else "", str(part["wrong_name"]["n"]), goals[0]))
+        for what, name in (("auroc", ""), ("auroc_told_apart", ", where the data tell the effects apart")):
+            value = part.get(what)
+            out.append((f"effect left out, {group}: AUROC of unknown{name}", "" if value is None else f"{value:.3f}",
+                        str(part["wrong_name"]["n"]), goals[0]))
         add(f"effect left out, {group}: given a wrong name", part["wrong_name"])
         add(f"effect left out, {group}: the same where the data tell the two apart", part.get("wrong_name_told_apart"),
             goals[1])

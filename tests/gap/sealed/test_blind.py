@@ -176,7 +176,8 @@ def test_scores_in_closed_form():
     ideal = {level: (part["ideal"]["hits"], part["ideal"]["n"]) for level, part in found["by_severity"].items()}
     assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 26th of 2 % of the flights
     assert found["shrink"]["right"]["value"] == pytest.approx(0.9) and found["shrink"]["wrong"]["value"] == 0.0
-    assert found["unknown"]["all"]["auroc"] == 1.0 and found["unknown"]["all"]["wrong_name"]["hits"] == 0
+    left_out = found["unknown"]["all"]
+    assert left_out["auroc"] == left_out["auroc_told_apart"] == 1.0 and left_out["wrong_name"]["hits"] == 0
     assert found["confusion"]["none"] == {"none": 1, "unknown": 1}
     with pytest.raises(AirTouchError, match="not a flight of this set"):
         blind_score.figures(key, [answer("z", "none", [("none", 1.0)])])

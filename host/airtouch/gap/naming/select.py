@@ -29,7 +29,7 @@ from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, Term, is_random, random_of
+from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SHAKES, Term, is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.unnamed.generic import generic_gain, height_gain
 
@@ -45,8 +45,6 @@ CERTAIN = 20.0  #: evidence beyond which more says no more
 CHANCE_LOSS = 1.0  #: log likelihood that a right effect may lose in a cell by chance
 MOST_EFFECTS = 3
 MOST_DEVIATIONS = 3  #: that nominal flights have as well, beside the effects named
-#: an effect of so many parameters (place, width, turbulence) that its class in the library holds few of its flights
-NOT_A_CURVE = "downwash"
 WORTH_AGAIN = 0.25  #: of what the first effect must gain; candidates below it are not judged again beside a deviation
 
 
@@ -67,7 +65,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
         return by_relations
     passing = _passing(on, alone, need, without)
     singles, least, steps = _steps(on, candidates, alone, need, passing, progress)
-    if by_relations is not None and passing is None and [s.name for s in steps if s.named][:1] != [NOT_A_CURVE]:
+    first = next((s.name for s in steps if s.named), "")
+    if by_relations is not None and passing is None and first not in SHAKES:  # these have more shapes than their class
         return by_relations
     if passing is not None and any(s.named and s.name == passing.name
                                    and _news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):

@@ -14,28 +14,24 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from airtouch.gap.relations import exposure, space
+from airtouch.gap.relations.checks import checked
 from airtouch.gap.relations.density import coordinates_of, fit, plain
 from airtouch.gap.relations.effect_class import CHANCE, learned
 from airtouch.gap.relations.hypotheses import Flown, Learned
-from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, drawn_flights, fly
+from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, drawn_flights, fly, scaled
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
 from airtouch.gap.relations.space import Standard
-from airtouch.gap.signatures.candidates import alike, free_of, unit
-from airtouch.simulation.effects import EFFECTS, NAMES, Active, get
+from airtouch.gap.signatures.candidates import alike
+from airtouch.simulation.effects import EFFECTS, NAMES, Active
 from airtouch.vehicle import load
 
-NOMINAL, NAMELESS, PAIRS, CHECKS, A_CLASS = 5000, 3000, 300, 300, 12  #: flights of each kind; of A_CLASS for each class
+NOMINAL, NAMELESS, PAIRS = 5000, 3000, 300  #: flights of each kind
 PER_KNOT = 60  #: flights of a class for each factor of three in strength, twice as many where it has a direction
-FIRST_CHECK, FIRST_OF_CLASS = 1_000_000, 1_100_000  #: numbers of flights that the rest is checked on
 SMALL = 6.0  #: size of a shift in all whitened features that is hardly one: such are the weakest flights of a class
 HALVINGS = 17  #: of a strength, at most
 COMMON, EACH, OF_NAMELESS = 160, 6, 120  #: directions: of nameless disturbances, of each class, of their scatter
 TOGETHER = 24  #: directions, at most, in which two effects are no sum
 CLEAR = 12.0  #: size of the smaller of two effects from which their sum is looked at
-RANGE = 30.0  #: factor of strengths over which classes are checked
-KEPT = 0.8  #: share of the flights of a class that keep the shares of their evidence that are stored
-LEAST_GAIN = 10.0  #: nats that chance and a crude model may gain beside any class
-LOGARITHMIC = frozenset({"motor_lag", "imu_noise", "controller_gain"})  #: effects whose parameters are factors
 Say = Callable[[str], None]
 
 
@@ -91,7 +87,7 @@ def _learned(scene: Scene, empty: Library, paired: Sequence[Paired], middle: np.
     library = replace(library, learned=replace(library.learned, together=_together(scene, library, paired)))
     say("checks")
     nothing = np.zeros(len(classes))
-    return checked(scene, read(packed(replace(library, left=nothing, more=nothing, far=nothing))))
+    return checked(scene, read(packed(replace(library, left=nothing, more=nothing, far=nothing))), say)
 
 
 def _paired(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawing: Drawing, say: Say) -> Paired:
@@ -103,10 +99,10 @@ def _paired(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawi
             break
         low /= 2.0
     low = min(low, high / 3.0)
-    turned = 2 if np.count_nonzero(_scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
+    turned = 2 if np.count_nonzero(scaled(drawing, drawing.active(high, np.random.default_rng(0)))) > 1 else 1
     count = int(turned * PER_KNOT * (np.log(high / low) / np.log(3.0) + 1.0))
     made = [(i, a, f) for i, a, f in drawn_flights(scene, drawing, (low, high), count) if i in nominal]
-    strength = np.array([_scaled(drawing, a) for _, a, _ in made])
+    strength = np.array([scaled(drawing, a) for _, a, _ in made])
     flown = white(np.array([f for *_, f in made]))
     shift = flown - np.array([nominal[i] for i, *_ in made])
     return Paired(drawing, strength[:, np.abs(strength).max(axis=0) > 0.0], shift, flown, (low, high))
@@ -119,16 +115,6 @@ def _size(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawing
         f = fly(scene, i, [drawing.active(strength, np.random.default_rng([SEED, 5, i]))])
         sizes += [] if f is None else [np.linalg.norm(white(f)[0] - nominal[i])]
     return float(np.median(sizes)) if sizes else np.inf
-
-
-def _scaled(drawing: Drawing, active: Active) -> np.ndarray:
-    """Parameters (p,) of an effect in natural steps from neutral; of factors the logarithm."""
-    effect = get(drawing.kind.effect)
-    alone = drawing.name.partition(" ")[2]  # one of an effect's parameters, where the class is of that one
-    free = [p for p in effect.parameters if p.name in free_of(effect) and alone in ("", p.name)]
-    if effect.name in LOGARITHMIC:
-        return np.array([np.log(active.values[p.name]) for p in free])
-    return np.array([(active.values[p.name] - (p.neutral or 0.0)) / unit(p) for p in free])
 
 
 def _nameless(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray]) -> np.ndarray:
@@ -192,38 +178,6 @@ def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tu
     flown = Flown(values, library.learned)
     both = flown.settled(flown.judged((first, fit(two, known(values - first.shift), known))))
     return flown.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
-
-
-def checked(scene: Scene, library: Library) -> Library:
-    """The library with what is known of it by flights that it was not learned from."""
-    flown = [f for i in range(CHECKS) if (f := fly(scene, FIRST_CHECK + i)) is not None]
-    squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
-    low, high = np.quantile(squared, [0.16, 0.84])
-    library = replace(library, distance=(float(np.median(squared)), float(0.5 * (high - low))))
-    drawing_of = {(d.name, d.shape): d for e in NAMES if e in EFFECTS for d in drawings(e)}
-    shares = [_shares(scene, library, i, drawing_of[c.name, c.shape]) for i, c in enumerate(library.learned.classes)]
-    left, more, far = np.array(shares).T
-    return replace(library, left=left, more=more, far=far)
-
-
-def _shares(scene: Scene, library: Library, place: int, drawing: Drawing) -> tuple[float, float, float]:
-    """`Library.left`, `more` and `far` of a class."""
-    own, left, more, far = library.learned.classes[place], [0.0], [0.0], [0.0]
-    for i in range(A_CLASS):
-        rng = np.random.default_rng([SEED, 96, place, i])
-        strength = float(np.exp(rng.uniform(np.log(drawing.kind.highest / RANGE), np.log(drawing.kind.highest))))
-        f = fly(scene, FIRST_OF_CLASS + 1000 * place + i, [drawing.active(strength, rng)])
-        if f is None:
-            continue
-        y = library.coordinates(f[None])[0]
-        flown, found = Flown(y, library.learned), fit(own, y, plain(len(y)))
-        here = flown.judged((found,))
-        second = flown.beside(here, lambda c, _: not alike(c.effect, own.effect))[0]
-        beyond = library.beyond(flown.distance(here))
-        for shares, gain in ((left, flown.nameless(here) - here.evidence - LEAST_GAIN),
-                             (more, second.evidence - here.evidence - LEAST_GAIN), (far, beyond - library.usual)):
-            shares.append(max(gain, 0.0) / max(here.evidence, LEAST_GAIN))
-    return float(np.quantile(left, KEPT)), float(np.quantile(more, KEPT)), float(np.quantile(far, KEPT))
 
 
 def main() -> None:

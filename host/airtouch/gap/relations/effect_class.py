@@ -9,6 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
+from airtouch.gap.relations.readout import Readout
+
 KNOT = float(np.log(3.0))  #: between two knots of a curve, in the logarithm of the strength
 LEAST_SHIFT = 0.5  #: shift along a class's own direction below which a flight says nothing of the curve
 LEAST_SIZE = 5.0  #: of a shift, by which errors of the curve are weighed
@@ -26,7 +28,8 @@ class EffectClass:
 
     knots (k,): logarithms of strengths; table (parts, k, Q): shift per unit of strength at the knots, one part for each
     parameter and one more, even in the sign, where there are two signs; ways (Q, r), spread (r,): directions, and
-    variances there of a flight's distance from the curve, over the squared size of the shift.
+    variances there of a flight's distance from the curve, over the squared size of the shift. readout: what its
+    strengths are in the effect's units, where that is known.
     """
 
     name: str
@@ -38,6 +41,7 @@ class EffectClass:
     table: np.ndarray
     ways: np.ndarray
     spread: np.ndarray
+    readout: Readout | None = None
 
     @property
     def of_one_parameter(self) -> bool:

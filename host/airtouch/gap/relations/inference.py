@@ -1,7 +1,7 @@
 """Which effects the relations of a flight's signals say: the likeliest hypothesis, and the evidence for each effect."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -9,7 +9,9 @@ from scipy.special import logsumexp
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import Flown, Hypothesis, Learned
 from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.readout import Reading, read_out
 from airtouch.gap.signatures.candidates import alike
+from airtouch.simulation.effects import get
 
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
 #: 99 of 100 flights with an effect from the weakest strength on (all flights of `learning.SEED`)
@@ -36,6 +38,7 @@ class Inference:
 
     left_before: nats that a disturbance without a name gains over none; left: what is left beside the effects, what it
     gains there or how much farther than nominal flights this one lies; allowed: what may be left where they are right.
+    readings: of the likeliest effects, their parameters as far as the library tells them.
     """
 
     classes: tuple[EffectClass, ...]
@@ -43,6 +46,7 @@ class Inference:
     left_before: float
     left: float
     allowed: float
+    readings: Mapping[str, Reading] = field(default_factory=dict)
 
     def probabilities(self) -> dict[str, float]:
         """Of each effect alone and of `none`; they sum to 1."""
@@ -61,7 +65,16 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
     best = _chosen(flown, singles, more)
     both = _left(flown, best, left), _beyond(flown, library, best, far)
     return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flown.nameless(flown.none),
-                     *max(both, key=lambda b: b[0] / b[1]))
+                     *max(both, key=lambda b: b[0] / b[1]), _readings(best))
+
+
+def _readings(best: Hypothesis) -> Mapping[str, Reading]:
+    """Parameters of the effects of a hypothesis, those of an effect's several classes together."""
+    out: dict[str, dict[str, tuple[float, float]]] = {}
+    for f in best.fits:
+        if f.of.readout is not None:
+            out.setdefault(f.of.effect, {}).update(read_out(f.of.readout, get(f.of.effect), f.strength))
+    return out
 
 
 def _left(flown: Flown, best: Hypothesis, shares: Shares) -> tuple[float, float]:

@@ -9,7 +9,8 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.relations import exposure
 from airtouch.gap.relations.features import features
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.relations.readout import amount_of
+from airtouch.gap.signatures.candidates import every, free_of
 from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
@@ -55,6 +56,13 @@ class Drawing:
         return drawn if self.shape is None else Active(drawn.effect, {**drawn.values, SHAPED[self.name]: self.shape})
 
 
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the effect's free parameters; of one where the class is of that one alone."""
+        alone = self.name.partition(" ")[2]
+        return tuple(p for p in free_of(get(self.kind.effect)) if alone in ("", p))
+
+
 def drawings(effect: str) -> list[Drawing]:
     """The classes of flights of an effect."""
     out = []
@@ -83,3 +91,9 @@ def disturbed_flights(scene: Scene, count: int) -> Iterator[tuple[int, np.ndarra
         made = fly(scene, number, exposure.draw(np.random.default_rng([SEED, number, 1])))
         if made is not None:
             yield number, made
+
+
+def scaled(drawing: Drawing, active: Active) -> np.ndarray:
+    """Free parameters (p,) of an effect as amounts: natural steps from neutral, of factors the logarithm."""
+    effect = get(drawing.kind.effect)
+    return np.array([amount_of(effect, name, active.values[name]) for name in drawing.free])

@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -13,6 +13,7 @@ import numpy as np
 
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import Learned
+from airtouch.gap.relations.readout import Readout
 from airtouch.gap.relations.space import Standard
 from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
@@ -87,9 +88,12 @@ def packed(library: Library) -> bytes:
               "nameless": learned.nameless, "left": library.left, "more": library.more, "far": library.far}
     for i, c in enumerate(learned.classes):
         arrays |= {f"{i}.knots": c.knots, f"{i}.table": c.table, f"{i}.ways": c.ways, f"{i}.spread": c.spread}
+        if c.readout is not None:
+            arrays |= {f"{i}.strength": c.readout.strength, f"{i}.amount": c.readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
-             "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in learned.classes]}
-    exact = ("knots", "spread", "standard.middle", "standard.deviation")
+             "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in learned.classes],
+             "readouts": [c.readout and c.readout.parameters for c in learned.classes]}
+    exact = ("knots", "spread", "strength", "amount", "standard.middle", "standard.deviation")
     kept: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(exact) else STORED) for k, v in arrays.items()}
     file = io.BytesIO()
     np.savez_compressed(file, **kept, words=np.array(json.dumps(words)))
@@ -102,12 +106,16 @@ def read(content: bytes) -> Library:
         words = json.loads(str(file["words"]))
         a = {k: file[k].astype(float) for k in file.files if k != "words"}
     classes = tuple(EffectClass(name, effect, shape, parameters, signed, a[f"{i}.knots"], a[f"{i}.table"],
-                                a[f"{i}.ways"], a[f"{i}.spread"])
+                                a[f"{i}.ways"], a[f"{i}.spread"], _readout(words["readouts"][i], i, a))
                     for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
     middle, spread = words["distance"]
     return Library(words["scenario"], words["vehicle"], Standard(a["standard.middle"], a["standard.deviation"]),
                    a["projection"], a["middle"], Learned(classes, a["together"], a["nameless"]), (middle, spread),
                    a["left"], a["more"], a["far"])
+
+
+def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:
+    return Readout(tuple(parameters), arrays[f"{place}.strength"], arrays[f"{place}.amount"]) if parameters else None
 
 
 @cache

@@ -107,16 +107,20 @@ def top(case: Case | None, name: str, first: int) -> bool:
 def unknown(single: Mapping[str, Any], plain: Mapping[str, Case], cases: Sequence[Case]) -> dict[str, Any]:
     """Effects taken out of the registry: is `unknown` said, is it likelier than where they are in.
 
-    wrong_name_told_apart: among those flights whose data tell the effect from the names that it was given.
+    wrong_name_told_apart, auroc_told_apart: among those flights whose data tell the effect from the names that it was
+    given.
     """
     out = {_name(c): c for c in cases if c.get("without") and _name(c) in single}
     groups = {"all": list(out), **{LEVELS[i]: [n for n in out if single[n]["level"] == i] for i in range(3)}}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
+    apart = {n for n, c in out.items() if told_apart(plain.get(n), single[n]["name"], _named(c))}
+    known = {n: _chance(c, "unknown") for n, c in plain.items()}
     return {g: {"said_unknown": share(out[n]["verdict"] == "unknown" for n in names),
                 "wrong_name": share(out[n]["verdict"] == "effect" for n in names),
-                "wrong_name_told_apart": share(out[n]["verdict"] == "effect" for n in names
-                                               if told_apart(plain.get(n), single[n]["name"], _named(out[n]))),
-                "auroc": auroc([score[n] for n in names], [_chance(plain[n], "unknown") for n in names if n in plain])}
+                "wrong_name_told_apart": share(out[n]["verdict"] == "effect" for n in names if n in apart),
+                "auroc": auroc([score[n] for n in names], [known[n] for n in names if n in known]),
+                "auroc_told_apart": auroc([score[n] for n in names if n in apart],
+                                          [known[n] for n in names if n in apart and n in known])}
             for g, names in groups.items() if names}
 
 

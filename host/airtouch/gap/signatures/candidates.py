@@ -13,7 +13,7 @@ import numpy as np
 
 from airtouch.gap.result import Found, Quantity
 from airtouch.simulation import signals as at
-from airtouch.simulation.effects import EFFECTS, Active, Effect, get
+from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, get
 
 MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
 _FREE = {
@@ -155,8 +155,13 @@ class Term:
                                    min(values[p.name] + half, p.high), p.unit)
         return out
 
-    def _parameter(self, name: str):
-        return next(p for p in self.effect.parameters if p.name == name)
+    def _parameter(self, name: str) -> Parameter:
+        return parameter_of(self.effect, name)
+
+
+def parameter_of(effect: Effect, name: str) -> Parameter:
+    """The parameter of an effect with a name."""
+    return next(p for p in effect.parameters if p.name == name)
 
 
 def unit(p) -> float:

@@ -1,0 +1,107 @@
+"""What flights that a library was not learned from say of it: how far they lie off, and what its strengths are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airtouch.gap.relations.density import far, fit, plain
+from airtouch.gap.relations.effect_class import EffectClass
+from airtouch.gap.relations.hypotheses import Flown
+from airtouch.gap.relations.inference import LEAST_EVIDENCE
+from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, fly, scaled
+from airtouch.gap.relations.library import Library
+from airtouch.gap.relations.readout import Readout
+from airtouch.gap.signatures.candidates import alike
+from airtouch.simulation.effects import EFFECTS, NAMES
+
+CHECKS, A_CLASS, CALIBRATION = 300, 12, 80  #: nominal flights; flights of each class to check it, and to calibrate it
+#: numbers of the flights; each class has 1000 of its own
+FIRST_CHECK, FIRST_OF_CLASS, FIRST_CALIBRATION = 1_000_000, 1_100_000, 1_200_000
+RANGE = 30.0  #: factor of strengths over which classes are checked
+HALVINGS = 12  #: of the highest strength, at most, down to that which hardly shows
+KEPT = 0.8  #: share of the flights of a class that keep the shares of their evidence that are stored
+LEAST_GAIN = 10.0  #: nats that chance and a crude model may gain beside any class
+LEAST_FLIGHTS = 12  #: calibration flights that show the effect; with fewer a class gives no parameters
+Say = Callable[[str], None]
+
+
+def checked(scene: Scene, library: Library, say: Say = lambda _: None) -> Library:
+    """The library with its distances, shares and calibration."""
+    flown = [f for i in range(CHECKS) if (f := fly(scene, FIRST_CHECK + i)) is not None]
+    squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
+    low, high = np.quantile(squared, [0.16, 0.84])
+    library = replace(library, distance=(float(np.median(squared)), float(0.5 * (high - low))))
+    drawing_of = {(d.name, d.shape): d for e in NAMES if e in EFFECTS for d in drawings(e)}
+    own = [drawing_of[c.name, c.shape] for c in library.learned.classes]
+    left, more, far = np.array([_shares(scene, library, i, d) for i, d in enumerate(own)]).T
+    classes = []
+    for i, (c, d) in enumerate(zip(library.learned.classes, own, strict=True)):
+        say(f"calibration of {c.name} {c.shape or ''}")
+        classes.append(replace(c, readout=_readout(scene, library, i, d)))
+    return replace(library, left=left, more=more, far=far, learned=replace(library.learned, classes=tuple(classes)))
+
+
+def _shares(scene: Scene, library: Library, place: int, drawing: Drawing) -> tuple[float, float, float]:
+    """`Library.left`, `more` and `far` of a class."""
+    own, left, more, far = library.learned.classes[place], [0.0], [0.0], [0.0]
+    for i in range(A_CLASS):
+        rng = np.random.default_rng([SEED, 96, place, i])
+        strength = float(np.exp(rng.uniform(np.log(drawing.kind.highest / RANGE), np.log(drawing.kind.highest))))
+        f = fly(scene, FIRST_OF_CLASS + 1000 * place + i, [drawing.active(strength, rng)])
+        if f is None:
+            continue
+        y = library.coordinates(f[None])[0]
+        flown, found = Flown(y, library.learned), fit(own, y, plain(len(y)))
+        here = flown.judged((found,))
+        second = flown.beside(here, lambda c, _: not alike(c.effect, own.effect))[0]
+        beyond = library.beyond(flown.distance(here))
+        for shares, gain in ((left, flown.nameless(here) - here.evidence - LEAST_GAIN),
+                             (more, second.evidence - here.evidence - LEAST_GAIN), (far, beyond - library.usual)):
+            shares.append(max(gain, 0.0) / max(here.evidence, LEAST_GAIN))
+    return float(np.quantile(left, KEPT)), float(np.quantile(more, KEPT)), float(np.quantile(far, KEPT))
+
+
+def _readout(scene: Scene, library: Library, place: int, drawing: Drawing) -> Readout | None:
+    """Calibration of a class by flights from the strength that hardly shows to the highest; None where too few do."""
+    own, high = library.learned.classes[place], drawing.kind.highest
+    rng = np.random.default_rng([SEED, 95, place])
+    flights = iter(range(FIRST_CALIBRATION + 1000 * place, FIRST_CALIBRATION + 1000 * (place + 1)))
+
+    def fitted(strength: float) -> Calibrated | None:
+        return _fitted(scene, library, own, drawing, strength, next(flights), rng)
+
+    low = high
+    for _ in range(HALVINGS):
+        ended = [f for f in (fitted(low) for _ in range(3)) if f is not None]
+        if ended and np.mean([f.shows for f in ended]) < 0.5:
+            break
+        low /= 2.0
+    drawn = np.exp(rng.uniform(np.log(min(low, 0.5 * high)), np.log(high), CALIBRATION))
+    shown = [f for f in (fitted(s) for s in drawn) if f is not None and f.shows]
+    if len(shown) < LEAST_FLIGHTS:
+        return None
+    amount = np.array([f.amount for f in shown])
+    free = np.abs(amount).max(axis=0) > 0.0
+    return Readout(tuple(np.array(drawing.free)[free].tolist()), np.array([f.strength for f in shown]), amount[:, free])
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A flight with an effect: strength (s,) of its class as fitted, true amounts (p,), whether the effect shows."""
+
+    strength: np.ndarray
+    amount: np.ndarray
+    shows: bool
+
+
+def _fitted(scene: Scene, library: Library, own: EffectClass, drawing: Drawing, strength: float, number: int,
+            rng: np.random.Generator) -> Calibrated | None:
+    """A flight with an effect of a strength; None where it does not end well."""
+    active = drawing.active(strength, rng)
+    features = fly(scene, number, [active])
+    if features is None:
+        return None
+    values = library.coordinates(features[None])[0]
+    found = fit(own, values, plain(len(values)))
+    return Calibrated(found.strength, scaled(drawing, active), found.evidence - far(values) > LEAST_EVIDENCE)

@@ -1,0 +1,91 @@
+"""The parameters of an effect, with their errors, from the strength that its class has in a flight.
+
+A class's strength is a length in the space of features. What that is in the effect's own units comes from simulated
+flights that the class was not learned from (calibration), and so does the error of a single flight.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from airtouch.gap.signatures.candidates import parameter_of, unit
+from airtouch.simulation.effects import Effect
+
+LOGARITHMIC = frozenset({"motor_lag", "imu_noise", "controller_gain"})  #: effects whose parameters are factors
+#: of an effect's parameters by name: value and standard deviation, in the parameter's unit
+Reading = Mapping[str, tuple[float, float]]
+WIDTH = float(np.log(2.0))  #: of the weights of the calibration flights, standard deviation of the log strength
+RIDGE = 0.1  #: flights that say that amount and strength are proportional: for strengths at the ends of the calibration
+
+
+@dataclass(frozen=True)
+class Readout:
+    """Calibration flights of one class.
+
+    parameters: names of the k parameters that were drawn; strength (n, s): of the class, fitted to each flight;
+    amount (n, k): true parameters, in natural steps from neutral, of factors the logarithm.
+    """
+
+    parameters: tuple[str, ...]
+    strength: np.ndarray
+    amount: np.ndarray
+
+    def __call__(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Amounts (k,) of a flight with a fitted strength (s,), and their standard deviations (k,)."""
+        if self.strength.shape[1] == 1 and self.amount.shape[1] == 1:
+            return self._along(float(strength[0]))
+        return self._across(strength)
+
+    def _along(self, strength: float) -> tuple[np.ndarray, np.ndarray]:
+        """One parameter: local linear regression of the logarithm of the amount on that of the strength."""
+        same = self.strength[:, 0] * strength > 0.0
+        x = np.log(np.abs(self.strength[same, 0])) - np.log(abs(strength))
+        y = np.log(np.abs(self.amount[same, 0])) - x
+        weight = _weights(x)
+        columns = np.column_stack([np.ones_like(x), x])
+        normal = (columns * weight[:, None]).T @ columns + RIDGE * np.diag([0.0, WIDTH ** 2])
+        fitted = np.linalg.solve(normal, columns.T @ (weight * y))
+        amount = float(np.sign(np.median(self.amount[same, 0])) * np.exp(fitted[0]))
+        error = _deviation((y - columns @ fitted)[:, None], weight)
+        return np.array([amount]), np.abs(amount) * error
+
+    def _across(self, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Several parameters: linear in the strengths; errors in proportion to the length of the amount."""
+        length = np.linalg.norm(self.amount, axis=1)
+        matrix = np.linalg.lstsq(self.strength / length[:, None], self.amount / length[:, None], rcond=None)[0]
+        amount, off = strength @ matrix, (self.amount - self.strength @ matrix) / length[:, None]
+        weight = _weights(np.log(np.linalg.norm(self.strength, axis=1)) - np.log(np.linalg.norm(strength)))
+        return amount, np.linalg.norm(amount) * _deviation(off, weight)
+
+
+def _weights(x: np.ndarray) -> np.ndarray:
+    """Weights (n,) of calibration flights at distances x (n,) in the logarithm of the strength."""
+    return np.exp(-0.5 * (np.clip(np.abs(x) - max(float(np.abs(x).min()) - WIDTH, 0.0), 0.0, None) / WIDTH) ** 2)
+
+
+def _deviation(off: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Standard deviation (k,) of residuals (n, k), with the flights that the regression itself has used up."""
+    many = weight.sum() ** 2 / (weight ** 2).sum()
+    return np.sqrt((weight[:, None] * off ** 2).sum(axis=0) / weight.sum() * many / max(many - 2.0, 1.0))
+
+
+def amount_of(effect: Effect, name: str, value: float) -> float:
+    """A parameter's value in natural steps from neutral; of a factor its logarithm."""
+    if effect.name in LOGARITHMIC:
+        return float(np.log(value))
+    p = parameter_of(effect, name)
+    return (value - (p.neutral or 0.0)) / unit(p)
+
+
+def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
+    """The parameters of an effect whose class has a strength (s,) in a flight."""
+    out = {}
+    for name, amount, deviation in zip(readout.parameters, *readout(strength), strict=True):
+        p = parameter_of(effect, name)
+        if effect.name in LOGARITHMIC:
+            value = float(np.exp(amount))
+            out[name] = value, value * float(deviation)
+        else:
+            out[name] = (p.neutral or 0.0) + float(amount) * unit(p), float(deviation) * unit(p)
+    return out

@@ -1,0 +1,61 @@
+"""Parameters of an effect from the strength of its class."""
+
+import numpy as np
+import pytest
+
+from airtouch.gap.relations.readout import Readout, amount_of, read_out
+from airtouch.simulation.effects import get
+
+
+def test_a_power_law_is_read_off_exactly():
+    strength = np.geomspace(1.0, 100.0, 40)
+    readout = Readout(("fraction",), strength[:, None], 0.02 * strength[:, None] ** 1.5)
+    amount, deviation = readout(np.array([20.0]))
+    assert amount == pytest.approx([0.02 * 20.0 ** 1.5], rel=1e-3)
+    assert deviation[0] < 1e-2 * amount[0]
+
+
+@pytest.mark.parametrize("scatter", [0.05, 0.3])
+def test_nine_intervals_in_ten_hold_the_amount(scatter):
+    """The strength of a flight lies off by a normal error of the logarithm: its deviation is that of the amount."""
+    rng = np.random.default_rng(1)
+
+    def drawn(many):
+        amount = np.exp(rng.uniform(np.log(0.01), np.log(1.0), many))
+        return 50.0 * amount * np.exp(scatter * rng.normal(size=many)), amount
+
+    held = []
+    for _ in range(10):
+        strength, amount = drawn(80)
+        readout = Readout(("fraction",), strength[:, None], amount[:, None])
+        for s, true in zip(*drawn(60), strict=True):
+            (value,), (deviation,) = readout(np.array([s]))
+            held.append(abs(value - true) <= 1.645 * deviation)
+    assert 0.84 < np.mean(held) < 0.96
+
+
+def test_either_sign_has_its_own_line():
+    size = np.geomspace(1.0, 100.0, 30)
+    strength, amount = np.concatenate([size, -size])[:, None], np.concatenate([2.0 * size, -3.0 * size])[:, None]
+    readout = Readout(("loss",), strength, amount)
+    assert readout(np.array([10.0]))[0] == pytest.approx([20.0], rel=1e-3)
+    assert readout(np.array([-10.0]))[0] == pytest.approx([-30.0], rel=1e-3)
+
+
+def test_several_parameters_are_linear_in_the_strengths():
+    rng = np.random.default_rng(2)
+    matrix, strength = np.array([[0.3, 0.1], [-0.2, 0.5]]), rng.normal(size=(60, 2))
+    readout = Readout(("x", "y"), strength, strength @ matrix)
+    amount, deviation = readout(np.array([2.0, -1.0]))
+    assert amount == pytest.approx(np.array([2.0, -1.0]) @ matrix)
+    assert np.all(deviation < 1e-9)
+
+
+@pytest.mark.parametrize(("name", "parameter", "value"), [
+    ("motor_lag", "factor", 1.4), ("controller_gain", "rate", 0.7), ("mass", "fraction", 0.05),
+    ("imu_bias", "acc_z", -0.2)])
+def test_amounts_and_values_are_the_inverse_of_each_other(name, parameter, value):
+    amount = amount_of(get(name), parameter, value)
+    size = np.geomspace(0.1, 10.0, 20)[:, None] * np.sign(amount)
+    found = read_out(Readout((parameter,), size, size), get(name), np.array([amount]))
+    assert found[parameter][0] == pytest.approx(value, rel=1e-6)
