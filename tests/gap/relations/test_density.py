@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
-from airtouch.gap.relations.density import coordinates_of, far, fit, plain
+from airtouch.gap.relations.density import coordinates_of, fit, log_density, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
 Q = 6
@@ -15,11 +15,11 @@ KNOTS = np.log([0.1, 1.0, 10.0])
 NONE = np.zeros((Q, 0)), np.zeros(0)
 
 
-def straight(way, ways=NONE[0], spread=NONE[1], signed=False):
+def straight(way, axes=NONE[0], variances=NONE[1], signed=False):
     """A class whose shift is its strength times `way` (Q,)."""
     table = np.tile(way, (1, len(KNOTS), 1))
     return EffectClass("one", "one", None, 1, signed, KNOTS,
-                       np.concatenate([table, np.zeros_like(table)]) if signed else table, ways, spread)
+                       np.concatenate([table, np.zeros_like(table)]) if signed else table, axes, variances)
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def way():
 
 def test_the_likeliest_strength_of_a_straight_line_is_the_projection(way):
     values = 2.0 * way + np.random.default_rng(4).normal(size=Q)
-    found = fit(straight(way), values, plain(Q))
+    found = fit(straight(way), values, unchanged(Q))
     assert found.strength == pytest.approx([way @ values / (way @ way)], rel=1e-3)
     assert found.level == pytest.approx(-0.5 * np.sum((values - found.strength * way) ** 2), rel=1e-6)
 
@@ -41,20 +41,20 @@ def test_evidence_is_the_likelihood_averaged_over_strengths(way, signed):
 
     def density(log_strength):
         signs = (-1.0, 1.0) if signed else (1.0,)
-        return np.mean([np.exp(far(values - s * np.exp(log_strength) * way)) for s in signs])
+        return np.mean([np.exp(log_density(values - s * np.exp(log_strength) * way)) for s in signs])
 
     exact = np.log(quad(density, KNOTS[0], KNOTS[-1], points=[np.log(3.0)], limit=200)[0] / (KNOTS[-1] - KNOTS[0]))
-    assert fit(straight(way, signed=signed), values, plain(Q)).evidence == pytest.approx(exact, abs=0.05)
+    assert fit(straight(way, signed=signed), values, unchanged(Q)).evidence == pytest.approx(exact, abs=0.05)
 
 
 def test_scatter_about_the_curve_widens_the_density(way):
-    """Against SciPy's normal density with the covariance 1 + shift^2 ways spread ways'."""
+    """Against SciPy's normal density with the covariance 1 + shift^2 axes variances axes'."""
     rng = np.random.default_rng(5)
-    ways = np.linalg.qr(rng.normal(size=(Q, 2)))[0]
-    spread, values = np.array([0.3, 0.05]), 2.0 * way + rng.normal(size=Q)
-    found = fit(straight(way, ways, spread), values, plain(Q))
+    axes = np.linalg.qr(rng.normal(size=(Q, 2)))[0]
+    variances, values = np.array([0.3, 0.05]), 2.0 * way + rng.normal(size=Q)
+    found = fit(straight(way, axes, variances), values, unchanged(Q))
     shift = found.strength * way
-    covariance = np.eye(Q) + (shift @ shift) * (ways * spread) @ ways.T
+    covariance = np.eye(Q) + (shift @ shift) * (axes * variances) @ axes.T
     constant = 0.5 * Q * np.log(2.0 * np.pi)
     assert found.level == pytest.approx(multivariate_normal(shift, covariance).logpdf(values) + constant)
 
@@ -64,14 +64,14 @@ def test_coordinates_turn_a_covariance_into_one():
     factors, values = rng.normal(size=(Q, 2)), rng.normal(size=Q)
     known = coordinates_of(factors)
     exact = multivariate_normal(np.zeros(Q), np.eye(Q) + factors @ factors.T).logpdf(values)
-    assert known.level + far(known(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
+    assert known.level + log_density(known(values)) == pytest.approx(exact + 0.5 * Q * np.log(2.0 * np.pi))
 
 
-def test_several_parameters_are_solved_together():
+def test_several_parameters_are_solved_interaction():
     """A plane: the least squares solution, within what was flown."""
     rng = np.random.default_rng(7)
     plane = rng.normal(size=(2, Q))
     of = EffectClass("two", "two", None, 2, False, KNOTS, np.repeat(plane[:, None], len(KNOTS), axis=1),
                      np.zeros((Q, 0)), np.zeros(0))
     values = np.array([1.5, -0.7]) @ plane + 0.1 * rng.normal(size=Q)
-    assert fit(of, values, plain(Q)).strength == pytest.approx(np.linalg.lstsq(plane.T, values)[0], abs=1e-3)
+    assert fit(of, values, unchanged(Q)).strength == pytest.approx(np.linalg.lstsq(plane.T, values)[0], abs=1e-3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.relations.effect_class import learned
+from airtouch.gap.relations.effect_class import learn_class
 
 Q, N = 20, 400
 
@@ -16,7 +16,7 @@ def test_a_bent_curve_and_its_scatter_are_recovered():
     shift[:, 0], shift[:, 1] = strength, 0.02 * strength ** 1.5
     shift[:, 2] = 0.2 * rng.normal(size=N) * np.linalg.norm(shift[:, :2], axis=1)
     flown = shift + rng.normal(size=(N, Q))
-    made = learned("one", "one", None, 0.01 * strength[:, None], shift, flown)
+    made = learn_class("one", "one", None, 0.01 * strength[:, None], shift, flown)
     assert not made.signed and made.parameters == 1
     for s in (5.0, 20.0, 80.0):
         expected = np.zeros(Q)
@@ -25,8 +25,8 @@ def test_a_bent_curve_and_its_scatter_are_recovered():
         found = min((made.mean(np.array([[x]]))[0] for x in np.geomspace(0.8 * s, 1.3 * s, 200)),
                     key=lambda m: np.linalg.norm(m - expected))
         assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
-    assert np.abs(made.ways[2, 0]) > 0.95
-    assert np.sqrt(made.spread[0]) == pytest.approx(0.2, rel=0.15)
+    assert np.abs(made.axes[2, 0]) > 0.95
+    assert np.sqrt(made.variances[0]) == pytest.approx(0.2, rel=0.15)
 
 
 def test_two_signs_are_two_branches():
@@ -34,7 +34,7 @@ def test_two_signs_are_two_branches():
     strength = np.exp(rng.uniform(np.log(3.0), np.log(50.0), N)) * rng.choice([-1.0, 1.0], N)
     shift = np.zeros((N, Q))
     shift[:, 0], shift[:, 1] = strength, 0.5 * np.abs(strength)
-    made = learned("one", "one", None, strength[:, None], shift, shift + 0.3 * rng.normal(size=(N, Q)))
+    made = learn_class("one", "one", None, strength[:, None], shift, shift + 0.3 * rng.normal(size=(N, Q)))
     assert made.signed
     up, down = made.mean(np.array([[20.0], [-20.0]]))
     assert up[0] == pytest.approx(-down[0], rel=0.05)
@@ -46,7 +46,7 @@ def test_a_plane_of_two_parameters():
     plane = rng.normal(size=(2, Q))
     way = rng.normal(size=(N, 2))
     strength = way / np.linalg.norm(way, axis=1, keepdims=True) * np.exp(rng.uniform(0.0, 3.0, N))[:, None]
-    made = learned("two", "two", None, strength, strength @ plane, strength @ plane + 0.1 * rng.normal(size=(N, Q)))
+    made = learn_class("two", "two", None, strength, strength @ plane, strength @ plane + 0.1 * rng.normal(size=(N, Q)))
     one = np.array([[0.6, -0.8]])
     middle = np.median(np.abs(strength))  # what strengths are scaled by
     assert made.mean(one)[0] == pytest.approx(middle * one[0] @ plane, rel=0.05, abs=0.05)

@@ -9,8 +9,8 @@ from scipy.stats import multivariate_normal
 
 from airtouch.gap.relations import inference
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.hypotheses import SIZES, Flown, Learned
-from airtouch.gap.relations.inference import infer, of_mean
+from airtouch.gap.relations.hypotheses import SIZES, FlightFeatures, LearnedModel
+from airtouch.gap.relations.inference import infer, model_of_mean
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.space import Standard
 
@@ -23,7 +23,7 @@ def library():
     """Six effects along six axes, each by its strength alone; what has no name lies anywhere."""
     classes = tuple(EffectClass(n, n, None, 1, False, KNOTS, np.tile(np.eye(Q)[i], (1, 3, 1)), np.zeros((Q, 0)),
                                 np.zeros(0)) for i, n in enumerate(NAMES))
-    learned = Learned(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
+    learned = LearnedModel(classes, np.zeros((Q, 0)), np.eye(Q) / np.sqrt(Q))
     return Library("none", "none", Standard(np.zeros(Q), np.ones(Q)), np.eye(Q), np.zeros(Q), learned,
                    (float(Q), np.sqrt(2.0 * Q)), np.zeros(len(NAMES)), np.zeros(len(NAMES)), np.zeros(len(NAMES)))
 
@@ -33,19 +33,19 @@ def noise(seed=1):
 
 
 def test_evidence_of_two_effects_that_do_not_meet_is_the_sum_of_each():
-    flown = Flown(noise() + 20.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], library().learned)
-    alone = {h.names[0]: h for h in flown.singles()}
-    both = next(h for h in flown.beside(alone["mass"], lambda c, _: c.name == "wind"))
+    flown = FlightFeatures(noise() + 20.0 * np.eye(Q)[0] + 10.0 * np.eye(Q)[1], library().model)
+    alone = {h.names[0]: h for h in flown.single_effects()}
+    both = next(h for h in flown.with_one_more(alone["mass"], lambda c, _: c.name == "wind"))
     assert both.evidence == pytest.approx(alone["mass"].evidence + alone["wind"].evidence, abs=0.05)
 
 
 def test_something_without_a_name_is_a_mixture_of_normal_densities():
-    of, values = library().learned, 5.0 * noise(2)
+    of, values = library().model, 5.0 * noise(2)
     exact = logsumexp([multivariate_normal(np.zeros(Q), np.eye(Q) + s * s * of.nameless @ of.nameless.T).logpdf(values)
                        for s in SIZES]) - np.log(len(SIZES))
-    flown = Flown(values, of)
+    flown = FlightFeatures(values, of)
     none = multivariate_normal(np.zeros(Q), np.eye(Q)).logpdf(values)
-    assert flown.nameless(flown.none) == pytest.approx(exact - none)
+    assert flown.nameless_evidence(flown.none) == pytest.approx(exact - none)
 
 
 @pytest.mark.parametrize("true", [(), ("mass",), ("mass", "wind"), ("vibration", "inertia", "gust")])
@@ -53,7 +53,7 @@ def test_inference_names_what_is_there(true):
     values = noise() + sum(size * np.eye(Q)[NAMES.index(n)] for size, n in zip(SIZE, true, strict=False))
     found = infer(library(), values[None])
     assert {c.name for c in found.classes} == set(true)
-    assert found.left < found.allowed
+    assert found.unexplained < found.limit
     chance = found.probabilities()
     assert sum(chance.values()) == pytest.approx(1.0)
     assert max(chance, key=chance.__getitem__) == (true[0] if true else "none")
@@ -62,7 +62,7 @@ def test_inference_names_what_is_there(true):
 def test_a_withheld_effect_is_left():
     values = (noise() + 45.0 * np.eye(Q)[0])[None]
     found = infer(library().without(["mass"]), values)
-    assert not found.classes and found.left > 10.0 * found.allowed
+    assert not found.classes and found.unexplained > 10.0 * found.limit
     assert found.evidence.keys() == set(NAMES[1:])
 
 
@@ -79,14 +79,14 @@ def test_the_mean_of_flights_is_as_one_of_less_noise():
     """Four flights: evidence is that of one whose noise is half as large, whose shift is twice as long."""
     way = np.eye(Q)[0]
     four, one = np.tile(3.0 * way, (4, 1)), 6.0 * way
-    scaled = replace(library(), learned=of_mean(library().learned, 4))
+    scaled = replace(library(), model=model_of_mean(library().model, 4))
     assert infer(library(), four).evidence["mass"] == pytest.approx(infer(scaled, one[None]).evidence["mass"])
     assert infer(library(), four).evidence["mass"] > infer(library(), four[:1]).evidence["mass"] + 10.0
 
 
 def test_scatter_between_flights_averages_out():
-    scattered = replace(library().learned.classes[0], ways=np.eye(Q)[:, 1:2], spread=np.array([0.4]))
-    mean = of_mean(Learned((scattered,), np.zeros((Q, 0)), np.zeros((Q, 0))), 4).classes[0]
+    scattered = replace(library().model.classes[0], axes=np.eye(Q)[:, 1:2], variances=np.array([0.4]))
+    mean = model_of_mean(LearnedModel((scattered,), np.zeros((Q, 0)), np.zeros((Q, 0))), 4).classes[0]
     shift = mean.mean(np.array([[2.0]]))[0]
     # of the mean times 2: 4 (1 + 2^2 0.4) / 4
-    assert 1.0 + (shift @ shift) * mean.spread[0] == pytest.approx(1.0 + 2.0 ** 2 * 0.4)
+    assert 1.0 + (shift @ shift) * mean.variances[0] == pytest.approx(1.0 + 2.0 ** 2 * 0.4)

@@ -27,7 +27,7 @@ def test_a_file_holds_what_was_saved(tmp_path):
     shipped = library.shipped()
     library.save(shipped, tmp_path / "one.npz")
     again = library.read((tmp_path / "one.npz").read_bytes())
-    assert [c.name for c in again.learned.classes] == [c.name for c in shipped.learned.classes]
+    assert [c.name for c in again.model.classes] == [c.name for c in shipped.model.classes]
     assert again.projection == pytest.approx(shipped.projection)
     assert again.effects == shipped.effects
 
@@ -36,7 +36,7 @@ def test_the_file_is_of_todays_features_and_effects():
     """Else `python -m airtouch.gap.relations.build` makes a new one."""
     shipped = library.shipped()
     assert len(shipped.standard.middle) == len(names())
-    assert {(c.name, c.shape) for c in shipped.learned.classes} \
+    assert {(c.name, c.shape) for c in shipped.model.classes} \
         == {(d.name, d.shape) for e in NAMES for d in drawings(e)}
 
 

@@ -41,7 +41,7 @@ def related(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], alone: Ma
         judged = round_of(on, variants, steps[-1] if steps else None, progress, promising=(effect,))
         if effect in judged:
             steps.append(replace(judged[effect], named=True, evidence=inference.evidence[effect]))
-    return Selection(alone, tuple(steps), inference.left_before, inference.left, on.parts,
+    return Selection(alone, tuple(steps), inference.nameless_alone, inference.unexplained, on.parts,
                      dict.fromkeys(alone, FIRST_GAIN), on.data.study.nominal, False, 0.0, True, True,
                      inference=inference)
 

@@ -120,7 +120,7 @@ class Selection:
         The fewer nominal flights there are, the farther off may another one lie.
         """
         if self.inference is not None:
-            return self.inference.allowed
+            return self.inference.limit
         if self.nominal < 2:
             return max(UNKNOWN_ALONE, UNKNOWN_ASSUMED * self.free_before, self.usual)
         gained = self.whole.gain if self.whole else 0.0

@@ -1,4 +1,4 @@
-"""Learn a library from simulated flights, about 20,000 of them; takes some 20 min of one core.
+"""Learn a library from about 25,000 simulated flights, in half an hour of one core.
 
     python -m airtouch.gap.relations.build OUT.npz [--scenario diagnosis] [--vehicle crazyflie-2.1-flow]
 
@@ -15,9 +15,9 @@ from scipy.linalg import solve_triangular
 
 from airtouch.gap.relations import exposure, space
 from airtouch.gap.relations.checks import checked
-from airtouch.gap.relations.density import coordinates_of, fit, plain
-from airtouch.gap.relations.effect_class import CHANCE, learned
-from airtouch.gap.relations.hypotheses import Flown, Learned
+from airtouch.gap.relations.density import coordinates_of, fit, unchanged
+from airtouch.gap.relations.effect_class import CHANCE, learn_class
+from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, drawn_flights, fly, scaled
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
 from airtouch.gap.relations.space import Standard
@@ -69,25 +69,26 @@ def build(scene: Scene, say: Say = lambda _: None) -> Library:
     paired = [_paired(scene, white, own, d, say) for e in NAMES if e in EFFECTS for d in drawings(e)]
     say("flights without a name")
     nameless = _nameless(scene, white, own)
-    ways = space.directions([p.shift for p in paired], EACH, nameless, COMMON)
-    stored = solve_triangular(white.lower, ways, lower=True, trans="T").astype(STORED).astype(float)
-    ways, at = white.lower.T @ stored, standard(table) @ stored
+    axes = space.directions([p.shift for p in paired], EACH, nameless, COMMON)
+    stored = solve_triangular(white.lower, axes, lower=True, trans="T").astype(STORED).astype(float)
+    axes, at = white.lower.T @ stored, standard(table) @ stored
     return _learned(scene, Library(scene.scenario, scene.vehicle.name, standard, stored, at.mean(axis=0),
-                                   Learned((), np.zeros((stored.shape[1], 0)), _of_nameless(nameless @ ways)),
-                                   (0.0, 1.0), np.zeros(0), np.zeros(0), np.zeros(0)), paired, middle, ways, say)
+                                   LearnedModel((), np.zeros((stored.shape[1], 0)), _of_nameless(nameless @ axes)),
+                                   (0.0, 1.0), np.zeros(0), np.zeros(0), np.zeros(0)), paired, middle, axes, say)
 
 
-def _learned(scene: Scene, empty: Library, paired: Sequence[Paired], middle: np.ndarray, ways: np.ndarray, say: Say,
+def _learned(scene: Scene, empty: Library, paired: Sequence[Paired], middle: np.ndarray, axes: np.ndarray, say: Say,
              ) -> Library:
     """The library with classes, and what is known of them by flights that they were not learned from."""
-    classes = tuple(learned(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.strength, p.shift @ ways,
-                            (p.flown - middle) @ ways) for p in paired)
-    library = replace(empty, learned=replace(empty.learned, classes=classes))
+    classes = tuple(learn_class(p.drawing.name, p.drawing.kind.effect, p.drawing.shape, p.strength, p.shift @ axes,
+                            (p.flown - middle) @ axes) for p in paired)
+    library = replace(empty, model=replace(empty.model, classes=classes))
     say("flights of two effects")
-    library = replace(library, learned=replace(library.learned, together=_together(scene, library, paired)))
+    library = replace(library, model=replace(library.model, interaction=_interaction(scene, library, paired)))
     say("checks")
     nothing = np.zeros(len(classes))
-    return checked(scene, read(packed(replace(library, left=nothing, more=nothing, far=nothing))), say)
+    return checked(scene, read(packed(replace(library, nameless_share=nothing, second_share=nothing,
+                                               distance_share=nothing))), say)
 
 
 def _paired(scene: Scene, white: Whitened, nominal: dict[int, np.ndarray], drawing: Drawing, say: Say) -> Paired:
@@ -131,11 +132,11 @@ def _of_nameless(shift: np.ndarray) -> np.ndarray:
     """Directions (Q, r), times the deviation, of nameless shifts (n, Q) over their size."""
     size = np.linalg.norm(shift, axis=1, keepdims=True)
     unit_shift = (shift / np.maximum(size, 1e-9))[size[:, 0] > 3.0]
-    _, spread, ways = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
-    return ways[:OF_NAMELESS].T * spread[:OF_NAMELESS]
+    _, spread, axes = np.linalg.svd(unit_shift / np.sqrt(len(unit_shift)), full_matrices=False)
+    return axes[:OF_NAMELESS].T * spread[:OF_NAMELESS]
 
 
-def _together(scene: Scene, library: Library, paired: Sequence[Paired]) -> np.ndarray:
+def _interaction(scene: Scene, library: Library, paired: Sequence[Paired]) -> np.ndarray:
     """Directions (Q, r), times the deviation, of what two effects are beside their sum, over the smaller."""
     relative, noise = [], []
     for i in range(PAIRS):
@@ -158,10 +159,10 @@ def _together(scene: Scene, library: Library, paired: Sequence[Paired]) -> np.nd
 def _standing_out(relative: np.ndarray, noise: float) -> np.ndarray:
     """Directions (Q, r), times the deviation, in which values (n, Q) vary by more than a noise of this variance may."""
     many, dimensions = relative.shape
-    _, spread, ways = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
+    _, spread, axes = np.linalg.svd(relative / np.sqrt(many), full_matrices=False)
     stands = spread ** 2 > CHANCE * noise * (1.0 + np.sqrt(dimensions / many)) ** 2
     stands[TOGETHER:] = False
-    return ways[stands].T * np.sqrt(spread[stands] ** 2 - noise)
+    return axes[stands].T * np.sqrt(spread[stands] ** 2 - noise)
 
 
 def _drawn(paired: Paired, rng: np.random.Generator) -> Active:
@@ -172,11 +173,11 @@ def _drawn(paired: Paired, rng: np.random.Generator) -> Active:
 
 def _residual_of_two(library: Library, values: np.ndarray, a: int, b: int) -> tuple[np.ndarray, float]:
     """What two right classes leave of a flight (Q,), and the size of the smaller one's shift."""
-    one, two = library.learned.classes[a], library.learned.classes[b]
-    first = fit(one, values, plain(len(values)))
+    one, two = library.model.classes[a], library.model.classes[b]
+    first = fit(one, values, unchanged(len(values)))
     known = coordinates_of(first.factors())
-    flown = Flown(values, library.learned)
-    both = flown.settled(flown.judged((first, fit(two, known(values - first.shift), known))))
+    flown = FlightFeatures(values, library.model)
+    both = flown.refitted(flown.at_fits((first, fit(two, known(values - first.shift), known))))
     return flown.coordinates(both.fits)(values - both.shift), min(float(np.linalg.norm(f.shift)) for f in both.fits)
 
 
@@ -189,7 +190,8 @@ def main() -> None:
     given = parser.parse_args()
     made = build(Scene(given.scenario, load(given.vehicle)), lambda text: print(text, flush=True))
     save(made, given.out)
-    for c, left, more, far in zip(made.learned.classes, made.left, made.more, made.far, strict=True):
+    for c, left, more, far in zip(made.model.classes, made.nameless_share, made.second_share, made.distance_share,
+                                    strict=True):
         print(f"{c.name} {c.shape or ''}: left {left:.3f}, more {more:.3f}, far {far:.3f}")
 
 

@@ -1,13 +1,13 @@
-"""What flights that a library was not learned from say of it: how far they lie off, and what its strengths are."""
+"""Check and calibrate a library on simulated flights that it was not learned from."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airtouch.gap.relations.density import far, fit, plain
+from airtouch.gap.relations.density import fit, log_density, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.hypotheses import Flown
+from airtouch.gap.relations.hypotheses import FlightFeatures
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, fly, scaled
 from airtouch.gap.relations.library import Library
@@ -27,24 +27,25 @@ Say = Callable[[str], None]
 
 
 def checked(scene: Scene, library: Library, say: Say = lambda _: None) -> Library:
-    """The library with its distances, shares and calibration."""
+    """The library with its distances, its shares and the calibration of its classes."""
     flown = [f for i in range(CHECKS) if (f := fly(scene, FIRST_CHECK + i)) is not None]
     squared = (library.coordinates(np.array(flown)) ** 2).sum(axis=1)
     low, high = np.quantile(squared, [0.16, 0.84])
     library = replace(library, distance=(float(np.median(squared)), float(0.5 * (high - low))))
     drawing_of = {(d.name, d.shape): d for e in NAMES if e in EFFECTS for d in drawings(e)}
-    own = [drawing_of[c.name, c.shape] for c in library.learned.classes]
-    left, more, far = np.array([_shares(scene, library, i, d) for i, d in enumerate(own)]).T
+    own = [drawing_of[c.name, c.shape] for c in library.model.classes]
+    nameless, second, distance = np.array([_shares(scene, library, i, d) for i, d in enumerate(own)]).T
     classes = []
-    for i, (c, d) in enumerate(zip(library.learned.classes, own, strict=True)):
+    for i, (c, d) in enumerate(zip(library.model.classes, own, strict=True)):
         say(f"calibration of {c.name} {c.shape or ''}")
         classes.append(replace(c, readout=_readout(scene, library, i, d)))
-    return replace(library, left=left, more=more, far=far, learned=replace(library.learned, classes=tuple(classes)))
+    return replace(library, nameless_share=nameless, second_share=second, distance_share=distance,
+                   model=replace(library.model, classes=tuple(classes)))
 
 
 def _shares(scene: Scene, library: Library, place: int, drawing: Drawing) -> tuple[float, float, float]:
-    """`Library.left`, `more` and `far` of a class."""
-    own, left, more, far = library.learned.classes[place], [0.0], [0.0], [0.0]
+    """`Library.nameless_share`, `second_share` and `distance_share` of a class."""
+    own, nameless, second, distance = library.model.classes[place], [0.0], [0.0], [0.0]
     for i in range(A_CLASS):
         rng = np.random.default_rng([SEED, 96, place, i])
         strength = float(np.exp(rng.uniform(np.log(drawing.kind.highest / RANGE), np.log(drawing.kind.highest))))
@@ -52,19 +53,21 @@ def _shares(scene: Scene, library: Library, place: int, drawing: Drawing) -> tup
         if f is None:
             continue
         y = library.coordinates(f[None])[0]
-        flown, found = Flown(y, library.learned), fit(own, y, plain(len(y)))
-        here = flown.judged((found,))
-        second = flown.beside(here, lambda c, _: not alike(c.effect, own.effect))[0]
-        beyond = library.beyond(flown.distance(here))
-        for shares, gain in ((left, flown.nameless(here) - here.evidence - LEAST_GAIN),
-                             (more, second.evidence - here.evidence - LEAST_GAIN), (far, beyond - library.usual)):
+        flight, found = FlightFeatures(y, library.model), fit(own, y, unchanged(len(y)))
+        here = flight.at_fits((found,))
+        two = flight.with_one_more(here, lambda c, _: not alike(c.effect, own.effect))[0]
+        excess = library.excess(flight.squared_distance(here))
+        for shares, gain in ((nameless, flight.nameless_evidence(here) - here.evidence - LEAST_GAIN),
+                             (second, two.evidence - here.evidence - LEAST_GAIN),
+                             (distance, excess - library.usual_excess)):
             shares.append(max(gain, 0.0) / max(here.evidence, LEAST_GAIN))
-    return float(np.quantile(left, KEPT)), float(np.quantile(more, KEPT)), float(np.quantile(far, KEPT))
+    low, middle, high = (float(np.quantile(shares, KEPT)) for shares in (nameless, second, distance))
+    return low, middle, high
 
 
 def _readout(scene: Scene, library: Library, place: int, drawing: Drawing) -> Readout | None:
     """Calibration of a class by flights from the strength that hardly shows to the highest; None where too few do."""
-    own, high = library.learned.classes[place], drawing.kind.highest
+    own, high = library.model.classes[place], drawing.kind.highest
     rng = np.random.default_rng([SEED, 95, place])
     flights = iter(range(FIRST_CALIBRATION + 1000 * place, FIRST_CALIBRATION + 1000 * (place + 1)))
 
@@ -103,5 +106,5 @@ def _fitted(scene: Scene, library: Library, own: EffectClass, drawing: Drawing, 
     if features is None:
         return None
     values = library.coordinates(features[None])[0]
-    found = fit(own, values, plain(len(values)))
-    return Calibrated(found.strength, scaled(drawing, active), found.evidence - far(values) > LEAST_EVIDENCE)
+    found = fit(own, values, unchanged(len(values)))
+    return Calibrated(found.strength, scaled(drawing, active), found.evidence - log_density(values) > LEAST_EVIDENCE)

@@ -17,33 +17,33 @@ SLOPE = 1e-3  #: of the strength, over which slopes are taken
 
 @dataclass(frozen=True)
 class Coordinates:
-    """A change of coordinates that makes a covariance 1 + F F' to 1: along ways (Q, r) by stretch (r,), less 1.
+    """A change of coordinates that makes a covariance 1 + F F' to 1: along axes (Q, r) by stretch (r,), less 1.
 
     level: logarithm of the density that it costs.
     """
 
-    ways: np.ndarray
+    axes: np.ndarray
     stretch: np.ndarray
     level: float
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Values (..., Q) in these coordinates."""
-        return values + ((values @ self.ways) * self.stretch) @ self.ways.T
+        return values + ((values @ self.axes) * self.stretch) @ self.axes.T
 
 
 def coordinates_of(factors: np.ndarray) -> Coordinates:
     """Coordinates for the covariance 1 + F F' of factors F (Q, r)."""
-    ways, size, _ = np.linalg.svd(factors, full_matrices=False)
+    axes, size, _ = np.linalg.svd(factors, full_matrices=False)
     grown = np.sqrt(1.0 + size ** 2)
-    return Coordinates(ways, 1.0 / grown - 1.0, -float(np.log(grown).sum()))
+    return Coordinates(axes, 1.0 / grown - 1.0, -float(np.log(grown).sum()))
 
 
-def plain(dimensions: int) -> Coordinates:
+def unchanged(dimensions: int) -> Coordinates:
     """Coordinates that change nothing."""
     return Coordinates(np.zeros((dimensions, 0)), np.zeros(0), 0.0)
 
 
-def far(values: np.ndarray) -> float:
+def log_density(values: np.ndarray) -> float:
     """Log density of values (Q,) whose covariance is 1, without the constant."""
     return -0.5 * float(values @ values)
 
@@ -67,7 +67,7 @@ class Fit:
 
     def factors(self) -> np.ndarray:
         """F (Q, r): F F' is the covariance of a flight about the curve, beyond that of nominal flights."""
-        return self.of.ways * (np.linalg.norm(self.shift) * np.sqrt(self.of.spread))
+        return self.of.axes * (np.linalg.norm(self.shift) * np.sqrt(self.of.variances))
 
 
 class _Seen:
@@ -75,17 +75,17 @@ class _Seen:
 
     def __init__(self, of: EffectClass, values: np.ndarray, coordinates: Coordinates) -> None:
         self.of, self.values, self.coordinates = of, values, coordinates
-        if coordinates.stretch.size and of.spread.size:
-            self.ways, size, _ = np.linalg.svd(coordinates((of.ways * np.sqrt(of.spread)).T).T, full_matrices=False)
-            self.spread = size ** 2
+        if coordinates.stretch.size and of.variances.size:
+            self.axes, size, _ = np.linalg.svd(coordinates((of.axes * np.sqrt(of.variances)).T).T, full_matrices=False)
+            self.variances = size ** 2
         else:
-            self.ways, self.spread = of.ways, of.spread
+            self.axes, self.variances = of.axes, of.variances
 
     def level(self, shift: np.ndarray) -> np.ndarray:
         """Log density (n,) at expected shifts (n, Q) in plain coordinates."""
         size = (shift ** 2).sum(axis=1)
         off = self.values - self.coordinates(shift)
-        along, grown = off @ self.ways, 1.0 + size[:, None] * self.spread
+        along, grown = off @ self.axes, 1.0 + size[:, None] * self.variances
         distance = (off ** 2).sum(axis=1) - (along ** 2 * (1.0 - 1.0 / grown)).sum(axis=1)
         return self.coordinates.level - 0.5 * (distance + np.log(grown).sum(axis=1))
 
@@ -95,8 +95,8 @@ class _Seen:
 
     def solved(self, shift: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (n, Q) over the covariance that the class has at an expected shift (Q,)."""
-        grown = 1.0 + (shift @ shift) * self.spread
-        return values - ((values @ self.ways) * (1.0 - 1.0 / grown)) @ self.ways.T
+        grown = 1.0 + (shift @ shift) * self.variances
+        return values - ((values @ self.axes) * (1.0 - 1.0 / grown)) @ self.axes.T
 
     def clipped(self, strength: np.ndarray) -> np.ndarray:
         """A strength (parameters,) within what was flown."""

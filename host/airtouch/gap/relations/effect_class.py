@@ -27,8 +27,8 @@ class EffectClass:
     """name: of the kind of effect; effect: of the registry; shape: value of the parameter that shapes it, or None.
 
     knots (k,): logarithms of strengths; table (parts, k, Q): shift per unit of strength at the knots, one part for each
-    parameter and one more, even in the sign, where there are two signs; ways (Q, r), spread (r,): directions, and
-    variances there of a flight's distance from the curve, over the squared size of the shift. readout: what its
+    parameter and one more, even in the sign, where there are two signs; axes (Q, r), variances (r,): directions, and
+    variances along them, of a flight's distance from the curve, over the squared size of the shift. readout: what its
     strengths are in the effect's units, where that is known.
     """
 
@@ -39,8 +39,8 @@ class EffectClass:
     signed: bool
     knots: np.ndarray
     table: np.ndarray
-    ways: np.ndarray
-    spread: np.ndarray
+    axes: np.ndarray
+    variances: np.ndarray
     readout: Readout | None = None
 
     @property
@@ -88,7 +88,7 @@ def _hats(size: np.ndarray, knots: np.ndarray) -> np.ndarray:
     return out
 
 
-def learned(name: str, effect: str, shape: float | None, strength: np.ndarray, shift: np.ndarray, flown: np.ndarray,
+def learn_class(name: str, effect: str, shape: float | None, strength: np.ndarray, shift: np.ndarray, flown: np.ndarray,
             ) -> EffectClass:
     """A class from flights: scaled parameters (n, parameters), shifts from the same flights without the effect (n, Q),
 
@@ -126,9 +126,9 @@ def _fitted(name: str, effect: str, shape: float | None, strength: np.ndarray, s
     moved = np.linalg.norm(expected, axis=1)
     off = np.linalg.norm(shift - expected, axis=1) / np.hypot(moved, LEAST_SIZE)
     good = off < ODD * np.median(off)
-    ways, spread = _scatter(flown[good] - expected[good], moved[good], columns.shape[1])
+    axes, variances = _scatter(flown[good] - expected[good], moved[good], columns.shape[1])
     return EffectClass(name, effect, shape, strength.shape[1], signed, knots,
-                       table.reshape(parts.shape[1], len(knots), -1), ways, spread), good
+                       table.reshape(parts.shape[1], len(knots), -1), axes, variances), good
 
 
 def _scatter(off: np.ndarray, moved: np.ndarray, fitted: int) -> tuple[np.ndarray, np.ndarray]:
@@ -140,7 +140,7 @@ def _scatter(off: np.ndarray, moved: np.ndarray, fitted: int) -> tuple[np.ndarra
     relative = off[clear] / moved[clear, None]
     many = len(relative)
     noise = float(np.mean(moved[clear] ** -2.0))
-    _, size, ways = np.linalg.svd(relative / np.sqrt(max(many - fitted * clear.mean(), 1.0)), full_matrices=False)
+    _, size, axes = np.linalg.svd(relative / np.sqrt(max(many - fitted * clear.mean(), 1.0)), full_matrices=False)
     stands = size ** 2 > CHANCE * noise * (1.0 + np.sqrt(off.shape[1] / many)) ** 2
     stands[RANK:] = False
-    return ways[stands].T, size[stands] ** 2 - noise
+    return axes[stands].T, size[stands] ** 2 - noise

@@ -1,4 +1,4 @@
-"""Which effects together, or something without a name: hypotheses on the features of a flight and their evidence."""
+"""Hypotheses on the features of a flight and their evidence: effects together, or a disturbance without a name."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,23 +8,23 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from airtouch.gap.relations.density import Coordinates, Fit, coordinates_of, far, fit, plain
+from airtouch.gap.relations.density import Coordinates, Fit, coordinates_of, fit, log_density, unchanged
 from airtouch.gap.relations.effect_class import EffectClass
 
 ROUNDS = 3  #: in which the effects of a hypothesis are fitted in turn
-SIZES = np.geomspace(3.0, 300.0, 10)  #: of a disturbance without a name, each as likely
+SIZES = np.geomspace(3.0, 300.0, 10)  #: of a disturbance without a name in nominal deviations, equally likely
 
 
 @dataclass(frozen=True)
-class Learned:
-    """What was learned from simulated flights: classes of effects; together (Q, r): directions, times the deviation, in
+class LearnedModel:
+    """What was learned from simulated flights: classes of effects, their interaction, disturbances without a name.
 
-    which two effects are more or less than their sum, over the size of the smaller; nameless (Q, r): the same of
-    disturbances without a name, over their size.
+    interaction (Q, r): directions, times the standard deviation, in which two effects are not their sum, relative to
+    the size of the smaller one; nameless (Q, r): the same of disturbances without a name, relative to their size.
     """
 
     classes: tuple[EffectClass, ...]
-    together: np.ndarray
+    interaction: np.ndarray
     nameless: np.ndarray
 
 
@@ -32,7 +32,7 @@ class Learned:
 class Hypothesis:
     """Effects at their likeliest strengths.
 
-    level: log density over none; evidence: the same averaged over strengths.
+    level: log density over none, nats; evidence: the same averaged over strengths.
     """
 
     fits: tuple[Fit, ...]
@@ -41,7 +41,7 @@ class Hypothesis:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the kinds of effects."""
+        """Names of the classes."""
         return tuple(f.of.name for f in self.fits)
 
     @property
@@ -55,70 +55,74 @@ class Hypothesis:
         return np.sum([f.shift for f in self.fits], axis=0)
 
 
-class Flown:
-    """The features of a flight less those of nominal ones (Q,), and hypotheses on them."""
+class FlightFeatures:
+    """The features of a flight relative to nominal ones (Q,), and hypotheses on them."""
 
-    def __init__(self, values: np.ndarray, learned: Learned) -> None:
-        self.values, self.learned = values, learned
+    def __init__(self, values: np.ndarray, model: LearnedModel) -> None:
+        self.values, self.model = values, model
         self.none = Hypothesis((), 0.0, 0.0)
 
-    def singles(self) -> list[Hypothesis]:
-        """Every class alone, the best first."""
-        base = far(self.values)
-        made = [fit(c, self.values, plain(len(self.values))) for c in self.learned.classes]
-        return sorted((Hypothesis((f,), f.level - base, f.evidence - base) for f in made), key=lambda h: -h.evidence)
+    def single_effects(self) -> list[Hypothesis]:
+        """A hypothesis for every class alone, the likeliest first."""
+        base = log_density(self.values)
+        fits = [fit(c, self.values, unchanged(len(self.values))) for c in self.model.classes]
+        return sorted((Hypothesis((f,), f.level - base, f.evidence - base) for f in fits), key=lambda h: -h.evidence)
 
-    def beside(self, held: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool]) -> list[Hypothesis]:
-        """Every class that may stand beside a hypothesis on top of it, the best first; fitted in turn once."""
-        known = self.coordinates(held.fits)
-        left = known(self.values - held.shift)
-        out = []
-        for c in self.learned.classes:
-            if allowed(c, held):
-                more = fit(c, left, known)
-                out.append(self.judged((*held.fits, more), held.evidence - held.level))
+    def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
+                      ) -> list[Hypothesis]:
+        """The hypothesis with each allowed class added, the likeliest first; the others keep their strength."""
+        known = self.coordinates(hypothesis.fits)
+        residual = known(self.values - hypothesis.shift)
+        cost = hypothesis.evidence - hypothesis.level
+        out = [self.at_fits((*hypothesis.fits, fit(c, residual, known)), cost)
+               for c in self.model.classes if allowed(c, hypothesis)]
         return sorted(out, key=lambda h: -h.evidence)
 
-    def settled(self, found: Hypothesis) -> Hypothesis:
-        """A hypothesis whose effects are fitted in turn, each beside the others."""
-        best, fits = found, list(found.fits)
+    def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
+        """The hypothesis with its effects fitted in turn, each beside the others."""
+        best, fits = hypothesis, list(hypothesis.fits)
         for _ in range(ROUNDS):
             for i, f in enumerate(fits):
                 others = tuple(fits[:i] + fits[i + 1:])
                 known = self.coordinates(others)
                 fits[i] = fit(f.of, known(self.values - np.sum([o.shift for o in others], axis=0)), known)
-            tried = self.judged(tuple(fits))
+            tried = self.at_fits(tuple(fits))
             if tried.level <= best.level:
                 break
             best = tried
         return best
 
-    def distance(self, found: Hypothesis) -> float:
-        """Squared distance of the flight from effects, over the scatter about them."""
-        left = self.coordinates(found.fits)(self.values - found.shift) if found.fits else self.values
-        return float(left @ left)
+    def squared_distance(self, hypothesis: Hypothesis) -> float:
+        """Squared distance of the flight from a hypothesis, relative to the scatter about it."""
+        fits = hypothesis.fits
+        residual = self.coordinates(fits)(self.values - hypothesis.shift) if fits else self.values
+        return float(residual @ residual)
 
-    def nameless(self, beside: Hypothesis) -> float:
-        """Evidence over none of a hypothesis with a disturbance beside it that has no name."""
-        known = self.coordinates(beside.fits) if beside.fits else plain(len(self.values))
-        left = known(self.values - (beside.shift if beside.fits else 0.0))
-        ways, size, _ = np.linalg.svd(known(self.learned.nameless.T).T, full_matrices=False)
-        along = (left @ ways) ** 2
+    def nameless_evidence(self, hypothesis: Hypothesis) -> float:
+        """Evidence over none of a hypothesis with a disturbance without a name beside it, nats."""
+        known = self.coordinates(hypothesis.fits) if hypothesis.fits else unchanged(len(self.values))
+        residual = known(self.values - (hypothesis.shift if hypothesis.fits else 0.0))
+        axes, size, _ = np.linalg.svd(known(self.model.nameless.T).T, full_matrices=False)
+        along = (residual @ axes) ** 2
         grown = 1.0 + np.outer(SIZES ** 2, size ** 2)
-        level = known.level + far(left) + 0.5 * ((along * (1.0 - 1.0 / grown)) - np.log(grown)).sum(axis=1)
+        level = known.level + log_density(residual) + 0.5 * ((along * (1.0 - 1.0 / grown)) - np.log(grown)).sum(axis=1)
         averaged = float(logsumexp(level) - np.log(len(SIZES)))
-        return averaged - far(self.values) + beside.evidence - beside.level
+        return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.level
 
-    def judged(self, fits: Sequence[Fit], occam: float | None = None) -> Hypothesis:
-        """Effects at the strengths of their fits. occam: what the strengths of all but the last may cost, if known."""
+    def at_fits(self, fits: Sequence[Fit], cost: float | None = None) -> Hypothesis:
+        """The hypothesis of effects at the strengths of their fits.
+
+        cost: nats that averaging over the strengths of all but the last changes, if known.
+        """
         known = self.coordinates(fits)
-        level = known.level + far(known(self.values - np.sum([f.shift for f in fits], axis=0))) - far(self.values)
-        cost = sum(f.evidence - f.level for f in fits) if occam is None else occam + fits[-1].evidence - fits[-1].level
-        return Hypothesis(tuple(fits), level, level + cost)
+        residual = known(self.values - np.sum([f.shift for f in fits], axis=0))
+        level = known.level + log_density(residual) - log_density(self.values)
+        own = [f.evidence - f.level for f in fits]
+        return Hypothesis(tuple(fits), level, level + (sum(own) if cost is None else cost + own[-1]))
 
     def coordinates(self, fits: Sequence[Fit]) -> Coordinates:
-        """Coordinates for the scatter of a flight under effects."""
+        """Coordinates in which the scatter of a flight under effects has the covariance 1."""
         sizes = [float(np.linalg.norm(f.shift)) for f in fits]
         smaller = float(np.sqrt(sum(min(a, b) ** 2 for a, b in combinations(sizes, 2))))
-        return coordinates_of(np.concatenate([*(f.factors() for f in fits),
-                                              *([smaller * self.learned.together] if smaller else [])], axis=1))
+        interaction = [smaller * self.model.interaction] if smaller else []
+        return coordinates_of(np.concatenate([*(f.factors() for f in fits), *interaction], axis=1))

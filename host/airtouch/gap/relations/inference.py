@@ -1,4 +1,4 @@
-"""Which effects the relations of a flight's signals say: the likeliest hypothesis, and the evidence for each effect."""
+"""Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -7,69 +7,72 @@ import numpy as np
 from scipy.special import logsumexp
 
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.hypotheses import Flown, Hypothesis, Learned
+from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Reading, read_out
 from airtouch.gap.signatures.candidates import alike
 from airtouch.simulation.effects import get
 
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
-#: 99 of 100 flights with an effect from the weakest strength on (all flights of `learning.SEED`)
+#: 99 of 100 flights with an effect from the weakest strength on gained as much (all flights of `learning.SEED`)
 LEAST_EVIDENCE = 18.0
 #: nats that a disturbance without a name may gain beside the right effects, whatever their evidence
-LEAST_LEFT = 10.0
-#: nats by which two effects must be likelier than one with a disturbance that has no name beside it: of 44 wrong pairs
-#: that were found where the right effect was left out, 36 were not
+LEAST_NAMELESS = 10.0
+#: nats by which two effects must be likelier than one with a disturbance without a name beside it; 36 of 44 wrong
+#: pairs, found where the right effect was left out, were not
 OVER_NAMELESS = 30.0
-#: of the evidence of any effects, beside what their classes ask for, that may be left as no curve is exact, and by
-#: which a flight may lie off; the same for two effects, which are no sum of each; by what that distance is
-#: multiplied. Of 100 flights with an effect 95 are named right so, and 16 get a wrong name where it is left out
-#: (`learning.SEED`)
-CRUDE_LEFT, CRUDE_FAR, PAIR_LEFT, PAIR_FAR, FAR = 0.01, 0.02, 0.01, 0.07, 1.5
+#: shares of the effects' evidence, beside those of their classes, that a disturbance without a name may gain and that
+#: the flight may lie off, because no curve is exact; PAIR: the same for two effects, because they are not a sum; FAR:
+#: factor on the limit of the distance. With them 95 of 100 flights with an effect are named right, and 16 get a wrong
+#: name where it is left out (`learning.SEED`)
+CRUDE_NAMELESS, CRUDE_DISTANCE, PAIR_NAMELESS, PAIR_DISTANCE, FAR = 0.01, 0.02, 0.01, 0.07, 1.5
 MOST_EFFECTS = 3
-BEAM = 3  #: hypotheses beside which another effect is looked for, and of what is found those that are fitted in turn
+BEAM = 3  #: hypotheses to which an effect is added, and additions to each that are fitted in turn
 TEMPERATURE = 2.0  #: of the probabilities: the densities' tails are heavier than normal ones
-Shares = Mapping[tuple[str, float | None], float]  #: of each class by its name and shape
+Shares = Mapping[tuple[str, float | None], float]  #: one number for each class, by its name and shape
 
 
 @dataclass(frozen=True)
 class Inference:
-    """classes: of the effects that are there, the likeliest; evidence: nats of each effect alone over none.
+    """What the relations of a flight's signals show.
 
-    left_before: nats that a disturbance without a name gains over none; left: what is left beside the effects, what it
-    gains there or how much farther than nominal flights this one lies; allowed: what may be left where they are right.
-    readings: of the likeliest effects, their parameters as far as the library tells them.
+    classes: classes of the likeliest effects; evidence: nats that each effect alone gains over none. nameless_alone:
+    nats that a disturbance without a name gains over none. unexplained: nats that speak against the likeliest effects,
+    the gain of a disturbance without a name beside them or the excess of the flight's distance from them, whichever is
+    nearer its limit; limit: nats that may speak against effects that are right. readings: parameters of the likeliest
+    effects, of those that the library is calibrated for.
     """
 
     classes: tuple[EffectClass, ...]
     evidence: Mapping[str, float]
-    left_before: float
-    left: float
-    allowed: float
+    nameless_alone: float
+    unexplained: float
+    limit: float
     readings: Mapping[str, Reading] = field(default_factory=dict)
 
     def probabilities(self) -> dict[str, float]:
-        """Of each effect alone and of `none`; they sum to 1."""
+        """Probabilities of each effect alone and of `none`; they sum to 1."""
         names = [*self.evidence, "none"]
         score = np.array([*self.evidence.values(), LEAST_EVIDENCE]) / TEMPERATURE
         return dict(zip(names, np.exp(score - logsumexp(score)).tolist(), strict=True))
 
 
 def infer(library: Library, coordinates: np.ndarray) -> Inference:
-    """What coordinates (n, Q) of flights say of the effects that they have in common."""
+    """Infer the effects that flights with coordinates (n, Q) have in common."""
     many = len(coordinates)
-    flown = Flown(np.sqrt(many) * coordinates.mean(axis=0), of_mean(library.learned, many))
-    singles = flown.singles()
-    more, left, far = ({(c.name, c.shape): float(x) for c, x in zip(library.learned.classes, shares, strict=True)}
-                       for shares in (library.more, library.left, library.far))
-    best = _chosen(flown, singles, more)
-    both = _left(flown, best, left), _beyond(flown, library, best, far)
-    return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flown.nameless(flown.none),
-                     *max(both, key=lambda b: b[0] / b[1]), _readings(best))
+    flight = FlightFeatures(np.sqrt(many) * coordinates.mean(axis=0), model_of_mean(library.model, many))
+    singles = flight.single_effects()
+    second, nameless, distance = (
+        {(c.name, c.shape): float(x) for c, x in zip(library.model.classes, shares, strict=True)}
+        for shares in (library.second_share, library.nameless_share, library.distance_share))
+    best = _likeliest(flight, singles, second)
+    against = _nameless(flight, best, nameless), _distance(flight, library, best, distance)
+    return Inference(tuple(f.of for f in best.fits), _by_effect(singles), flight.nameless_evidence(flight.none),
+                     *max(against, key=lambda a: a[0] / a[1]), _readings(best))
 
 
 def _readings(best: Hypothesis) -> Mapping[str, Reading]:
-    """Parameters of the effects of a hypothesis, those of an effect's several classes together."""
+    """Parameters of the effects of a hypothesis; several classes of one effect give one reading."""
     out: dict[str, dict[str, tuple[float, float]]] = {}
     for f in best.fits:
         if f.of.readout is not None:
@@ -77,67 +80,67 @@ def _readings(best: Hypothesis) -> Mapping[str, Reading]:
     return out
 
 
-def _left(flown: Flown, best: Hypothesis, shares: Shares) -> tuple[float, float]:
-    """Nats that a disturbance without a name gains beside effects, and how many it may gain."""
-    share = _largest(best, shares) + CRUDE_LEFT + PAIR_LEFT * (len(best.fits) > 1)
-    return flown.nameless(best) - best.evidence, LEAST_LEFT + share * best.evidence
+def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> tuple[float, float]:
+    """Nats that a disturbance without a name gains beside effects, and their limit."""
+    share = _largest(best, shares) + CRUDE_NAMELESS + PAIR_NAMELESS * (len(best.fits) > 1)
+    return flight.nameless_evidence(best) - best.evidence, LEAST_NAMELESS + share * best.evidence
 
 
-def _beyond(flown: Flown, library: Library, best: Hypothesis, shares: Shares) -> tuple[float, float]:
-    """Nats by which a flight lies farther from effects than nominal ones from none, and by how many it may."""
-    share = _largest(best, shares) + CRUDE_FAR + PAIR_FAR * (len(best.fits) > 1)
-    return library.beyond(flown.distance(best)), FAR * (library.usual + share * best.evidence)
+def _distance(flight: FlightFeatures, library: Library, best: Hypothesis, shares: Shares) -> tuple[float, float]:
+    """Nats by which a flight lies farther from effects than nominal flights from none, and their limit."""
+    share = _largest(best, shares) + CRUDE_DISTANCE + PAIR_DISTANCE * (len(best.fits) > 1)
+    return library.excess(flight.squared_distance(best)), FAR * (library.usual_excess + share * best.evidence)
 
 
 def _largest(of: Hypothesis, shares: Shares) -> float:
-    """The largest share of the classes of a hypothesis, 0 without any."""
+    """Largest share of the classes of a hypothesis, 0 for no class."""
     return max((shares[f.of.name, f.of.shape] for f in of.fits), default=0.0)
 
 
-def of_mean(learned: Learned, many: int) -> Learned:
-    """What was learned, for the mean of so many flights times the square root of their number.
+def model_of_mean(model: LearnedModel, many: int) -> LearnedModel:
+    """The model of the mean of `many` flights times the square root of their number.
 
     Nominal scatter stays as it is, shifts are longer by that root, and single flights lie about them as before.
     """
     if many == 1:
-        return learned
-    return replace(learned, classes=tuple(replace(c, table=np.sqrt(many) * c.table, spread=c.spread / many)
-                                          for c in learned.classes))
+        return model
+    return replace(model, classes=tuple(replace(c, table=np.sqrt(many) * c.table, variances=c.variances / many)
+                                        for c in model.classes))
 
 
-def _chosen(flown: Flown, singles: list[Hypothesis], more: Shares) -> Hypothesis:
-    """The likeliest hypothesis, with as few effects as its evidence lets it have."""
-    best, held = (singles[0] if singles else flown.none), singles[:BEAM]
+def _likeliest(flight: FlightFeatures, singles: list[Hypothesis], second: Shares) -> Hypothesis:
+    """The likeliest hypothesis, with no more effects than its evidence supports."""
+    best, beam = (singles[0] if singles else flight.none), singles[:BEAM]
     if best.evidence < LEAST_EVIDENCE:
-        return flown.none
+        return flight.none
     while len(best.fits) < MOST_EFFECTS:
-        tried = _further(flown, held)
-        if not tried:
+        larger = _with_one_more(flight, beam)
+        if not larger:
             break
-        first = tried[0]
-        share = _largest(best, more)
+        first = larger[0]
+        share = _largest(best, second)
         if first.evidence < best.evidence + LEAST_EVIDENCE + share * best.evidence \
-                or first.evidence < flown.nameless(best) + OVER_NAMELESS:
+                or first.evidence < flight.nameless_evidence(best) + OVER_NAMELESS:
             break
-        best, held = first, tried[:1]
+        best, beam = first, larger[:1]
     return best
 
 
-def _further(flown: Flown, held: list[Hypothesis]) -> list[Hypothesis]:
-    """Hypotheses with one effect more, fitted in turn, the best first."""
+def _with_one_more(flight: FlightFeatures, beam: list[Hypothesis]) -> list[Hypothesis]:
+    """Hypotheses with one more effect, all effects refitted in turn, the likeliest first."""
     tried = {frozenset((f.of.name, f.of.shape) for f in h.fits): h
-             for one in held for h in reversed(flown.beside(one, may_stand_beside)[:BEAM])}
+             for one in beam for h in reversed(flight.with_one_more(one, may_stand_beside)[:BEAM])}
     worth = sorted(tried.values(), key=lambda h: -h.evidence)[:BEAM]
-    return sorted((flown.settled(h) for h in worth), key=lambda h: -h.evidence)
+    return sorted((flight.refitted(h) for h in worth), key=lambda h: -h.evidence)
 
 
-def may_stand_beside(other: EffectClass, held: Hypothesis) -> bool:
-    """Whether a class is of another effect than those of a hypothesis, and no other name of one of them.
+def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
+    """Whether a class may be added to a hypothesis.
 
-    Or of another parameter of one of them, where each parameter has a class of its own.
+    It may not be another name of an effect in it; it may be another parameter of one, if each parameter has a class.
     """
-    another = other.of_one_parameter and other.name not in held.names
-    return all(not alike(other.effect, e) or (another and other.effect == e) for e in held.effects)
+    another = other.of_one_parameter and other.name not in hypothesis.names
+    return all(not alike(other.effect, e) or (another and other.effect == e) for e in hypothesis.effects)
 
 
 def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:

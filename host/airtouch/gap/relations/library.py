@@ -12,25 +12,27 @@ from typing import Any
 import numpy as np
 
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.hypotheses import Learned
+from airtouch.gap.relations.hypotheses import LearnedModel
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.relations.space import Standard
 from airtouch.logs.files import write_bytes
 from airtouch.vehicle import Vehicle, load
 
 SHIPPED = "diagnosis.npz"
-USUAL = 4.0  #: standard deviations of the distance of nominal flights beyond which a flight is none
+MOST_DEVIATIONS = 4.0  #: standard deviations of the squared distance of nominal flights beyond which a flight is none
+SHARES = ("nameless_share", "second_share", "distance_share")
 STORED = np.float16  #: numbers of a file; their rounding moves a coordinate by less than a tenth of its deviation
 
 
 @dataclass(frozen=True)
 class Library:
-    """vehicle: its name; projection (features, Q), middle (Q,): coordinates of a flight are its standardised features
+    """The model of one vehicle, by its name, in one scenario, and the coordinates that it is written in.
 
-    times the projection, less the middle. distance: median and deviation of the squared size of coordinates of nominal
-    flights that were not learned from. Shares (classes,) of its evidence, which four of five flights with a class keep:
-    `left`, what a disturbance without a name gains beside it; `more`, what a second effect gains; `far`, how much
-    farther from it than nominal flights from none the flight lies, in nats.
+    projection (features, Q), middle (Q,): coordinates of a flight are its standardised features times the projection,
+    less the middle. distance: median and standard deviation of the squared size of coordinates of nominal flights that
+    were not learned from. The shares (classes,) are nats over the evidence for the class, as four of five flights with
+    it have at most: nameless_share, what a disturbance without a name gains beside it; second_share, what a second
+    effect gains; distance_share, by how much the flight lies farther from it than nominal flights from none.
     """
 
     scenario: str
@@ -38,41 +40,42 @@ class Library:
     standard: Standard
     projection: np.ndarray
     middle: np.ndarray
-    learned: Learned
+    model: LearnedModel
     distance: tuple[float, float]
-    left: np.ndarray
-    more: np.ndarray
-    far: np.ndarray
+    nameless_share: np.ndarray
+    second_share: np.ndarray
+    distance_share: np.ndarray
 
     def coordinates(self, features: np.ndarray) -> np.ndarray:
         """Coordinates (n, Q) of features (n, features)."""
         return self.standard(features) @ self.projection - self.middle
 
     @property
-    def usual(self) -> float:
-        """Nats by which nominal flights, but for a few odd ones, lie no farther from none than most do."""
-        return 0.5 * USUAL * self.distance[1]
+    def usual_excess(self) -> float:
+        """Nats of excess distance that hardly any nominal flight has."""
+        return 0.5 * MOST_DEVIATIONS * self.distance[1]
 
-    def beyond(self, squared: float) -> float:
-        """Nats by which a flight at a squared distance lies farther off than nominal flights from none."""
+    def excess(self, squared: float) -> float:
+        """Excess of a squared distance over that of the median nominal flight, in nats."""
         return 0.5 * (squared - self.distance[0])
 
     def nominal(self, coordinates: np.ndarray) -> bool:
         """Whether flights (n, Q) said to be nominal lie as those do that were learned from."""
-        return bool(len(coordinates)) and self.beyond(float(np.median((coordinates ** 2).sum(axis=1)))) < self.usual
+        middle = float(np.median((coordinates ** 2).sum(axis=1))) if len(coordinates) else np.inf
+        return self.excess(middle) < self.usual_excess
 
     @property
     def effects(self) -> frozenset[str]:
         """Names of the effects of the registry that it has classes of."""
-        return frozenset(c.effect for c in self.learned.classes)
+        return frozenset(c.effect for c in self.model.classes)
 
     def without(self, names: Iterable[str]) -> "Library":
         """The library with effects left out."""
         out = frozenset(names)
-        keep = np.array([c.effect not in out for c in self.learned.classes])
-        classes = tuple(c for c in self.learned.classes if c.effect not in out)
-        return replace(self, learned=replace(self.learned, classes=classes), left=self.left[keep],
-                       more=self.more[keep], far=self.far[keep])
+        keep = np.array([c.effect not in out for c in self.model.classes])
+        classes = tuple(c for c in self.model.classes if c.effect not in out)
+        return replace(self, model=replace(self.model, classes=classes), nameless_share=self.nameless_share[keep],
+                       second_share=self.second_share[keep], distance_share=self.distance_share[keep])
 
 
 def save(library: Library, path: Path) -> None:
@@ -82,18 +85,18 @@ def save(library: Library, path: Path) -> None:
 
 def packed(library: Library) -> bytes:
     """The bytes of a library's file."""
-    learned = library.learned
+    model = library.model
     arrays = {"standard.middle": library.standard.middle, "standard.deviation": library.standard.deviation,
-              "projection": library.projection, "middle": library.middle, "together": learned.together,
-              "nameless": learned.nameless, "left": library.left, "more": library.more, "far": library.far}
-    for i, c in enumerate(learned.classes):
-        arrays |= {f"{i}.knots": c.knots, f"{i}.table": c.table, f"{i}.ways": c.ways, f"{i}.spread": c.spread}
+              "projection": library.projection, "middle": library.middle, "interaction": model.interaction,
+              "nameless": model.nameless, **{name: getattr(library, name) for name in SHARES}}
+    for i, c in enumerate(model.classes):
+        arrays |= {f"{i}.knots": c.knots, f"{i}.table": c.table, f"{i}.axes": c.axes, f"{i}.variances": c.variances}
         if c.readout is not None:
             arrays |= {f"{i}.strength": c.readout.strength, f"{i}.amount": c.readout.amount}
     words = {"scenario": library.scenario, "vehicle": library.vehicle, "distance": library.distance,
-             "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in learned.classes],
-             "readouts": [c.readout and c.readout.parameters for c in learned.classes]}
-    exact = ("knots", "spread", "strength", "amount", "standard.middle", "standard.deviation")
+             "classes": [[c.name, c.effect, c.shape, c.parameters, c.signed] for c in model.classes],
+             "readouts": [c.readout and c.readout.parameters for c in model.classes]}
+    exact = ("knots", "variances", "strength", "amount", "standard.middle", "standard.deviation")
     kept: dict[str, Any] = {k: v.astype(np.float32 if k.endswith(exact) else STORED) for k, v in arrays.items()}
     file = io.BytesIO()
     np.savez_compressed(file, **kept, words=np.array(json.dumps(words)))
@@ -106,12 +109,12 @@ def read(content: bytes) -> Library:
         words = json.loads(str(file["words"]))
         a = {k: file[k].astype(float) for k in file.files if k != "words"}
     classes = tuple(EffectClass(name, effect, shape, parameters, signed, a[f"{i}.knots"], a[f"{i}.table"],
-                                a[f"{i}.ways"], a[f"{i}.spread"], _readout(words["readouts"][i], i, a))
+                                a[f"{i}.axes"], a[f"{i}.variances"], _readout(words["readouts"][i], i, a))
                     for i, (name, effect, shape, parameters, signed) in enumerate(words["classes"]))
-    middle, spread = words["distance"]
+    middle, deviation = words["distance"]
     return Library(words["scenario"], words["vehicle"], Standard(a["standard.middle"], a["standard.deviation"]),
-                   a["projection"], a["middle"], Learned(classes, a["together"], a["nameless"]), (middle, spread),
-                   a["left"], a["more"], a["far"])
+                   a["projection"], a["middle"], LearnedModel(classes, a["interaction"], a["nameless"]),
+                   (middle, deviation), *(a[name] for name in SHARES))
 
 
 def _readout(parameters: Sequence[str] | None, place: int, arrays: Mapping[str, np.ndarray]) -> Readout | None:

@@ -69,5 +69,5 @@ def directions(shifts: Sequence[np.ndarray], each: int, first: np.ndarray, commo
 def _principal(shifts: np.ndarray, many: int, least: float = 8.0) -> np.ndarray:
     """The directions (features, many) in which shifts (n, features) lie, their lengths cut at `least`."""
     scaled = shifts / np.maximum(np.linalg.norm(shifts, axis=1, keepdims=True), least)
-    _, size, ways = np.linalg.svd(scaled, full_matrices=False)
-    return ways[:many][size[:many] > 1e-6 * size[0]].T
+    _, size, axes = np.linalg.svd(scaled, full_matrices=False)
+    return axes[:many][size[:many] > 1e-6 * size[0]].T
