@@ -80,9 +80,9 @@ def test_predicted_ratio_is_that_of_the_simulated_loop(nominal, effects):
         strengths, _, _ = identify.noise_strengths(controller.firmware(row, axis), row, axis, nominal[:, i])
         f, fine = command_spectra.frequencies(), command_spectra.fine_frequencies()
         expected = command_spectra.through_window(
-            strengths @ noise_spectra.spectra(controller.firmware(changed, axis), changed, axis, fine))
+            strengths @ noise_spectra.noise_power(controller.firmware(changed, axis), changed, axis, fine))
         expected /= command_spectra.through_window(
-            strengths @ noise_spectra.spectra(controller.firmware(row, axis), row, axis, fine))
+            strengths @ noise_spectra.noise_power(controller.firmware(row, axis), row, axis, fine))
         error = 10.0 * np.log10(seen[:, i] / nominal[:, i] / expected)
         assert np.abs(error).mean() < 0.6
         assert np.abs(error[f < 5.0]).max() < 1.5  # where 8 ms make the loop ring, its power grows by 10 dB
@@ -171,7 +171,7 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
 
     def seen(axis):
         c = controller.firmware(row, axis)
-        whole = [noise_spectra.spectra(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
+        whole = [noise_spectra.noise_power(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
         if axis != "thrust":
             whole += [turning.turning_per_command(c, row, axis, strengths, f),
                       loop_model.torque_per_command(row, axis, f)]

@@ -57,7 +57,7 @@ def test_commands_answer_a_turn_as_the_loop_says(spectra, axis, band):
     turned, commanded = (x[:, in_band(*band), axis] for x in spectra)
     row = prepare(VEHICLE, ())[0][0]
     said = disturbed(firmware_of(row), row, frequencies(AIR))
-    expected = (said.turned / said.commanded)[in_band(*band), axis]
+    expected = (said.measured / said.commanded)[in_band(*band), axis]
     found = (turned * commanded.conj()).sum(axis=0) / (np.abs(commanded) ** 2).sum(axis=0)
     off = np.log(found / expected)
     assert abs(np.mean(off.real)) < 0.15
@@ -73,6 +73,6 @@ def test_the_vehicle_turns_as_the_loop_says(spectra, axis, band):
     arms = row["rotor_y" if axis == 0 else "rotor_x"]
     torque = 4.0 * TIME_S * each ** 2 * (arms ** 2).sum() / row["inertia"][axis] ** 2 \
         / (1.0 + (2.0 * np.pi * TIME_S * f) ** 2)
-    said = torque * np.abs(disturbed(firmware_of(row), row, f).turned[:, axis]) ** 2
+    said = torque * np.abs(disturbed(firmware_of(row), row, f).measured[:, axis]) ** 2
     found = (np.abs(spectra[0][:, :, axis]) ** 2).mean(axis=0)
     assert found[in_band(*band)].sum() == pytest.approx(said[in_band(*band)].sum(), rel=0.25)

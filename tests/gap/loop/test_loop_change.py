@@ -105,7 +105,7 @@ def test_the_share_of_torque_changes_as_in_paired_flights(name, stepped, low, hi
 def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flights(name):
     """Once taken for the same in every loop: late sensors then left noise that no effect explained."""
     f = frequencies(AIR)
-    before, after = nominal().controller.torque_change(changed(name), f).left[:, :, 1]
+    before, after = nominal().controller.torque_change(changed(name), f).unexplained[:, :, 1]
     judged = (f > 2.0) & (f < 45.0)
     told, seen = (in_bands(x[judged]) for x in (after / before, beside(name) / beside(None)))
     np.testing.assert_allclose(told, seen, rtol=0.2)
@@ -113,7 +113,7 @@ def test_what_the_commands_do_not_tell_of_the_torque_changes_as_in_paired_flight
 
 def test_what_the_commands_do_not_tell_of_the_torque_is_noise_of_the_loop():
     f = frequencies(AIR)
-    told = nominal().controller.torque_change(changed("late sensors"), f).left[0, :, 1]
+    told = nominal().controller.torque_change(changed("late sensors"), f).unexplained[0, :, 1]
     judged = (f > 2.0) & (f < 25.0)
     told, seen = (in_bands(x[judged]) for x in (told, beside(None)))
     np.testing.assert_allclose(told, seen, rtol=0.25)
@@ -128,7 +128,8 @@ def test_noise_of_the_commands_is_laid_to_the_sensor_that_makes_it():
     every, gyro = (command_spectra.typical(np.abs(s) ** 2)[:, 1] for s in spectra)
     law, row = nominal().controller, prepare(vehicle, ())[0][0]
     roll = controller.firmware(row, "roll")
-    made = command_spectra.through_window(noise_spectra.spectra(roll, row, "roll", command_spectra.fine_frequencies()))
+    fine = command_spectra.fine_frequencies()
+    made = command_spectra.through_window(noise_spectra.noise_power(roll, row, "roll", fine))
     told = law.strengths[1][0] * made[0] / (law.strengths[1] @ made)
     f = command_spectra.frequencies()
     for low, high in ((2.0, 5.0), (5.0, 9.0), (9.0, 15.0), (15.0, 35.0)):

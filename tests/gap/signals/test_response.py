@@ -7,7 +7,7 @@ from airtouch.gap import measure
 from airtouch.gap.loop import controller, loop_model, turning
 from airtouch.gap.loop.disturbed import Disturbed, disturbed
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
-from airtouch.gap.signals.response import FIRST_BIN, response_of
+from airtouch.gap.signals.response import FIRST_BIN, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, blocks, frequencies, starts
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
@@ -33,15 +33,15 @@ def test_share_is_that_of_errors_in_variables():
     rng = np.random.default_rng(1)
     felt, logged = flights(rng, 1.0, 1.0)
     response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
-    np.testing.assert_allclose(response.steady.told.real, 1.0 / (1.0 + 1.0), atol=0.1)
-    np.testing.assert_allclose(response.steady.told.imag, 0.0, atol=0.1)
+    np.testing.assert_allclose(response.steady.coherent.real, 1.0 / (1.0 + 1.0), atol=0.1)
+    np.testing.assert_allclose(response.steady.coherent.imag, 0.0, atol=0.1)
 
 
 def test_a_share_no_surer_than_noise_is_not_believed():
     rng = np.random.default_rng(5)
     felt, logged = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
     response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
-    assert np.median(np.abs(response.steady.told)) == 0.0
+    assert np.median(np.abs(response.steady.coherent)) == 0.0
 
 
 def test_a_weaker_response_earns_nothing_on_nominal_flights():
@@ -59,19 +59,21 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
     quiet = response.quiet(w)
     assert quiet.all()
     assert size(weaker) < 0.6 * size(nominal)
-    before, after = (size(response.applied(quiet, y, nominal, x, x, x)) for x in (nominal, weaker))
+    residual = y - w
+    before, after = (size(response.with_residual(table(y - share * w), quiet, TorqueSpectra(y, residual, change)))
+                     for share, change in ((1.0, None), (0.5, y - 0.5 * w - residual)))
     assert after > before
 
 
 def test_means_stay_as_they_are():
     rng = np.random.default_rng(3)
     felt, logged = flights(rng, 1.0, 2.0)
-    left = [f - w for f, w in zip(felt, logged, strict=True)]
-    response = response_of(felt, left, NO_LOOP)
-    every = np.zeros((12, BINS, COUNT), complex)
-    every[:, :, TORQUE] = left[0]
-    out = response.applied(response.quiet(logged[0]), felt[0], every, every, every, every)
-    np.testing.assert_array_equal(out[:, :FIRST_BIN], every[:, :FIRST_BIN])
+    residuals = [f - w for f, w in zip(felt, logged, strict=True)]
+    response = response_of(felt, residuals, NO_LOOP)
+    spectra = np.zeros((12, BINS, COUNT), complex)
+    spectra[:, :, TORQUE] = residuals[0]
+    out = response.with_residual(spectra, response.quiet(logged[0]), TorqueSpectra(felt[0], residuals[0]))
+    np.testing.assert_array_equal(out[:, :FIRST_BIN], spectra[:, :FIRST_BIN])
 
 
 def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_own():
@@ -83,7 +85,7 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
         f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
     response = response_of(felt, [f - w for f, w in zip(felt, logged, strict=True)], NO_LOOP)
     np.testing.assert_array_equal(response.quiet(logged[0])[:, 0], np.arange(20) % 4 != 0)
-    np.testing.assert_allclose(np.abs(response.stepped.told), 1.0 / 3.0, atol=0.05)
+    np.testing.assert_allclose(np.abs(response.stepped.coherent), 1.0 / 3.0, atol=0.05)
     left = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: what errors in variables leave; the kick's own scatter
     np.testing.assert_allclose(np.median(response.stepped.weight), np.sqrt(left[0] / left[1]), rtol=0.1)
 
@@ -108,7 +110,7 @@ def test_more_inertia_leaves_more_of_an_outside_torque():
     axes = {}
     for name, active in (("usual", ()), ("heavy", (heavy,))):
         row = prepare(vehicle, active)[0][0]
-        axes[name] = np.abs(disturbed(controller.firmware_of(row), row, f).turned)
+        axes[name] = np.abs(disturbed(controller.firmware_of(row), row, f).measured)
     low = (f > 0.5) & (f < 3.0)
     assert (axes["heavy"][low, :2] > 1.5 * axes["usual"][low, :2]).all()
     assert np.all(axes["usual"][f > 40.0] > 0.9)

@@ -10,7 +10,7 @@ from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import COMMAND_ONLY, ClosedLoop
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
-from airtouch.gap.signals.response import FIRST_BIN, Response
+from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, frequencies, starts
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.gap.workspace import Workspace
@@ -105,8 +105,21 @@ def _applied(data: Data, response: Response, active: Sequence[Active], replayed:
     change = law.torque_change(active, frequencies(AIR))
     replays = (_replayed(data, s) for s in ((), through, beside))
     sets = zip(data.flights, data.quiet, data.turning, *replays, every, strict=True)
-    return [e if f.rates is None else {**e, AIR: response.applied(q, m, n[AIR], d[AIR], o[AIR], e[AIR], change)}
+    return [e if f.rates is None else {**e, AIR: response.with_residual(e[AIR], q, _torque(m, n, d, o), change)}
             for f, q, m, n, d, o, e in sets]
+
+
+def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[str, np.ndarray],
+            disturbed: dict[str, np.ndarray]) -> TorqueSpectra:
+    """Torque of a flight in the air, from spectra of the gap under three hypotheses.
+
+    nominal: without effects; driven: with those that act through the commands; disturbed: with outside torques as well.
+    """
+    residual = nominal[AIR][:, :, TORQUE]
+    by_command = None if driven[AIR] is nominal[AIR] else driven[AIR][:, :, TORQUE] - residual
+    disturbance = None if disturbed[AIR] is driven[AIR] else \
+        disturbed[AIR][:, :, TORQUE] - driven[AIR][:, :, TORQUE]
+    return TorqueSpectra(measured, residual, by_command, disturbance)
 
 
 def commanded(data: Data) -> list[np.ndarray]:

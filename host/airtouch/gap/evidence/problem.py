@@ -159,7 +159,7 @@ class Problem:
 
     def _noise(self, change: Change) -> np.ndarray:
         """By what a changed loop multiplies the torque's floor (own,), less 1, as far as it is noise of the loop."""
-        before, after = change.left
+        before, after = change.unexplained
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
         table[FIRST_BIN:, TORQUE] = (np.minimum(before / nominal, 1.0) * (after / before - 1.0))[FIRST_BIN:]

@@ -14,7 +14,7 @@ from scipy.signal import freqz
 from airtouch.gap.evidence.vibration_lines import lines
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop.controller import AXES
-from airtouch.gap.loop.noise_spectra import spectra
+from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies
 from airtouch.simulation.body import rigid_body
@@ -64,7 +64,7 @@ def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
     made = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
     response = data.study.response
     if response is not None and data.flights[i].rates is not None:
-        made[AIR][:, :, TORQUE] *= response.added(data.quiet[i], term.name in SENSED)
+        made[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.name in SENSED)
     return made
 
 
@@ -111,7 +111,7 @@ def _gyro_share(study: Any) -> np.ndarray:
         return share
     row = prepare(study.vehicle, study.calibration)[0][0]
     for i, axis in enumerate(AXES[1:]):
-        strength, made = loop.strengths[i + 1], spectra(loop.controllers[i + 1], row, axis, f)
+        strength, made = loop.strengths[i + 1], noise_power(loop.controllers[i + 1], row, axis, f)
         share[:, i] = strength[0] * made[0] / np.maximum(strength @ made, 1e-300)
     return share
 

@@ -1,6 +1,6 @@
 """Command view: the closed loop seen in the power spectra of the commands.
 
-What the controller is told is driven by noise that no log holds, so commands cannot be
+Noise that no log holds drives the controller, so commands cannot be
 predicted sample by sample; their spectra can. Flights declared nominal give the spectra
 of level flight and, through `loop_model`, the controller and its noise; a hypothesis
 then multiplies them by the ratio of the modelled spectra with and without it.
@@ -27,7 +27,7 @@ from airtouch.gap.loop.controller import AXES, Controller, firmware, firmware_of
 from airtouch.gap.loop.disturbed import logged_over_flown
 from airtouch.gap.loop.edge_response import EdgeFloor
 from airtouch.gap.loop.loop_model import excess_phase, of_loop, torque_per_command
-from airtouch.gap.loop.noise_spectra import spectra
+from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.loop.turning import (
     NO_STEP,
     Step,
@@ -41,25 +41,26 @@ from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-UNSTABLE = 30.0  #: nepers of power per rad of phase beyond stability
+UNSTABLE = 30.0  #: nepers of command power added per rad of phase beyond stability: a loop that could not fly
 #: fields of the plant that make the roll and pitch loops, not their noise
 LOOP_FIELDS = ("sensor_delay", "actuator_delay", "rate_gain", "attitude_gain", "position_gain", "motor_rise",
                "motor_fall", "inertia", "rate_scale", "gyro_lowpass", "gyro_bandwidth", "rotor_x", "rotor_y")
 SMOOTH = 2.0  #: bins: a block's window and `response.SMOOTH`
 PLANTS = 500  #: hypotheses whose plant is cached
 LOOPS = 1000  #: spectra of an axis that are cached, about 10 kB each
-MOST_CHANGE = 5.0  #: of the share of torque
+MOST_CHANGE = 5.0  #: largest ratio that effects may make of the share of torque; beyond, the model is not trusted
 #: effects that change the commands alone: replayed motor commands hold nothing of them
 COMMAND_ONLY = frozenset({"sensor_latency", "controller_gain", "range_step", "flow_scale"})
 
 
 class Change(NamedTuple):
-    """By what effects multiply the torque of a command, complex (bins, 1), and by what the share of the commanded
+    """How effects change the torque of a command and the rotation that it causes, effects over without.
 
-    torque that turns the vehicle, (2, bins, 3), which the loop model had at `before`: level, and stepped.
+    motors, complex (bins, 1): ratio of torque to command. share, complex (2, bins, 3): ratio of the share of the
+    commanded torque that turns the vehicle, level and stepped; before: that share in the loop model without effects.
     cut (bins, 3): size of that part of the change of stepped blocks which the limits of the command make.
-    logged (bins, 1): `disturbed.logged_over_flown`. left (2, bins, 3): power of the torque that the commands do not
-    tell, before and after, (rad/s^2)^2/Hz.
+    logged (bins, 1): `disturbed.logged_over_flown`. unexplained (2, bins, 3): power of the torque that the commands do
+    not explain, without and with effects, (rad/s^2)^2/Hz.
     """
 
     motors: np.ndarray
@@ -67,7 +68,7 @@ class Change(NamedTuple):
     before: np.ndarray
     cut: np.ndarray
     logged: np.ndarray
-    left: np.ndarray
+    unexplained: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -90,10 +91,10 @@ class ClosedLoop:
     steps: tuple[Step, Step] = (NO_STEP, NO_STEP)
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
 
-    def spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
+    def levelled_spectra(self, flight: Flight) -> tuple[np.ndarray, np.ndarray]:
         """First samples and spectra (blocks, bins, AXES) of a flight's commands as if flown as hard as nominal ones."""
-        first, every = block_spectra(flight, self.vehicle)
-        return first, every / np.sqrt(self.slopes.level(hardness_of(flight, first, LENGTH)))
+        first, spectra = block_spectra(flight, self.vehicle)
+        return first, spectra / np.sqrt(self.slopes.level(hardness_of(flight, first, LENGTH)))
 
     def ratio(self, active: Sequence[Active]) -> np.ndarray:
         """Expected power of the commands over that of nominal flights, (bins, AXES)."""
@@ -113,14 +114,14 @@ class ClosedLoop:
 
     def _change(self, row: Any, f: np.ndarray) -> Change:
         """`torque_change` of the effects that make a plant row."""
-        first = self._plain
-        after, before = self._shares(row, f), self._shares(first, f)
+        plain = self._plain
+        after, before = self._shares(row, f), self._shares(plain, f)
         share = after / before if self.by_firmware else np.ones_like(before)
-        motors = self._torque(row, AXES[1], f) / self._torque(first, AXES[1], f)
+        motors = self._torque(row, AXES[1], f) / self._torque(plain, AXES[1], f)
         share /= np.maximum(np.abs(share) / MOST_CHANGE, 1.0)
-        logged = logged_over_flown(firmware(first, AXES[1]), f)
+        logged = logged_over_flown(firmware(plain, AXES[1]), f)
         return Change(motors[:, None], share[:2], before[:2], np.abs(share[1] - share[2]), logged[:, None],
-                      np.stack([self._left(first, f), self._left(row, f)]))
+                      np.stack([self._unexplained(plain, f), self._unexplained(row, f)]))
 
     def changes_loop(self, active: Sequence[Active]) -> bool:
         """Whether effects change the roll and pitch loops."""
@@ -159,31 +160,31 @@ class ClosedLoop:
 
     def _share(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
         """`_shares` of axis i, complex (3, bins)."""
-        usual = self.steps[i - 1]
-        step = step_under(usual, controller, self._plain, row)
-        each = turnings_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, (NO_STEP, step, usual))
-        return np.stack(each) / self._torque(row, AXES[i], f)
+        nominal = self.steps[i - 1]
+        step = step_under(nominal, controller, self._plain, row)
+        ratios = turnings_per_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH, (NO_STEP, step, nominal))
+        return np.stack(ratios) / self._torque(row, AXES[i], f)
 
-    def _left(self, row: Any, f: np.ndarray) -> np.ndarray:
-        """Power (bins, 3) of the torque that the commands do not tell, (rad/s^2)^2/Hz; 1 in yaw, which has no model."""
-        left = np.ones((len(f), 3))
+    def _unexplained(self, row: Any, f: np.ndarray) -> np.ndarray:
+        """Power (bins, 3) of the torque that the commands do not explain, (rad/s^2)^2/Hz; 1 in yaw, without model."""
+        power = np.ones((len(f), 3))
         for i, axis in enumerate(AXES[1:] if self.by_firmware else ()):
-            left[:, i] = self._of_axis("left", row, axis, f, partial(self._left_of, row, i + 1, f))
-        return left
+            power[:, i] = self._of_axis("unexplained", row, axis, f, partial(self._unexplained_of, row, i + 1, f))
+        return power
 
-    def _left_of(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
-        """`_left` of axis i, (bins,)."""
+    def _unexplained_of(self, row: Any, i: int, f: np.ndarray, controller: Controller) -> np.ndarray:
+        """`_unexplained` of axis i, (bins,)."""
         return turning_beside_command(controller, row, AXES[i], self.strengths[i], f, SMOOTH)
 
-    def with_steps(self, told: np.ndarray, over: np.ndarray, f: np.ndarray) -> "ClosedLoop":
-        """The same with `steps`, from blocks of nominal flights in which a set-point stepped.
+    def with_steps(self, share: np.ndarray, excess: np.ndarray, f: np.ndarray) -> "ClosedLoop":
+        """The same loop with `steps`, from blocks of nominal flights in which a set-point stepped.
 
-        told (bins, 3): share of the commanded torque that turned the vehicle, 0 where it is not known; over (bins, 3):
+        share (bins, 3): of the commanded torque, what turned the vehicle, 0 where it is not known; excess (bins, 3):
         power of these torques over that of other blocks.
         """
         row = self._plain
-        roll, pitch = [step_of(firmware(row, axis), row, axis, self.strengths[i], f, over[:, i - 1],
-                               told[:, i - 1] * self._torque(row, axis, f))
+        roll, pitch = [step_of(firmware(row, axis), row, axis, self.strengths[i], f, excess[:, i - 1],
+                               share[:, i - 1] * self._torque(row, axis, f))
                        for i, axis in enumerate(AXES) if i] if self.by_firmware else self.steps
         return replace(self, steps=(roll, pitch))
 
@@ -206,15 +207,15 @@ class ClosedLoop:
 
     def commands_without(self, flight: Flight, active: Sequence[Active]) -> np.ndarray:
         """Commands (n, 4), N per motor, freed of what the effects did to their spectra."""
-        told = commands(flight, self.vehicle)
+        logged = commands(flight, self.vehicle)
         ratio = self.ratio(active)
         if np.all(ratio == 1.0):
-            return told
-        f = np.fft.rfftfreq(len(told), PERIOD_S)
-        spectrum = np.fft.rfft(told, axis=0)
+            return logged
+        f = np.fft.rfftfreq(len(logged), PERIOD_S)
+        spectrum = np.fft.rfft(logged, axis=0)
         for i in range(len(AXES)):
             spectrum[:, i] /= np.sqrt(np.interp(f, frequencies(), ratio[:, i]))
-        return np.fft.irfft(spectrum, len(told), axis=0)
+        return np.fft.irfft(spectrum, len(logged), axis=0)
 
     def _gyro_noise(self) -> np.ndarray:
         return np.maximum(self._plain["gyro_noise"], 1e-9)
@@ -225,19 +226,19 @@ class ClosedLoop:
 
     def _power(self, row: Any) -> np.ndarray:
         f = fine_frequencies()
-        made = []
+        by_axis = []
         for i, axis in enumerate(AXES):
-            sources, beyond = self._of_axis("power", row, axis, f, partial(_power_and_phase, row, axis, f))
+            powers, excess_rad = self._of_axis("power", row, axis, f, partial(_power_and_phase, row, axis, f))
             strengths = self.strengths[i].copy()
             if self.by_firmware and axis != "thrust":
                 strengths[0] *= (float(row["gyro_noise"][i - 1]) / self._gyro_noise()[i - 1]) ** 2
-            power = strengths @ sources
-            made.append(power * np.exp(UNSTABLE * beyond) if beyond > 0.0 else power)  # it would not fly
-        return np.stack([through_window(m) for m in made], axis=1)
+            power = strengths @ powers
+            by_axis.append(power * np.exp(UNSTABLE * excess_rad) if excess_rad > 0.0 else power)  # it would not fly
+        return np.stack([through_window(m) for m in by_axis], axis=1)
 
 
 def _power_and_phase(row: Any, axis: str, f: np.ndarray, controller: Controller) -> tuple[np.ndarray, float]:
-    return spectra(controller, row, axis, f), excess_phase(controller, row, axis)
+    return noise_power(controller, row, axis, f), excess_phase(controller, row, axis)
 
 
 def _same_loop(one: Any, two: Any) -> bool:

@@ -14,13 +14,13 @@ LENGTH = 128  #: samples of a block
 BAND_HZ = (1.5, 40.0)  #: below it set-points, which no log holds, move the commands
 HIGHPASS_HZ = 0.6
 MIX = 0.25 * np.array([[1, 1, 1, 1], [-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]], dtype=np.float64)
-EDGE_S = (0.1, 0.4)  #: left out before and after a change of phase at an edge, take-off or landing
+EDGE_S = (0.1, 0.4)  #: excluded before and after a change of phase at an edge, take-off or landing
 PLATFORM = KINDS.index("over platform")
 START_S = (0.8, 0.2)  #: the same around hover's end and beginning: set-points step before the speed shows it
 STEADY = (KINDS.index("hover"), KINDS.index("cruise"), PLATFORM)
 FINE, REACH = 4, 2  #: points a bin, bins a window's leakage is followed
 FREEDOM = 20.0  #: of the tails of a block's power
-STEPPED = 5.0  #: times the usual power of its flight: a block in which a set-point stepped
+STEPPED = 5.0  #: times the median power of its flight's blocks, above which a set-point stepped in a block
 SHAPES = 5  #: smooth shapes by which the floor's logarithm may differ from flight to flight
 SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers of power)
 
@@ -28,7 +28,7 @@ SPREAD = (0.10, 0.04)  #: their standard deviation: level, other shapes (nepers 
 @cache
 def frequencies() -> np.ndarray:
     """Hz of the bins that are judged; not to be changed."""
-    return _constant(_every()[_kept()])
+    return _constant(_all_frequencies()[_judged()])
 
 
 @cache
@@ -49,7 +49,7 @@ def through_window(power: np.ndarray) -> np.ndarray:
 
 @cache
 def _window() -> np.ndarray:
-    """What the points around a bin count in it."""
+    """Weights of the points around a bin in its power under a Hann window, (2 REACH FINE + 1,)."""
     x = np.arange(-REACH * FINE, REACH * FINE + 1) / FINE
     kernel = (0.5 * np.sinc(x) + 0.25 * (np.sinc(x - 1.0) + np.sinc(x + 1.0))) ** 2
     return _constant(kernel / kernel.sum())
@@ -60,16 +60,16 @@ def _constant(values: np.ndarray) -> np.ndarray:
     return values
 
 
-def _every() -> np.ndarray:
+def _all_frequencies() -> np.ndarray:
     return np.fft.rfftfreq(LENGTH, PERIOD_S)
 
 
-def _kept() -> np.ndarray:
-    return (_every() >= BAND_HZ[0]) & (_every() <= BAND_HZ[1])
+def _judged() -> np.ndarray:
+    return (_all_frequencies() >= BAND_HZ[0]) & (_all_frequencies() <= BAND_HZ[1])
 
 
 def highpassed(values: np.ndarray) -> np.ndarray:
-    """What changes faster than HIGHPASS_HZ, (n,) or (n, c)."""
+    """Values (n,) or (n, c) without what changes slower than HIGHPASS_HZ."""
     low = butter(2, HIGHPASS_HZ * 2.0 * PERIOD_S, output="sos")
     return values - sosfiltfilt(low, values, axis=0, padlen=min(60, len(values) - 2))
 
@@ -81,27 +81,27 @@ def commands(flight: Flight, vehicle: Vehicle) -> np.ndarray:
 
 def steady(flight: Flight) -> np.ndarray:
     """Samples (n,) of level flight away from edges, take-off and landing."""
-    inside = np.isin(flight.phase, STEADY) & (flight.usable | flight.bridged)
-    part = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
-    moves = np.where(flight.phase == KINDS.index("hover"), 0, 1)
-    for change, span in ((np.diff(part), EDGE_S), (np.diff(moves), START_S)):
+    level = np.isin(flight.phase, STEADY) & (flight.usable | flight.bridged)
+    over = np.where(np.isin(flight.phase, STEADY), flight.phase == PLATFORM, 2)
+    moving = np.where(flight.phase == KINDS.index("hover"), 0, 1)
+    for change, span in ((np.diff(over), EDGE_S), (np.diff(moving), START_S)):
         before, after = (int(x / PERIOD_S) for x in span)
         for k in np.flatnonzero(change) + 1:
-            inside[max(k - before, 0):k + after] = False
-    return inside
+            level[max(k - before, 0):k + after] = False
+    return level
 
 
 def starts(flight: Flight) -> np.ndarray:
     """First samples of the blocks, half overlapping."""
     bad = np.cumsum(np.concatenate([[0], ~steady(flight)]))
-    found, k = [], 0
+    out, k = [], 0
     while k + LENGTH <= len(flight):
         if bad[k + LENGTH] == bad[k]:
-            found.append(k)
+            out.append(k)
             k += LENGTH // 2
         else:
             k += 1
-    return np.array(found, int)
+    return np.array(out, int)
 
 
 def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
@@ -113,19 +113,19 @@ def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.nda
     first = starts(flight)
     window = np.hanning(LENGTH + 1)[:-1]
     scale = np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
-    told = commands(flight, vehicle)[:, :len(AXES)]
-    cut = told[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
-    made = np.fft.rfft(cut * window[:, None], axis=1)[:, _kept()] * scale
-    calm = _calm(np.abs(made) ** 2)
-    return first[calm], made[calm]
+    logged = commands(flight, vehicle)[:, :len(AXES)]
+    cut = logged[first[:, None] + np.arange(LENGTH)] if len(first) else np.zeros((0, LENGTH, len(AXES)))
+    spectra = np.fft.rfft(cut * window[:, None], axis=1)[:, _judged()] * scale
+    calm = _calm(np.abs(spectra) ** 2)
+    return first[calm], spectra[calm]
 
 
 def _calm(power: np.ndarray) -> np.ndarray:
     """Blocks (bool) of power (blocks, bins, AXES) like the flight's others: in the rest a set-point stepped."""
     if len(power) < 3:
         return np.ones(len(power), bool)
-    usual = np.median(power, axis=0) / np.log(2.0)
-    return ((power / np.maximum(usual, 1e-30)).mean(axis=1) < STEPPED).all(axis=1)
+    typical_power = np.median(power, axis=0) / np.log(2.0)
+    return ((power / np.maximum(typical_power, 1e-30)).mean(axis=1) < STEPPED).all(axis=1)
 
 
 def typical(power: np.ndarray) -> np.ndarray:
@@ -133,11 +133,11 @@ def typical(power: np.ndarray) -> np.ndarray:
 
     The mean would follow the few blocks in which a set-point stepped.
     """
-    found = power.mean(axis=0)
+    estimate = power.mean(axis=0)
     for _ in range(12):
-        e = power / found
-        found = found * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
-    return found
+        e = power / estimate
+        estimate = estimate * ((FREEDOM + 1.0) * e / (FREEDOM + e)).mean(axis=0)
+    return estimate
 
 
 def shapes() -> np.ndarray:

@@ -15,11 +15,11 @@ AXES = ("thrust", "roll", "pitch")
 
 @dataclass(frozen=True)
 class Controller:
-    """Gains of one axis. roll, pitch: rate -> command (gain, N per rad/s), angle -> rate (angle, 1/s),
+    """Gains of the controller of one axis.
 
-    velocity -> angle (velocity, rad per m/s). thrust: climb -> command (gain, N per m/s),
-    height -> climb (angle, 1/s). Integrals are shares of their gain per second, derivative
-    in s. period_s: of the controller; lowpass_hz: of its gyro, 0 for none.
+    roll, pitch: rate -> command (gain, N per rad/s), angle -> rate (angle, 1/s), velocity -> angle (velocity, rad per
+    m/s). thrust: climb -> command (gain, N per m/s), height -> climb (angle, 1/s). Integrals are shares of their gain
+    per second, derivative in s. period_s: of the controller; lowpass_hz: of its gyro, 0 for none.
     """
 
     gain: float

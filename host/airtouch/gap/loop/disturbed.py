@@ -20,10 +20,10 @@ from airtouch.simulation.firmware import settings
 class Disturbed(NamedTuple):
     """Roll, pitch and yaw, complex (bins, 3) each, for an outside angular acceleration of 1.
 
-    turned: the one that is measured; commanded: the one that a model makes of the logged commands.
+    measured: by the gyro; commanded: what a model makes of the logged commands.
     """
 
-    turned: np.ndarray
+    measured: np.ndarray
     commanded: np.ndarray
 
 
@@ -34,19 +34,20 @@ def disturbed(controllers: Sequence[Controller], row: Any, f: np.ndarray) -> Dis
     """
     f = np.maximum(f, 0.05)
     roll, pitch = (_loop(c, row, axis, f) for c, axis in zip(controllers[1:], AXES[1:], strict=True))
-    axes = [_answer(c, f, *loop) for c, loop in zip((controllers[1], controllers[2], controllers[1]),
+    axes = [_responses(c, f, *loop) for c, loop in zip((controllers[1], controllers[2], controllers[1]),
                                                    (roll, pitch, _yaw(controllers[1], row, f)), strict=True)]
     return Disturbed(*(np.stack(x, axis=1) for x in zip(*axes, strict=True)))
 
 
-def _answer(c: Controller, f: np.ndarray, plant: np.ndarray, whole: np.ndarray, logged: np.ndarray,
+def _responses(c: Controller, f: np.ndarray, plant: np.ndarray, whole: np.ndarray, logged: np.ndarray,
             ) -> tuple[np.ndarray, np.ndarray]:
-    """`Disturbed` of one axis (bins,). plant: command to rate; whole: measured rate to command; logged: to that of the
+    """The two responses of `Disturbed` of one axis, (bins,) each.
 
-    log, which the model holds over a sample of the log.
+    plant: command to rate; whole: measured rate to command; logged: measured rate to the command of the log, which the
+    model holds over a sample of the log.
     """
-    turned = 1.0 / (1.0 + plant * whole)
-    return turned, -plant * logged_over_flown(c, f) * logged * turned
+    sensitivity = 1.0 / (1.0 + plant * whole)
+    return sensitivity, -plant * logged_over_flown(c, f) * logged * sensitivity
 
 
 def logged_over_flown(c: Controller, f: np.ndarray) -> np.ndarray:
@@ -56,18 +57,20 @@ def logged_over_flown(c: Controller, f: np.ndarray) -> np.ndarray:
     two samples is compared with a difference of the measured rate.
     """
     f = np.maximum(f, 0.05)
-    held = np.sinc(f * PERIOD_S) * np.exp(-1j * np.pi * f * PERIOD_S) / fixed_of(c, f).hold
-    return held * np.cos(np.pi * f * PERIOD_S) / np.sinc(f * PERIOD_S)
+    over_hold = np.sinc(f * PERIOD_S) * np.exp(-1j * np.pi * f * PERIOD_S) / fixed_of(c, f).hold
+    return over_hold * np.cos(np.pi * f * PERIOD_S) / np.sinc(f * PERIOD_S)
 
 
 def _loop(c: Controller, row: Any, axis: str, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What `_answer` takes of roll or pitch."""
+    """Plant, whole controller and logged command of roll or pitch, as `_responses` takes them."""
     plant, rate, angle, velocity, whole = loop_parts(c, row, axis, f)
     return plant, whole, rate + kick_of(c, fixed_of(c, f)) * (angle + velocity)
 
 
 def _yaw(c: Controller, row: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same of the firmware's yaw: rate within angle, whose derivative steps when the estimator renews the angle.
+    """Plant, whole controller and logged command of the firmware's yaw: rate within angle, whose derivative steps.
+
+    It steps when the estimator renews the angle.
 
     c: of the roll loop, whose filters and periods it shares. A rotor's torque on yaw is its drag and what speeds it up.
     """

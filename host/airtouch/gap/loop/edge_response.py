@@ -1,7 +1,7 @@
 """What a flight does in the second after an edge passes under it: thrust, speed along its path, height.
 
 Effects of the height control and of the optical flow show there alone. Nominal flights
-give the usual response and how much it scatters; what an effect adds to it comes from
+give the mean response and its scatter; what an effect adds to it comes from
 the simulator, flown with and without the effect over a platform like the flight's.
 """
 
@@ -42,11 +42,15 @@ step = [{{ do = "wait", time_s = 0.5 }}, {{ do = "take-off", height_m = {height}
 
 @dataclass(frozen=True)
 class EdgeFloor:
-    """usual: response (COUNT,) of nominal flights by kind, `counts` edges each; whiten (COUNT, COUNT)."""
+    """What nominal flights do at edges, and its scatter.
+
+    nominal: mean response (COUNT,) by kind, from `counts` edges each; whiten (COUNT, COUNT): turns a deviation from it
+    into independent standard normal numbers.
+    """
 
     vehicle: Vehicle
     calibration: tuple[Active, ...]
-    usual: dict[str, np.ndarray]
+    nominal: dict[str, np.ndarray]
     counts: dict[str, int]
     whiten: np.ndarray
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
@@ -64,18 +68,18 @@ def edges_of(flight: Flight) -> list[Edge]:
 
 def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int) -> np.ndarray:
     """Thrust (N per motor), speed (m/s) and height (m) after sample `at`, less those before it, (COUNT,)."""
-    here = slice(at - BEFORE, at + AFTER)
-    thrust = vehicle.thrust(motion.held(log.stack(PWM)[here])).mean(axis=1)
+    window = slice(at - BEFORE, at + AFTER)
+    thrust = vehicle.thrust(motion.held(log.stack(PWM)[window])).mean(axis=1)
     if log.has(*VELOCITY[:2]):
-        speed = motion.held(log.stack(VELOCITY[:2])[here])
-        way = speed[:BEFORE].mean(axis=0)
-        speed = speed @ (way / max(float(np.hypot(*way)), 1e-6))
+        speed = motion.held(log.stack(VELOCITY[:2])[window])
+        heading = speed[:BEFORE].mean(axis=0)
+        speed = speed @ (heading / max(float(np.hypot(*heading)), 1e-6))
     else:
         speed = np.zeros(BEFORE + AFTER)
     if log.has(POSITION[2]):
-        height = motion.held(log[POSITION[2]][here])
+        height = motion.held(log[POSITION[2]][window])
     elif log.has("zrange_m"):
-        height = motion.held(log["zrange_m"][here])
+        height = motion.held(log["zrange_m"][window])
         step = np.diff(height, prepend=height[0])
         step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
         height = np.cumsum(step)
@@ -89,35 +93,35 @@ def response(log: FlightLog, vehicle: Vehicle, turn: np.ndarray | None, at: int)
     return np.concatenate(out)
 
 
-def floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
-    """Usual response and scatter of flights declared nominal; None where they cross no edge."""
-    found: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
+def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
+    """Mean response and scatter of flights declared nominal; None where they cross no edge."""
+    responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
     windows = []
     for f in flights:
         edges = edges_of(f)
         for e in edges:
-            found[e.kind].append(response(f.log, vehicle, f.turn, e.sample))
+            responses[e.kind].append(response(f.log, vehicle, f.turn, e.sample))
         level = np.isin(f.phase, (2, 3, 4))
         for at in range(BEFORE, len(f) - AFTER, 20):
             if level[at - BEFORE:at + AFTER].all() and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges):
                 windows.append(response(f.log, vehicle, f.turn, at))
-    if not all(found.values()) or len(windows) < LEAST_WINDOWS:
+    if not all(responses.values()) or len(windows) < LEAST_WINDOWS:
         return None
     scatter = np.array(windows) - np.mean(windows, axis=0)
     spread = np.cov(scatter.T)
     mixed = 0.7 * spread + 0.3 * np.diag(np.diag(spread)) + 1e-12 * np.eye(COUNT) * max(np.trace(spread), 1e-9)
-    usual = {k: np.mean(v, axis=0) for k, v in found.items()}
-    counts = {k: len(v) for k, v in found.items()}
-    left = np.array([x - usual[k] for k, v in found.items() if len(v) > 1 for x in v])
-    if len(left):
-        own = left.T @ left / max(sum(n - 1 for n in counts.values()), 1)
+    nominal = {k: np.mean(v, axis=0) for k, v in responses.items()}
+    counts = {k: len(v) for k, v in responses.items()}
+    deviations = np.array([x - nominal[k] for k, v in responses.items() if len(v) > 1 for x in v])
+    if len(deviations):
+        own = deviations.T @ deviations / max(sum(n - 1 for n in counts.values()), 1)
         mixed += np.diag(np.maximum(np.diag(own) - np.diag(spread), 0.0))
-    return EdgeFloor(vehicle, tuple(calibration), usual, counts, np.linalg.inv(np.linalg.cholesky(mixed)))
+    return EdgeFloor(vehicle, tuple(calibration), nominal, counts, np.linalg.inv(np.linalg.cholesky(mixed)))
 
 
 def whitened(floor: EdgeFloor, flight: Flight, edge: Edge) -> np.ndarray:
-    """Response of one edge less the usual one, in its scatter, (COUNT,)."""
-    raw = response(flight.log, floor.vehicle, flight.turn, edge.sample) - floor.usual[edge.kind]
+    """Response of one edge less the nominal one, whitened by its scatter, (COUNT,)."""
+    raw = response(flight.log, floor.vehicle, flight.turn, edge.sample) - floor.nominal[edge.kind]
     return floor.whiten @ raw / np.sqrt(1.0 + 1.0 / floor.counts[edge.kind])
 
 
@@ -130,9 +134,9 @@ def template(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> d
         term = terms(effect)[0]
         step = term.step(parameter)
         neutral = term.effect.scaled(term.effect.values(), 0.0)
-        moved = {**neutral, parameter: neutral[parameter] + step}
-        base = _flown(floor, place, ())
-        with_effect = _flown(floor, place, (Active(term.effect, moved),))
+        stepped = {**neutral, parameter: neutral[parameter] + step}
+        base = _simulated_responses(floor, place, ())
+        with_effect = _simulated_responses(floor, place, (Active(term.effect, stepped),))
         return {k: floor.whiten @ (with_effect[k] - base[k]) / np.sqrt(1.0 + 1.0 / floor.counts[k]) for k in KINDS}
 
     return floor.workspace.once("templates", (effect, parameter, place), make)
@@ -159,11 +163,11 @@ def _place(flight: Flight) -> tuple[float, float, float, float]:
         raise ValueError(f"{flight.name}: no edge in this flight")
     entry = next((e for e in edges if e.kind == "entry"), None)
     leave = next((e for e in edges if e.kind == "exit" and (entry is None or e.sample > entry.sample)), None)
-    one = entry or leave or edges[0]
-    high, low = max(one.height_before_m, one.height_after_m), min(one.height_before_m, one.height_after_m)
+    edge = entry or leave or edges[0]
+    high, low = max(edge.height_before_m, edge.height_after_m), min(edge.height_before_m, edge.height_after_m)
     speed = 0.3
     if flight.log.has(*VELOCITY[:2]):
-        v = motion.held(flight.log.stack(VELOCITY[:2])[one.sample - BEFORE:one.sample + BEFORE])
+        v = motion.held(flight.log.stack(VELOCITY[:2])[edge.sample - BEFORE:edge.sample + BEFORE])
         speed = float(np.hypot(*v.mean(axis=0)))
     seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else 2.5
     speed = float(np.clip(speed, 0.1, 0.9))
@@ -172,32 +176,32 @@ def _place(flight: Flight) -> tuple[float, float, float, float]:
 
 
 def calm(vehicle: Vehicle) -> Vehicle:
-    """The vehicle with sensors that hardly err: what an effect changes then stands out after an exit too,
+    """The vehicle with sensors that hardly err, so that an effect shows after an exit too.
 
-    which comes at another time with it. Some flow noise stays, as the firmware's estimator drops the smallest
-    corrections of its attitude.
+    The exit comes at another time with the effect. Some flow noise stays, as the firmware's estimator drops the
+    smallest corrections of its attitude.
     """
     return replace(vehicle, acc_noise_rms_mps2=0.0, gyro_noise_rms_radps=0.0, range_noise_rms_m=0.0,
                    range_drift_rms=0.0, flow_noise_mps=(0.02, 0.02), flow_noise_time_s=0.02)
 
 
-def _flown(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
+def _simulated_responses(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
            ) -> dict[str, np.ndarray]:
     """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; made once."""
     key = (place, tuple((a.effect.name, tuple(a.values.items())) for a in active))
-    return floor.workspace.once("flown", key, lambda: _simulated(floor, place, active))
+    return floor.workspace.once("flown", key, lambda: _simulate(floor, place, active))
 
 
-def _simulated(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
+def _simulate(floor: EdgeFloor, place: tuple[float, float, float, float], active: Sequence[Active],
                ) -> dict[str, np.ndarray]:
     height, low, speed, length = place
     text = _MISSION.format(length=length, centre=1.5 + 0.5 * length, top=max(height - low, 0.02), height=height,
                            way=1.5 + length + 1.5 * speed + 0.3, speed=speed)
     logs = [x for x in simulated(scenario.parse(text, "edge response"), 2, vehicle=calm(floor.vehicle),
                                  effects=[*floor.calibration, *active], workers=1) if isinstance(x, FlightLog)]
-    made: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
+    responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
     for log in logs:
         for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - low))):
             if BEFORE <= e.sample < len(log) - AFTER:
-                made[e.kind].append(response(log, floor.vehicle, None, e.sample))
-    return {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in made.items()}
+                responses[e.kind].append(response(log, floor.vehicle, None, e.sample))
+    return {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in responses.items()}

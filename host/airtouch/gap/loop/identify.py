@@ -1,4 +1,4 @@
-"""The closed loop of nominal flights: the firmware's controller or one found from the spectra, noise, floor."""
+"""The closed loop of nominal flights: the firmware's controller or one fitted to the spectra, noise, floor."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,8 +20,8 @@ from airtouch.gap.loop.command_spectra import (
     typical,
 )
 from airtouch.gap.loop.controller import AXES, Controller, firmware
-from airtouch.gap.loop.edge_response import floor_of
-from airtouch.gap.loop.noise_spectra import spectra
+from airtouch.gap.loop.edge_response import edge_floor_of
+from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -31,21 +31,22 @@ FEWEST = 6  #: blocks of nominal flights, for a command view
 
 def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> ClosedLoop | None:
     """Controller, noise and floor of flights declared nominal; None where they have too few blocks."""
-    made = [block_spectra(f, vehicle) for f in flights]
-    if sum(len(first) for first, _ in made) < FEWEST:
+    by_flight = [block_spectra(f, vehicle) for f in flights]
+    if sum(len(first) for first, _ in by_flight) < FEWEST:
         return None
-    hardness = np.concatenate([hardness_of(f, first, LENGTH) for f, (first, _) in zip(flights, made, strict=True)])
-    every = np.abs(np.concatenate([s for _, s in made])) ** 2
-    slopes = slopes_of(every, hardness, frequencies())
-    power = typical(every / slopes.level(hardness))
+    hardness = np.concatenate([hardness_of(f, first, LENGTH) for f, (first, _) in zip(flights, by_flight, strict=True)])
+    powers = np.abs(np.concatenate([s for _, s in by_flight])) ** 2
+    slopes = slopes_of(powers, hardness, frequencies())
+    power = typical(powers / slopes.level(hardness))
     row = prepare(vehicle, calibration)[0][0]
     documented = [noise_strengths(firmware(row, a), row, a, power[:, i]) for i, a in enumerate(AXES)]
-    found = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
-    weight = 0.5 * len(every)
-    by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in found) + 1.5 * len(AXES)
-    chosen = documented if by_firmware else found
-    loop = ClosedLoop(vehicle, tuple(calibration), tuple(c[2] for c in chosen), by_firmware,
-                tuple(c[0] for c in chosen), power, len(every), slopes, floor_of(flights, vehicle, calibration))
+    searched = [_search(row, a, power[:, i]) for i, a in enumerate(AXES)]
+    weight = 0.5 * len(powers)
+    by_firmware = weight * sum(d[1] for d in documented) < weight * sum(x[1] for x in searched) + 1.5 * len(AXES)
+    controllers = documented if by_firmware else searched
+    loop = ClosedLoop(vehicle, tuple(calibration), tuple(c[2] for c in controllers), by_firmware,
+                      tuple(c[0] for c in controllers), power, len(powers), slopes,
+                      edge_floor_of(flights, vehicle, calibration))
     model = loop.nominal_power()
     return replace(loop, floor=model * np.exp(gaussian_filter1d(np.log(power / model), 3.0, axis=0, mode="nearest")))
 
@@ -53,7 +54,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
 def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarray,
                     steps: int = 300) -> tuple[np.ndarray, float, Controller]:
     """Noise strengths of highest Whittle likelihood for a command's power, its negative a block, and the controller."""
-    shapes = through_window(spectra(controller, row, axis, fine_frequencies()))
+    shapes = through_window(noise_power(controller, row, axis, fine_frequencies()))
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
     a = np.full(len(shapes), 1.0 / len(shapes))
@@ -70,9 +71,9 @@ def noise_strengths(controller: Controller, row: Any, axis: str, power: np.ndarr
 
 
 def _search(row: Any, axis: str, power: np.ndarray) -> tuple[np.ndarray, float, Controller]:
-    """A cascade's gains found from the shape of the spectrum, near those that vehicles of its size have."""
-    usual = firmware(row, axis)
-    middle = np.log([usual.gain, usual.angle, max(usual.velocity, 1e-3)])
+    """Gains of a cascade fitted to the shape of the spectrum, near those that vehicles of its size have."""
+    known = firmware(row, axis)
+    middle = np.log([known.gain, known.angle, max(known.velocity, 1e-3)])
     spread = np.array([0.7, 0.4, 0.5])
     free = 2 if axis == "thrust" else 3
 

@@ -45,10 +45,10 @@ def mean_of_rotors(values: np.ndarray) -> float:
 def excess_phase(c: Controller, row: Any, axis: str) -> float:
     """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable."""
     loop = _open_loop(c, row, axis, CROSSING_HZ)
-    turned, size = np.unwrap(np.angle(loop)), np.abs(loop)
-    turned += -2.0 * np.pi * np.ceil(turned[0] / (2.0 * np.pi))
+    phase, size = np.unwrap(np.angle(loop)), np.abs(loop)
+    phase += -2.0 * np.pi * np.ceil(phase[0] / (2.0 * np.pi))
     last = np.flatnonzero(size > 1.0)
-    return float(-np.pi - turned[last[-1]]) if len(last) else -np.pi
+    return float(-np.pi - phase[last[-1]]) if len(last) else -np.pi
 
 
 def torque_per_command(row: Any, axis: str, f: np.ndarray, c: Controller | None = None) -> np.ndarray:
@@ -104,7 +104,7 @@ def sensed_late(c: Controller, row: Any, f: np.ndarray) -> np.ndarray:
 
 
 class Fixed(NamedTuple):
-    """What no gain and no vehicle changes in the loop at some frequencies: arrays of their shape, or 1.
+    """The parts of the loop that neither gains nor vehicle change, at some frequencies: arrays of their shape, or 1.
 
     s: 2 pi i f; s2: its square; hold: of the motors' commands; renewed: of the estimator's attitude, velocity and
     height, which hold between two predictions; integral, angle_integral, velocity_integral: 1 and the integral of the
@@ -128,6 +128,7 @@ class Fixed(NamedTuple):
 
 
 def fixed_of(c: Controller, f: np.ndarray) -> Fixed:
+    """The parts of a controller's loop that no gain changes, at frequencies f (Hz); cached."""
     return _fixed_at(c.period_s, c.hold_s, (c.lowpass_hz, c.chip_hz, c.acc_hz),
                      (c.integral, c.angle_integral, c.velocity_integral, c.derivative), f.shape, f.tobytes())
 
@@ -138,11 +139,11 @@ def _fixed_at(period: float, hold: float, filters: tuple[float, float, float],
     f = np.frombuffer(frequencies).reshape(shape)
     s = 2j * np.pi * f
     runs = round(hold / period) if filters[0] else 1
-    held = sum(np.exp(-s * k * period) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
+    renewed = sum(np.exp(-s * k * period) for k in range(runs)) / runs if runs > 1 else 1.0 + 0.0 * s
     lowpass, chip, acc = (butterworth(s, cutoff) for cutoff in filters)
     integral, angle_integral, velocity_integral = (1.0 + share / s for share in shares[:3])
     return Fixed(s, s ** 2, np.sinc(f * period) * np.exp(-0.5 * s * period),
-                 held * np.exp(-0.5 * s * IMU_S) if hold else held, integral, angle_integral, velocity_integral,
+                 renewed * np.exp(-0.5 * s * IMU_S) if hold else renewed, integral, angle_integral, velocity_integral,
                  integral + shares[3] * ((1.0 - np.exp(-s * period)) / period), (1.0 - np.exp(-s * OUTER_S)) / period,
                  lowpass, chip, acc)
 

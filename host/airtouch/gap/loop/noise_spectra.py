@@ -1,4 +1,4 @@
-"""What noise makes of the motor commands: power spectra of the modelled loop, aliases included."""
+"""The motor commands that noise makes: power spectra of the modelled loop, aliases included."""
 
 from functools import lru_cache
 from typing import Any
@@ -13,7 +13,7 @@ FOLDS = (0, 1, -1, 2, -2)  #: multiples of the log's rate that fall onto a frequ
 FLOW_HZ = 1.5  #: above it the estimated velocity's error falls by its square; errors of optical flow last 0.1 s
 
 
-def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
+def noise_power(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
     """Power (sources, bins) of the command for noise of unit power at each source, aliases included.
 
     Sources, roll and pitch: white rate; with the firmware's controller velocity flat up to FLOW_HZ and falling with
@@ -26,25 +26,26 @@ def spectra(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 
 
 def aliases_of(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
-    """What of the first source's noise folds into the log, noise to command, complex (folds, bins)."""
+    """Transfer of the first source's noise, folded into the log, to the command, complex (folds, bins)."""
     if axis == "thrust" or c.period_s >= 0.5 * PERIOD_S:
         return np.zeros((0, len(f)))
-    folded = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
-    fixed = fixed_of(c, folded)
-    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, folded)
+    beyond_hz = np.maximum(np.abs(f + np.array(FOLDS[1:])[:, None] / PERIOD_S), 0.05)
+    fixed = fixed_of(c, beyond_hz)
+    plant, rate, angle, velocity, whole = loop_parts(c, row, axis, beyond_hz)
     kick = kick_of(c, fixed)
-    turned = plant * -(rate + angle) / (1.0 + plant * whole)
-    return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * turned
+    rate_response = plant * -(rate + angle) / (1.0 + plant * whole)
+    return -(rate + kick * angle) - (rate + kick * (angle + velocity)) * rate_response
 
 
 def with_aliases(power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
-    for folded in aliases:
-        power[0] += np.abs(folded) ** 2
+    """Power (sources, bins) with that of the first source's aliases (folds, bins) added to it in place."""
+    for alias in aliases:
+        power[0] += np.abs(alias) ** 2
     return power
 
 
 def difference(f: np.ndarray) -> np.ndarray:
-    """Of two samples of the log over their distance in time, at the middle between them, 1/s."""
+    """Transfer (bins,) of a difference of two samples of the log over their distance in time, at its middle, 1/s."""
     return 2j * np.sin(np.pi * f * PERIOD_S) / PERIOD_S
 
 
@@ -64,7 +65,9 @@ def _sources(c: Controller, row: Any, axis: str, f: np.ndarray) -> np.ndarray:
 
 
 def transfers(c: Controller, row: Any, f: np.ndarray, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
-    """Of roll or pitch, (sources, bins) each: noise to logged command, noise to measured angular acceleration.
+    """Transfers of roll or pitch from noise to logged command and to measured angular acceleration.
+
+    Each is complex (sources, bins).
 
     parts: of the loop at f.
     """
@@ -77,13 +80,13 @@ def transfers(c: Controller, row: Any, f: np.ndarray, parts: Parts) -> tuple[np.
     wandering = [speed / (low ** 2 + FLOW_HZ ** 2)] if c.lowpass_hz else [tilt, speed / low]
     outer = [*wandering, speed / low ** 2, tilt / low ** 2]
     direct = np.array([-(rate + angle), *outer, 0.0 * s])
-    stepped = np.array([-(rate + kick * angle), *(kick * np.array(outer)), 0.0 * s])
-    turned = plant * direct * size  # rate
-    turned[-1] = size / s
-    logged = stepped - (rate + kick * (angle + velocity)) * turned
-    turned = s * turned
-    turned[0] += difference(f) / fixed.chip
-    return logged, turned
+    kicked = np.array([-(rate + kick * angle), *(kick * np.array(outer)), 0.0 * s])
+    rate_response = plant * direct * size  # rate
+    rate_response[-1] = size / s
+    logged = kicked - (rate + kick * (angle + velocity)) * rate_response
+    rate_response = s * rate_response
+    rate_response[0] += difference(f) / fixed.chip
+    return logged, rate_response
 
 
 def paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray]:
@@ -97,10 +100,10 @@ def paths(c: Controller, row: Any, fixed: Fixed) -> tuple[np.ndarray, np.ndarray
 
 
 def kick_of(c: Controller, fixed: Fixed, passed: float = 1.0) -> np.ndarray | float:
-    """Angle path in the log over that in the loop: set-points of the outer loop and attitudes come as steps, whose
+    """Ratio of the angle path in the log to that in the loop.
 
-    derivative is in the log only where its rows are of the sample on which they do (c.kicked). passed: share of that
-    sample's derivative that the command's limits leave.
+    Set-points of the outer loop and attitudes come as steps, whose derivative is in the log only where its rows are of
+    the sample on which they step (c.kicked). passed: share of that sample's derivative that the command's limits leave.
     """
     if not c.on_error:
         return 1.0

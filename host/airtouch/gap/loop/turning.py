@@ -1,4 +1,4 @@
-"""How far the vehicle turns for a logged command: of noise, and of steps of a set-point beside it."""
+"""Rotation per logged command, from noise and from steps of a set-point beside it."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -15,8 +15,9 @@ KICKS = np.linspace(1.0, 0.0, 21)  #: shares that are tried of a step's first sa
 STEP_HZ = (1.5, 14.0)  #: where they are fitted
 GYRO_FOLDS = tuple(k for k in range(-5, 5) if k)  #: multiples of the log's rate below half of the IMU's
 UNCUT = 0.95  #: share of a kick from which the command's limits do not cut it
-#: of the gains, with which what is left of a cut kick falls: so it does in ten pairs of simulated flights each with
-CUT_POWER = 0.6  #: attitude gains of 0.5 to 1.5 and rate gains of 0.8 to 1.3
+#: Power of the gains with which the uncut share of a kick falls, from ten pairs of simulated flights each with attitude
+#: gains of 0.5 to 1.5 and rate gains of 0.8 to 1.3.
+CUT_POWER = 0.6
 
 
 class Step(NamedTuple):
@@ -35,10 +36,10 @@ NO_STEP = Step()
 
 def turning_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray,
                         width: float = 0.0, step: Step = NO_STEP) -> np.ndarray:
-    """Angular acceleration (..., bins) to be expected for a logged command, rad/s^2 per N: S_yu / S_uu of roll or pitch
+    """Expected angular acceleration (..., bins) per logged command, rad/s^2 per N: S_yu / S_uu of roll or pitch.
 
-    for noise of given strengths (..., sources) and steps; width: of neighbouring bins of f that are
-    smoothed over, standard deviation.
+    strengths (..., sources): of the noise. width: of the Gaussian that smooths over neighbouring bins of f, standard
+    deviation.
     """
     return turnings_per_command(c, row, axis, strengths, f, width, [step])[0]
 
@@ -49,60 +50,60 @@ def turnings_per_command(c: Controller, row: Any, axis: str, strengths: np.ndarr
     at = np.maximum(f, 0.05)
     parts = loop_parts(c, row, axis, at)
     cross, power, _ = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
-    made = {NO_STEP: (cross, power)}
-    known = [s for s in dict.fromkeys(steps) if s.power]
-    for s, stepped in zip(known, _stepped(c, row, at, parts, [s.kick for s in known]), strict=True):
-        made[s] = _with_steps(cross, power, s.power, *stepped)
-    crosses, powers = (np.array(x) for x in zip(*made.values(), strict=True))
+    by_step = {NO_STEP: (cross, power)}
+    moving = [s for s in dict.fromkeys(steps) if s.power]
+    for s, stepped in zip(moving, _stepped(c, row, at, parts, [s.kick for s in moving]), strict=True):
+        by_step[s] = _with_steps(cross, power, s.power, *stepped)
+    crosses, powers = (np.array(x) for x in zip(*by_step.values(), strict=True))
     if width > 0.0:
         crosses, powers = (gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in (crosses, powers))
-    each = dict(zip(made, crosses / powers, strict=True))
-    return [each[s if s.power else NO_STEP] for s in steps]
+    ratios = dict(zip(by_step, crosses / powers, strict=True))
+    return [ratios[s if s.power else NO_STEP] for s in steps]
 
 
-def _with_steps(cross: np.ndarray, power: np.ndarray, amount: float, logged: np.ndarray, turned: np.ndarray,
+def _with_steps(cross: np.ndarray, power: np.ndarray, amount: float, logged: np.ndarray, acceleration: np.ndarray,
                 ) -> tuple[np.ndarray, np.ndarray]:
     """S_yu and S_uu of noise, `cross` and `power`, and of steps of a power `amount` beside it (`_stepped`)."""
-    return cross + amount * turned * logged.conj(), power + amount * np.abs(logged) ** 2
+    return cross + amount * acceleration * logged.conj(), power + amount * np.abs(logged) ** 2
 
 
 def turning_beside_command(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray,
                            width: float = 0.0) -> np.ndarray:
-    """Power (bins,) of the angular acceleration that a logged command does not tell, rad^2/s^4/Hz.
+    """Power (bins,) of the angular acceleration that a logged command does not explain, rad^2/s^4/Hz.
 
     S_yy - |S_yu|^2 / S_uu of roll or pitch for noise of given strengths (sources,); width: as for
     `turning_per_command`. It is the noise of the gyro, and what the loop does of noise between two rows of the log.
     """
     parts = loop_parts(c, row, axis, np.maximum(f, 0.05))
-    spectra = [strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts)]
+    smoothed = [strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts)]
     if width > 0.0:
-        spectra = [gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in spectra]
-    cross, power, turning = spectra
-    return turning - np.abs(cross) ** 2 / power
+        smoothed = [gaussian_filter1d(x, width, axis=-1, mode="nearest") for x in smoothed]
+    cross, power, total = smoothed
+    return total - np.abs(cross) ** 2 / power
 
 
 def _spectra_of_turning(c: Controller, row: Any, axis: str, f: np.ndarray, parts: Parts,
                         ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """S_yu, S_uu and S_yy (sources, bins) of the angular acceleration y and the logged command u for noise of unit
+    """S_yu, S_uu and S_yy (sources, bins) for noise of unit power.
 
-    power. parts: of the loop at f, no lower than 0.05 Hz.
+    y: angular acceleration; u: logged command. parts: of the loop at f, no lower than 0.05 Hz.
     """
-    logged, turned = transfers(c, row, np.maximum(f, 0.05), parts)
-    cross, aliases = turned * logged.conj(), aliases_of(c, row, axis, f)
-    turning = np.abs(turned) ** 2
+    logged, acceleration = transfers(c, row, np.maximum(f, 0.05), parts)
+    cross, aliases = acceleration * logged.conj(), aliases_of(c, row, axis, f)
+    turning = np.abs(acceleration) ** 2
     folds = GYRO_FOLDS if len(aliases) else ()
     for k in folds:  # noise of the gyro folds into the log
         turning[0] += np.abs(_sensed(c, f, k)) ** 2
-    for k, folded in zip(FOLDS[1:], aliases, strict=False):  # and into the command alike
-        cross[0] += _sensed(c, f, k) * np.where(f + k / PERIOD_S < 0.0, folded, folded.conj())
+    for k, alias in zip(FOLDS[1:], aliases, strict=False):  # and into the command alike
+        cross[0] += _sensed(c, f, k) * np.where(f + k / PERIOD_S < 0.0, alias, alias.conj())
     return cross, with_aliases(np.abs(logged) ** 2, aliases), turning
 
 
 def _sensed(c: Controller, f: np.ndarray, k: int) -> np.ndarray:
     """Angular acceleration (bins,) that the log shows at f for noise of the gyro k times the log's rate above it."""
-    beyond = f + k / PERIOD_S
-    sensed = 1.0 / butterworth(2j * np.pi * np.abs(beyond), c.chip_hz)
-    return difference(f) * np.where(beyond < 0.0, np.conj(sensed), sensed)
+    folded_hz = f + k / PERIOD_S
+    response = 1.0 / butterworth(2j * np.pi * np.abs(folded_hz), c.chip_hz)
+    return difference(f) * np.where(folded_hz < 0.0, np.conj(response), response)
 
 
 def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.ndarray, over: np.ndarray,
@@ -119,12 +120,12 @@ def step_of(c: Controller, row: Any, axis: str, strengths: np.ndarray, f: np.nda
     parts = loop_parts(c, row, axis, at)
     cross, noise, _ = (strengths @ x for x in _spectra_of_turning(c, row, axis, f, parts))
     best, least = NO_STEP, np.inf
-    for kick, (logged, turned) in zip(KICKS, _stepped(c, row, at, parts, KICKS), strict=True):
+    for kick, (logged, acceleration) in zip(KICKS, _stepped(c, row, at, parts, KICKS), strict=True):
         step = Step(float(np.median(((over - 1.0) * noise / np.abs(logged) ** 2)[known])), float(kick))
         if step.power > 0.0:
-            both, power = _with_steps(cross, noise, step.power, logged, turned)
-            made = both / power
-            misfit = float((np.abs(made[known] / turning[known] - 1.0) ** 2).sum())
+            cross_power, power = _with_steps(cross, noise, step.power, logged, acceleration)
+            ratio = cross_power / power
+            misfit = float((np.abs(ratio[known] / turning[known] - 1.0) ** 2).sum())
             if misfit < least:
                 best, least = step, misfit
     return best
@@ -144,11 +145,11 @@ def step_under(step: Step, c: Controller, before: Any, row: Any) -> Step:
     return step._replace(kick=float(np.clip(kick, 0.0, 1.0)))
 
 
-def _stepped(c: Controller, row: Any, f: np.ndarray, parts: Parts, passed: Iterable[float],
+def _stepped(c: Controller, row: Any, f: np.ndarray, parts: Parts, kicks: Iterable[float],
              ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Of roll or pitch, (bins,) each: steps of the velocity's set-point to logged command and angular acceleration.
+    """Transfers (bins,) of roll or pitch from steps of the velocity's set-point to logged command and acceleration.
 
-    parts: of the loop at f. passed: shares of the first sample's derivative that the command's limits leave, a pair
+    parts: of the loop at f. kicks: shares of the first sample's derivative that the command's limits leave, a pair
     for each; what follows is too small for them.
     """
     fixed = fixed_of(c, f)
@@ -156,7 +157,7 @@ def _stepped(c: Controller, row: Any, f: np.ndarray, parts: Parts, passed: Itera
     step = paths(c, row, fixed)[1] / np.maximum(f, 0.3)
     per_step = plant / (1.0 + plant * whole)
     answer = rate + kick_of(c, fixed) * (angle + velocity)
-    for share in passed:
-        acted = (fixed.integral + share * (fixed.whole - fixed.integral)) / fixed.whole if c.on_error else 1.0
-        turned = per_step * acted * step
-        yield kick_of(c, fixed, share) * step - answer * turned, fixed.s * turned
+    for kick in kicks:
+        effective = (fixed.integral + kick * (fixed.whole - fixed.integral)) / fixed.whole if c.on_error else 1.0
+        acceleration = per_step * effective * step
+        yield kick_of(c, fixed, kick) * step - answer * acceleration, fixed.s * acceleration

@@ -24,7 +24,7 @@ from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
 from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.lost_rows import bridging_power
-from airtouch.gap.signals.response import Response, response_of
+from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.gap.signatures.candidates import Term, terms
 from airtouch.gap.signatures.nominal_scatter import scatter_of
@@ -127,7 +127,7 @@ def _study(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[
     floor = floor_of(flights, left, first, made, least, lost)
     if law is not None and answer is not None and answer.stepped is not None:
         over = answer.stepped.power / np.maximum(answer.steady.power, 1e-30)
-        law = law.with_steps(answer.stepped.told, over, frequencies(AIR))
+        law = law.with_steps(answer.stepped.coherent, over, frequencies(AIR))
     return Study(vehicle, calibration, law, floor, answer, nominal=len(flights))
 
 
@@ -148,7 +148,7 @@ def _response(vehicle: Vehicle, calibration: tuple[Active, ...], law: closed_loo
         return None, nothing
     quiet = [answer.quiet(t - m[AIR][:, :, TORQUE]) for t, m in zip(turning, made, strict=True)]
     for q, measured, m in zip(quiet, turning, made, strict=True):
-        m[AIR] = answer.applied(q, measured, m[AIR], m[AIR], m[AIR], m[AIR])
+        m[AIR] = answer.with_residual(m[AIR], q, TorqueSpectra(measured, m[AIR][:, :, TORQUE]))
     return answer, quiet
 
 

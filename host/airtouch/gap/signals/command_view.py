@@ -42,12 +42,12 @@ class CommandView:
             for i, regime, chosen in pieces:
                 if regime != AIR or not chosen.any():
                     continue
-                begin, every = loop.spectra(flights[i])
+                begin, spectra = loop.levelled_spectra(flights[i])
                 middle = first[i][AIR] + AIR_LENGTH[AIR] // 2
                 nearest = np.argmin(np.abs(begin[:, None] + LENGTH // 2 - middle), axis=1) if len(begin) else []
-                mine = every[chosen[nearest]] if len(begin) else every
-                if len(mine):
-                    self.spectra.append(mine)
+                chosen_spectra = spectra[chosen[nearest]] if len(begin) else spectra
+                if len(chosen_spectra):
+                    self.spectra.append(chosen_spectra)
                     self.flights.append(i)
             self.shapes = shapes()
             self.spread = np.array([SPREAD[0]] + [SPREAD[1]] * (SHAPES - 1))

@@ -13,8 +13,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.motion import held
-from airtouch.gap.signals.channels import COUNT, angular_acceleration, residual
-from airtouch.gap.signals.response import Response
+from airtouch.gap.signals.channels import COUNT, TORQUE, angular_acceleration, residual
+from airtouch.gap.signals.response import Response, TorqueSpectra
 from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, squared
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
@@ -27,7 +27,8 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
                    quiet: np.ndarray | None = None, response: Response | None = None) -> np.ndarray:
     """Power (blocks, bins, COUNT), unit^2/Hz, that lost rows add to the blocks in the air that begin at `first`.
 
-    quiet (blocks, 3), response: as `response.applied` takes them; without, the torque is that of the logged commands.
+    quiet (blocks, 3), response: as `Response.with_residual` takes them; without, the torque is that of the logged
+    commands.
     Zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight.
     """
     total = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT))
@@ -47,8 +48,8 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
         room[room] = before[begin[room] + LENGTH[AIR]] == before[begin[room]]
         spectrum = blocks(change, begin[room], AIR)
         if response is not None and quiet is not None and flight.rates is not None and room.any():
-            spectrum = response.applied(quiet[room], blocks(turned, begin[room], AIR), spectrum, spectrum, spectrum,
-                                        spectrum)
+            torque = TorqueSpectra(blocks(turned, begin[room], AIR), spectrum[:, :, TORQUE])
+            spectrum = response.with_residual(spectrum, quiet[room], torque)
         total[room] += np.nan_to_num(squared(spectrum))
         count[room] += 1
     return gaussian_filter1d(total / np.maximum(count, 1)[:, None, None], WIDTH, axis=1, mode="nearest")
