@@ -42,7 +42,7 @@ GROUPS = {
         "reference/networks", "kernels/test_network.py", "kernels/test_stream.py")),
     "score": Group(("detector/evaluation/score.py",), ("detector/evaluation/test_score.py",)),
     "selection": Group(("gap/naming/select.py", "gap/naming/judging.py", "gap/naming/rounds.py"),
-                       ("gap/naming/test_select.py", "gap/naming/test_select_beside.py")),
+                       ("gap/naming/test_rounds.py", "gap/naming/test_select.py", "gap/naming/test_select_beside.py")),
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)

@@ -10,7 +10,7 @@ from airtouch.gap.answer.unexplained import fails
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
-from airtouch.gap.evidence.problem import GROUPS, Part
+from airtouch.gap.evidence.problem import GROUPS, Part, whole_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
@@ -138,11 +138,14 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     force = one.acceleration.copy()
     force[(t >= 9.0) & (t < 15.0), 2] -= 1.0
     pushed = [replace(one, acceleration=force, name="pushed")]
-    selection, _ = found(pushed, ("mass",), scattered(), ())
+    selection, data = found(pushed, ("mass",), scattered(), ())
     assert [s.name for s in selection.named] == ["downwash"]
     ((name, since, until),) = selection.steps[0].terms[0].gate
     assert name == "pushed" and since == pytest.approx(9.0, abs=1.3) and until == pytest.approx(15.0, abs=1.3)
     assert selection.steps[0].evidence > 2.0 * judging.FIRST_GAIN and "downwash" in selection.singles
+    alone = selection.singles["downwash"]
+    without_price = judge(data, whole_of(data), alone.terms) - judge(data, whole_of(data), (), True)
+    assert alone.choice > 0.0 and alone.gain == pytest.approx(without_price - alone.choice)
     assert selection.least["downwash"] == judging.LEAST_GAIN
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = found(pushed, ("mass",), study, without)

@@ -143,6 +143,16 @@ def test_two_weak_rotors_have_a_strength_each():
     assert second.strength[0] * unit == pytest.approx(0.002, rel=0.1), "its own, not the first one's"
 
 
+def test_a_few_lost_rows_beside_a_large_effect_are_not_named():
+    """What the log did to its own times has no cells in which it is held against the effect before it."""
+    lost = np.zeros(3000, bool)
+    lost[500:2900:200] = True
+    selection, data = found([replace(made(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
+                            scattered(exact=True))
+    assert 0.0 < selection.singles["packet_loss"].gain < judging.LEAST_GAIN
+    assert [s.name for s in selection.steps] == ["mass"]
+
+
 def test_what_the_log_has_lost_makes_no_model_less_exact():
     """Of a tenth that another effect must gain in recorded flights, lost rows count for nothing."""
     lost = np.random.default_rng(0).random(3000) < 0.1
@@ -155,8 +165,11 @@ def test_what_the_log_has_lost_makes_no_model_less_exact():
     assert said.count("imu_noise") >= 3, "told in every round"
 
 
-def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant():
-    selection, data = found([weak(louder=2.0, r2=0.002)], ("weak_motor", "imu_noise"))
+@pytest.mark.parametrize(("louder", "loss", "first"), [(2.0, 0.002, "imu_noise"), (2.0, 0.01, "weak_motor")])
+def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant(louder, loss, first):
+    """One of four rotors is chosen, whether it is the first effect found or the second."""
+    selection, data = found([weak(louder=louder, r2=loss)], ("weak_motor", "imu_noise"))
+    assert selection.steps[0].name == first
     added = {s.name: s.share for s in selection.named}
     assert set(added) == {"weak_motor", "imu_noise"}
     of = {t.name: t for t in selection.whole.terms}
