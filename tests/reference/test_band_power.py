@@ -68,11 +68,25 @@ def test_bins_of_the_band():
     assert band_bins(100.0, 200, (6.0, 8.0)) == (12, 16)
 
 
-@pytest.mark.parametrize("settings", [
-    dict(window=3), dict(window=2.5), dict(hop=0), dict(band_hz=(8.0, 6.0)), dict(band_hz=(0.0, 8.0)),
-    dict(band_hz=(6.0, 60.0)), dict(band_hz=(6.1, 6.2)), dict(sample_rate_hz=0.0), dict(band_hz=(np.nan, 8.0)),
+@pytest.mark.parametrize(("settings", "said"), [
+    (dict(window=3), "window"), (dict(window=2.5), "window"), (dict(hop=0), "hop .* not 0"),
+    (dict(band_hz=(8.0, 6.0)), "8 to 6 Hz"), (dict(band_hz=(0.0, 8.0)), "band"),
+    (dict(band_hz=(6.0, 60.0)), "6 to 60 Hz holds no bin of a 200-sample .* 100 Hz; bins are 0.5 Hz apart.* to 50 Hz"),
+    (dict(band_hz=(6.1, 6.2)), "6.1 to 6.2 Hz holds no bin"), (dict(sample_rate_hz=0.0), "rate .* not 0"),
+    (dict(band_hz=(np.nan, 8.0)), "band must be .* not .nan"), (dict(window=201, band_hz=(49.9, 50.1)), "49.9 to 50.1 Hz"),
 ])
-def test_settings_out_of_range_are_one_line(settings):
-    with pytest.raises(AirTouchError) as error:
+def test_settings_out_of_range_are_one_line_that_says_which(settings, said):
+    with pytest.raises(AirTouchError, match=f"band power: .*{said}") as error:
         band_power(np.zeros(300), **settings)
     assert "\n" not in str(error.value)
+
+
+def test_only_samples_in_one_column_or_in_several_are_taken():
+    with pytest.raises(AirTouchError, match=r"not \(1, 2, 3\)"):
+        band_power(np.zeros((1, 2, 3)))
+
+
+def test_of_a_sine_in_the_lowest_bin_the_offset_is_none_of_the_power():
+    """A Hann window spreads a sine of bin 1 onto bin 0: its basis has no mean of its own to lend to an offset."""
+    x = 5.0 + 0.0 * np.arange(64)
+    np.testing.assert_allclose(band_power(x, window=64, band_hz=(1.0, 2.0))[63:], 0.0, atol=1e-24)

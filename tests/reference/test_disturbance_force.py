@@ -44,6 +44,25 @@ def test_pwm_is_limited_to_what_a_motor_can_be_sent():
     assert total_thrust(beyond, VEHICLE) == pytest.approx(2 * VEHICLE.thrust(np.array(65535.0)))
 
 
+def test_a_motor_off_has_no_thrust_whatever_it_is_sent_below_zero():
+    assert total_thrust(np.full((1, 4), -500.0), VEHICLE) == pytest.approx(4 * VEHICLE.thrust(np.array(0.0)))
+
+
+def test_a_level_vehicle_pushes_straight_up_also_before_its_axis_is_known():
+    pwm = np.full((2, 4), 40000.0)
+    lift = 4.0 * float(VEHICLE.thrust(np.array(40000.0)))
+    still, sideways = np.zeros((2, 3)), np.array([[np.nan] * 3, [1.0, 0.0, 0.0]])
+    np.testing.assert_allclose(disturbance_force(still, pwm, VEHICLE), [[0.0, 0.0, -lift]] * 2)
+    np.testing.assert_allclose(disturbance_force(still, pwm, VEHICLE, thrust_axis=sideways),
+                               [[0.0, 0.0, -lift], [-lift, 0.0, 0.0]])
+    np.testing.assert_allclose(disturbance_force(still, pwm, VEHICLE, thrust_axis=3.0 * sideways[1]),
+                               [[-lift, 0.0, 0.0]] * 2, err_msg="no longer than a unit vector")
+
+
 def test_shapes_that_disagree_are_refused():
-    with pytest.raises(AirTouchError):
+    with pytest.raises(AirTouchError, match=r"not \(4, 3\) and \(5, 4\)"):
         disturbance_force(np.zeros((4, 3)), np.zeros((5, 4)), VEHICLE)
+    with pytest.raises(AirTouchError, match=r"not \(4, 3\)"):
+        total_thrust(np.zeros((4, 3)), VEHICLE)
+    with pytest.raises(AirTouchError, match=r"not \(4, 2\)"):
+        force_norm(np.zeros((4, 2)))

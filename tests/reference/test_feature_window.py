@@ -6,6 +6,7 @@ from scipy.stats import zscore
 
 from airtouch.errors import AirTouchError
 from airtouch.reference import streaming_z_score, z_score_window
+from airtouch.reference.feature_window import deviation_from_mean
 
 
 def test_per_window_is_scipys_zscore():
@@ -39,7 +40,22 @@ def test_streaming_starts_at_the_first_finite_sample():
 
 
 def test_bad_input_is_refused():
-    for call in (lambda: streaming_z_score(np.zeros((3, 1)), 0.0), lambda: z_score_window(np.zeros(4)),
-                 lambda: streaming_z_score(np.zeros(3), 5.0), lambda: z_score_window(np.zeros((0, 3)))):
-        with pytest.raises(AirTouchError):
+    for call, said in ((lambda: streaming_z_score(np.zeros((3, 1)), 0.0), "time constant must be positive, not 0.0"),
+                       (lambda: z_score_window(np.zeros(4)), r"not \(4,\)"),
+                       (lambda: streaming_z_score(np.zeros(3), 5.0), r"not \(3,\)"),
+                       (lambda: z_score_window(np.zeros((0, 3))), r"not \(0, 3\)"),
+                       (lambda: deviation_from_mean(np.zeros(3), 0.0), "time constant must be positive, not 0.0")):
+        with pytest.raises(AirTouchError, match=said):
             call()
+
+
+def test_of_two_samples_the_second_lies_by_its_weight_from_both():
+    """Weights w and 1, w = exp(-1 / tau), tau less than a sample.
+
+    Of 0 and d the last lies w / (1 + w) d from the mean, and the deviation is sqrt(w) / (1 + w) d.
+    """
+    tau = 0.5
+    weight = np.exp(-1.0 / tau)
+    np.testing.assert_allclose(streaming_z_score(np.array([[3.0], [10.0]]), tau)[:, 0], [0.0, np.sqrt(weight)])
+    np.testing.assert_allclose(deviation_from_mean(np.array([3.0, 10.0, 10.0]), tau),
+                               [0.0, 7.0, 10.0 - (10.0 + 3.0 * weight) / (1.0 + weight)])
