@@ -1,12 +1,14 @@
 """A round of the selection by hand: given what each hypothesis gains, which of them stands for its candidate."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence.fit import Fit
 from airtouch.gap.naming import rounds, select
-from airtouch.gap.naming.judging import LEAST_GAIN, PRICE
+from airtouch.gap.naming.judging import LEAST_GAIN, PRICE, covariance_among_all
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.candidates import every, free_of, terms
 from hovers import chosen
@@ -86,6 +88,46 @@ def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are(
     assert tried == [1, 2, 4]
 
 
+def test_each_half_is_looked_at_as_the_hypothesis_fitted_on_the_other_leaves_it(monkeypatch):
+    asked, seen = [], []
+    problem = SimpleNamespace(power=np.array([1.0]))
+
+    def left_over(data, part, fitted):
+        asked.append((part, fitted))
+        return problem, np.array([len(asked)]), np.array([1.0 + len(asked)])
+
+    def first(new):
+        return 0.0, np.zeros((2, 1)), np.ones((2, 1))
+
+    by_hand(monkeypatch, first=first)
+    monkeypatch.setattr(rounds, "left_over", left_over)
+    monkeypatch.setattr(rounds, "first_order", lambda screen, parts, left, power, new, held:
+                        (seen.append((left, power)), first(new))[1])
+    fits = tuple(Fit(CHOSEN.terms, np.array([k]), np.eye(1), np.zeros(0), 0.0) for k in range(2))
+    one, two = (replace(f, terms=(f"fit {k}",)) for k, f in enumerate(fits))
+    on = SimpleNamespace(**{**vars(BENCH), "parts": ("first half", "second half")})
+    rounds.round_of(on, chosen(["inertia"]), replace(CHOSEN, fits=(one, two)))
+    assert asked == [("first half", ("fit 1",)), ("second half", ("fit 0",))]
+    assert seen == [([1, 2], [1.0, 2.0])]
+
+
+@pytest.mark.parametrize(("gain", "fitted"), [(rounds.HOPELESS, False), (rounds.HOPELESS + 1e-6, True)])
+def test_a_random_effect_that_promises_little_is_looked_at_and_not_fitted(monkeypatch, gain, fitted):
+    by_hand(monkeypatch, lambda new: 9.0, lambda t: gain)
+    best = rounds.round_of(BENCH, chosen(["imu_noise"]), None)["imu_noise"]
+    assert best.full is fitted and best.gain == (9.0 if fitted else 0.0)
+
+
+def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
+    _, *alone = every()["controller_gain"]
+    (attitude,) = next(t for t in alone if t[0].free == ("attitude",))
+    expected = np.diag([np.inf, 2.0, np.inf, np.inf])
+    np.testing.assert_array_equal(covariance_among_all(attitude, np.array([[2.0]])), expected)
+    offset = terms("com_offset")[0]
+    both = np.array([[2.0, -1.0], [-1.0, 3.0]])
+    np.testing.assert_array_equal(covariance_among_all(offset, both), both)
+
+
 @pytest.mark.parametrize("explained", [True, False])
 def test_where_the_relations_of_signals_explain_the_flights_they_decide_alone(monkeypatch, explained):
     """They are asked with what was judged; what they leave unexplained is selected by the spectra."""
@@ -107,7 +149,7 @@ def test_where_the_relations_of_signals_explain_the_flights_they_decide_alone(mo
 
     monkeypatch.setattr(select, "trial_of", lambda data: BENCH)
     monkeypatch.setattr(select, "round_of", lambda on, some, before, say: alone)
-    monkeypatch.setattr(select, "inference_of", lambda data, names: inference)
+    monkeypatch.setattr(select, "inference_of", lambda data, names: inference if names == ["mass"] else None)
     monkeypatch.setattr(select, "related", related)
     monkeypatch.setattr(select, "_passing", spectra)
     if explained:

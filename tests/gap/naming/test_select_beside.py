@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from airtouch.gap.evidence.clock import loss
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
+from airtouch.gap.naming.select import nameless
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, flown, noise
-from hovers import DOWN, STIFF, chosen, found, made, own_gain, scattered
+from hovers import DOWN, FLOOR, STIFF, chosen, found, made, own_gain, scattered
 
 
 @pytest.fixture(scope="module")
@@ -151,6 +154,51 @@ def test_a_few_lost_rows_beside_a_large_effect_are_not_named():
                             scattered(exact=True))
     assert 0.0 < selection.singles["packet_loss"].gain < judging.LEAST_GAIN
     assert [s.name for s in selection.steps] == ["mass"]
+
+
+def test_a_faint_push_beside_many_lost_rows_is_not_named():
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    one = replace(made(2, (0.0, 0.0, -0.02)), lost=lost)
+    selection, _ = found([one], ("mass", "packet_loss"), scattered(exact=True))
+    assert 0.0 < selection.singles["mass"].gain < judging.LEAST_GAIN
+    assert [s.name for s in selection.steps] == ["packet_loss"]
+
+
+def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
+    data = Data(FLOOR, [replace(made(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
+    on, (term,) = judging.trial_of(data), every()["packet_loss"][0]
+    known = judging.crossed(on, "packet_loss", (term,), None, 0.0)
+    assert known.gain == pytest.approx(loss(data)[1]) and known.gain > 100.0
+    assert nameless(on, None) - nameless(on, known) == pytest.approx(known.gain)
+
+
+def test_beside_an_effect_of_six_parameters_another_pays_for_none_of_them():
+    selection, data = found([made(1, (0.4, -0.3, -DOWN), louder=2.0)], ("imu_bias", "imu_noise"))
+    added = {s.name: s.share for s in selection.named}
+    (bias,) = (t for t in selection.whole.terms if t.name == "imu_bias")
+    alone = own_gain(data, [bias]) - 5 * judging.PRICE
+    assert added["imu_noise"] == pytest.approx(selection.whole.gain - alone, abs=0.3)
+
+
+def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcomer_does_not_pay_for_that(flying):
+    """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
+    data = Data(flying, flown(1, 2, {"sensor_latency": {"delay": 0.008}}))
+    on = judging.trial_of(data)
+    late = judging.crossed(on, "sensor_latency", every()["sensor_latency"][0], None, 0.0)
+    both = judging.crossed(on, "imu_noise", every()["imu_noise"][0], late, 0.5)
+    sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
+    together = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
+    assert sure - unsure > 5.0 and late.beyond == 0.0 and both.choice == 0.5
+    assert both.beyond == pytest.approx(sure - unsure)
+    assert both.gain == pytest.approx(together + (sure - unsure) - 0.5)
+    assert judging.crossed(on, "vibration", every()["vibration"][0], both, 0.0).beyond == both.beyond, "paid once"
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_a_loop_that_changes_is_assumed_in_recorded_flights_alone(flying, simulated):
+    study = replace(flying, scatter=Scatter({}, 8.0, (0.0, 0.0), exact=simulated))
+    selection, _ = found(flown(1, 2, {"sensor_latency": {"delay": 0.008}}), ("sensor_latency",), study)
+    assert [s.name for s in selection.steps] == ["sensor_latency"] and selection.assumed is not simulated
 
 
 def test_what_the_log_has_lost_makes_no_model_less_exact():
