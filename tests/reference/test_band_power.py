@@ -73,7 +73,8 @@ def test_bins_of_the_band():
     (dict(band_hz=(8.0, 6.0)), "8 to 6 Hz"), (dict(band_hz=(0.0, 8.0)), "band"),
     (dict(band_hz=(6.0, 60.0)), "6 to 60 Hz holds no bin of a 200-sample .* 100 Hz; bins are 0.5 Hz .* to 50 Hz"),
     (dict(band_hz=(6.1, 6.2)), "6.1 to 6.2 Hz holds no bin"), (dict(sample_rate_hz=0.0), "rate .* not 0"),
-    (dict(band_hz=(np.nan, 8.0)), "band must be .* not .nan"), (dict(window=201, band_hz=(49.9, 50.1)), "49.9 to 50.1 Hz"),
+    (dict(band_hz=(np.nan, 8.0)), "band must be .* not .nan"),
+    (dict(window=201, band_hz=(49.9, 50.1)), "49.9 to 50.1 Hz"),
 ])
 def test_settings_out_of_range_are_one_line_that_says_which(settings, said):
     with pytest.raises(AirTouchError, match=f"band power: .*{said}") as error:

@@ -49,7 +49,7 @@ def test_an_effect_without_a_name_is_measured_and_called_unknown(study, sideways
     """Its coefficient is force per mass; with the effect in the registry it is named instead."""
     one = flown(1, 45, {"sideways": {"push": PUSH}})
     data = Data(study, one)
-    found = [coefficients(HalfResiduals(data, p, ()), 1, study.usual)[BASIS.index("vx")]
+    found = [coefficients(HalfResiduals(data, p, ()), 1, study.unnamed_floor)[BASIS.index("vx")]
              for p in halves(data)]
     np.testing.assert_allclose(found, PUSH / VEHICLE.mass_kg, rtol=0.35)
     assert gain_of(study, one) > 30.0

@@ -16,10 +16,10 @@ from gap_flights import flown
 def test_torque_that_answers_the_commands_otherwise_shows_in_simulated_flights(study):
     """Half as much inertia again; recorded flights' loop is not modelled as well."""
     data = Data(study, flown(1, 50, {"inertia": {"fraction": 0.5}}))
-    found = [coefficients(HalfResiduals(data, p, ()), 4, study.usual) for p in halves(data)]
+    found = [coefficients(HalfResiduals(data, p, ()), 4, study.unnamed_floor) for p in halves(data)]
     assert all(f[len(BASIS):].any() for f in found)
     among = np.arange(WIDEST) < len(BASIS)
-    recorded = [coefficients(HalfResiduals(data, p, ()), 4, study.usual, among)
+    recorded = [coefficients(HalfResiduals(data, p, ()), 4, study.unnamed_floor, among)
                 for p in halves(data)]
     assert not any(f[len(BASIS):].any() for f in recorded)
 

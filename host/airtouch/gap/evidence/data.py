@@ -17,8 +17,8 @@ from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SCALES_TORQUE = frozenset({"inertia"})  #: what only multiplies torque, and would make less of any trim
-KEPT, KEPT_SAMPLES = 96, 20000  #: hypotheses whose spectra are kept, of flights no longer than this together
+SCALES_TORQUE = frozenset({"inertia"})  #: effects that only multiply torque, and would shrink any trim
+KEPT, KEPT_SAMPLES = 96, 20000  #: hypotheses whose spectra are cached, for flights of at most so many samples together
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Study:
     controller: ClosedLoop | None
     floor: Floor
     response: Response | None = None
-    usual: Any = None  #: generic.Usual of the nominal flights
+    unnamed_floor: Any = None  #: unnamed.columns.UnnamedFloor of the nominal flights
     nominal: int = 0  #: how many there were
     scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
     relations: Any = None  #: relations.library.Library that holds for the nominal flights, if there is one
@@ -84,27 +84,27 @@ class Data:
 def spectra(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of the gap with effects in the model, by flight and regime; commands are the command view's.
 
-    Where nominal flights tell how the gyro follows the commands, torque is compared with what that leaves to expect.
+    Where nominal flights show how the gyro follows the commands, torque is compared with what that leads to expect.
     """
     response = data.study.response
     replayed = [a for a in active if a.effect.name not in COMMAND_ONLY]
     if response is None:
-        every = _replayed(data, replayed)
-        return _without_means(data, replayed, every) if data.slow else every
+        with_all = _replayed(data, replayed)
+        return _without_means(data, replayed, with_all) if data.slow else with_all
     return _cached(data, "applied", active, lambda: _applied(data, response, active, replayed))
 
 
 def _applied(data: Data, response: Response, active: Sequence[Active], replayed: Sequence[Active],
              ) -> list[dict[str, np.ndarray]]:
-    """Spectra of the gap, torque compared with what the commands leave to expect. replayed: without COMMAND_ONLY."""
-    every = _replayed(data, replayed)
+    """Spectra of the gap, torque compared with what the commands lead to expect. replayed: without COMMAND_ONLY."""
+    with_all = _replayed(data, replayed)
     law = data.study.controller
     assert law is not None  # a response is known of nominal flights, and so is their loop
-    beside = [a for a in replayed if not law.changes_loop((a,))]
-    through = [a for a in beside if a.effect.wrench is None]
+    not_loop = [a for a in replayed if not law.changes_loop((a,))]
+    by_command = [a for a in not_loop if a.effect.wrench is None]
     change = law.torque_change(active, frequencies(AIR))
-    replays = (_replayed(data, s) for s in ((), through, beside))
-    sets = zip(data.flights, data.quiet, data.turning, *replays, every, strict=True)
+    replays = (_replayed(data, s) for s in ((), by_command, not_loop))
+    sets = zip(data.flights, data.quiet, data.turning, *replays, with_all, strict=True)
     return [e if f.rates is None else {**e, AIR: response.with_residual(e[AIR], q, _torque(m, n, d, o), change)}
             for f, q, m, n, d, o, e in sets]
 
@@ -124,11 +124,12 @@ def _torque(measured: np.ndarray, nominal: dict[str, np.ndarray], driven: dict[s
 
 def commanded(data: Data) -> list[np.ndarray]:
     """Spectra (blocks, bins, 3) in the air of the torque that the model makes of the logged commands, by flight."""
-    return [turned - left[AIR][:, :, TORQUE] for turned, left in zip(data.turning, _replayed(data, ()), strict=True)]
+    return [measured - residual[AIR][:, :, TORQUE]
+            for measured, residual in zip(data.turning, _replayed(data, ()), strict=True)]
 
 
 def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]] | None:
-    """Power that the gap may have by flight and regime, as `spectra`, where effects change what is cut of a step.
+    """Power by flight and regime, as `spectra`, that the gap may have because effects change what is cut of a step.
 
     None where they change nothing of it.
     """
@@ -146,32 +147,32 @@ def step_doubt(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarra
     return out
 
 
-def _without_means(data: Data, active: Sequence[Active], every: list[dict[str, np.ndarray]],
+def _without_means(data: Data, active: Sequence[Active], with_all: list[dict[str, np.ndarray]],
                    ) -> list[dict[str, np.ndarray]]:
     """Spectra whose torque is that without effects that only scale it: a trim at rest is none of theirs."""
-    some = [a for a in active if a.effect.name not in SCALES_TORQUE]
-    if len(some) == len(active):
-        return every
-    out = [{r: v.copy() for r, v in e.items()} for e in every]
-    for mine, other in zip(out, _replayed(data, some), strict=True):
-        for r, v in mine.items():
-            v[:, :, TORQUE] = other[r][:, :, TORQUE]
+    unscaled = [a for a in active if a.effect.name not in SCALES_TORQUE]
+    if len(unscaled) == len(active):
+        return with_all
+    out = [{r: v.copy() for r, v in e.items()} for e in with_all]
+    for spectra_of_all, spectra_without in zip(out, _replayed(data, unscaled), strict=True):
+        for r, v in spectra_of_all.items():
+            v[:, :, TORQUE] = spectra_without[r][:, :, TORQUE]
     return out
 
 
 def _replayed(data: Data, active: Sequence[Active]) -> list[dict[str, np.ndarray]]:
     """Spectra of what was measured minus what the model makes of the logged commands."""
-    kept = data.workspace.once("ungated", (), lambda: [{} for _ in data.flights])
+    residuals = data.workspace.once("ungated", (), lambda: [{} for _ in data.flights])
     return _cached(data, "spectra", active, lambda: [
-        _replay(data, *each, active) for each in zip(data.flights, data.first, kept, strict=True)])
+        _replay(data, *each, active) for each in zip(data.flights, data.first, residuals, strict=True)])
 
 
-def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], kept: dict, active: Sequence[Active],
+def _replay(data: Data, flight: Flight, first: dict[str, np.ndarray], residuals: dict, active: Sequence[Active],
             ) -> dict[str, np.ndarray]:
-    rest = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), kept)
+    bridged = bridged_residual(flight, data.study.vehicle, (*data.study.calibration, *active), residuals)
     out = {}
     for r, begin in first.items():  # commands are the command view's: nothing is left of them here
-        replayed = blocks(rest[:, :COMMAND.start], begin, r)
+        replayed = blocks(bridged[:, :COMMAND.start], begin, r)
         out[r] = np.zeros((*replayed.shape[:2], COUNT), complex)
         out[r][:, :, :COMMAND.start] = replayed
     return out

@@ -19,18 +19,18 @@ from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term, random_of
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8
-ENOUGH = 0.02  #: gain of a step, nats, below which a fit ends
-STEP = 0.02  #: of a scaled parameter, over which slopes are taken
-TRIES = 5  #: of a step, each shorter than the one before (Levenberg-Marquardt)
-LEAST_DAMPING, CALMED = 0.01, 0.1  #: of a step after one that failed; by what a step that gains multiplies it
+ENOUGH = 0.02  #: nats that a step must gain for the fit to go on
+STEP = 0.02  #: change of a scaled parameter over which slopes are taken
+TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt)
+LEAST_DAMPING, CALMED = 0.01, 0.1  #: damping after a step that failed; factor on it after a step that gained
 FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew
-TURNS, SETTLED = 6, 0.3  #: in which mean and random effects are fitted, at most, and the gain below which no more are
-ROUNDS = 4  #: in which the strengths of several random effects are fitted in turn
+TURNS, SETTLED = 6, 0.3  #: most turns of fitting mean, then random effects; nats that a further turn must gain
+ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
-COMMAND_PRIOR = 1.5  #: the same, where only the commands tell
-CELL_GAIN = 1.0  #: log likelihood that effects gain in a cell which they move
-CLOSE = 0.05  #: to neutral, scaled, where a fit of a new effect begins: some have no slope at neutral itself
-GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: coarse, of scaled parameters
+COMMAND_PRIOR = 1.5  #: the same for effects that only the commands show
+CELL_GAIN = 1.0  #: nats from which effects count as gaining in a cell
+CLOSE = 0.05  #: scaled parameter at which the fit of a new effect begins: some have no slope at neutral itself
+GRID = (-2.0, -1.0, -0.5, 0.05, 0.5, 1.0, 1.5, 2.0, 3.0)  #: scaled parameters from which effects of the loop may start
 
 
 @dataclass
@@ -46,7 +46,7 @@ class Fit:
 
 def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None = None,
         prior: np.ndarray | float = PRIOR_UNITS) -> Fit:
-    """Fit effects to the blocks of `part`; what is left is judged elsewhere.
+    """Fit of effects to the blocks of `part`; the residual is judged elsewhere.
 
     prior: standard deviation of the scaled parameters of mean effects around neutral.
     """
@@ -56,34 +56,34 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     random = random_of(terms)
     x = _start(problem, mean, start)
     offsets, covariance = np.zeros(0), np.zeros((0, 0))
-    added: np.ndarray | float = 0.0
+    random_power: np.ndarray | float = 0.0
     if random and mean and start is not None:
-        added = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
-    before = -np.inf
+        random_power = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
+    last_level = -np.inf
     for _ in range(TURNS if random and mean else 1):
-        x, offsets, covariance, values = _gauss_newton(problem, mean, x, added, prior, bool(random))
-        told, cost = problem.commanded(_active(mean, x), bool(random))
-        added = _random_power(problem, random, values, _active(mean, x)) if random else 0.0
-        reached = problem.likelihood(values, added + told) - cost
-        if reached < before + SETTLED:
+        x, offsets, covariance, values = _gauss_newton(problem, mean, x, random_power, prior, bool(random))
+        command_power, cost = problem.commanded(_active(mean, x), bool(random))
+        random_power = _random_power(problem, random, values, _active(mean, x)) if random else 0.0
+        level = problem.likelihood(values, random_power + command_power) - cost
+        if level < last_level + SETTLED:
             break
-        before = reached
+        last_level = level
     if random:
-        told, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
-    fitted, place = [], 0
-    chosen = iter(random)
+        command_power, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
+    fitted, first = [], 0
+    random_fits = iter(random)
     for t in terms:
         if t.kind == MEAN:
-            fitted.append(t.fitted(x[place:place + len(t.free)]))
-            place += len(t.free)
+            fitted.append(t.fitted(x[first:first + len(t.free)]))
+            first += len(t.free)
         else:
-            fitted.append(next(chosen) if t.kind == SPECTRUM else t)
-    gained = problem.likelihood(values, added + told) - cost
+            fitted.append(next(random_fits) if t.kind == SPECTRUM else t)
+    gained = problem.likelihood(values, random_power + command_power) - cost
     return Fit(tuple(fitted), x, covariance, offsets, gained)
 
 
 def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> float:
-    """Log likelihood of blocks under effects fitted elsewhere; offsets between flights found anew.
+    """Log likelihood of blocks under effects fitted elsewhere; offsets between flights fitted anew.
 
     wide: the commands' floor is as uncertain as under random effects, though there are none.
     """
@@ -93,7 +93,7 @@ def judge(data: Data, part: Part, terms: Sequence[Term], wide: bool = False) -> 
 
 def left_over(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
               ) -> tuple[Problem, np.ndarray, np.ndarray]:
-    """The problem, what is left (flattened, offsets taken off) and the power that it should have. wide: see `judge`."""
+    """The problem, its residual (flattened, offsets subtracted) and the expected power of it. wide: see `judge`."""
     problem, values, added, _ = _explained(data, part, terms, wide)
     return problem, values, problem.power + added
 
@@ -108,11 +108,11 @@ def cell_gains(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
 
 def _explained(data: Data, part: Part, terms: Sequence[Term], wide: bool = False,
                ) -> tuple[Problem, np.ndarray, np.ndarray, float]:
-    """What effects leave of a part, the power that they add, and what offsets and the commands' floor cost."""
+    """Problem of a part, its residual under effects, the power that they add, and the cost of offsets and floor."""
     problem = problem_of(data, part)
     values, added, cost = problem.modelled(terms, wide)
-    left, penalty = without_offsets(problem, values, added)
-    return problem, left, added, penalty + cost
+    residual, penalty = without_offsets(problem, values, added)
+    return problem, residual, added, penalty + cost
 
 
 def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean: Sequence[Active]) -> np.ndarray:
@@ -125,30 +125,30 @@ def _random_power(problem: Problem, random: list[Term], values: np.ndarray, mean
 
 
 def _start(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> np.ndarray:
-    """What is known, else (NaN) close to neutral; effects of the loop, of which nothing is known, where their
+    """Scaled parameters (k,) at which a fit begins: the known ones, else (NaN) close to neutral.
 
-    likelihood is highest on a coarse grid.
+    Effects of the loop of which nothing is known begin where their likelihood is highest on a coarse grid.
     """
     size = sum(len(t.free) for t in mean)
     known = np.full(size, np.nan) if known is None else known
     x = np.where(np.isnan(known), CLOSE, known)
     place = 0
     for t in mean:
-        here = range(place, place + len(t.free))
+        own = range(place, place + len(t.free))
         place += len(t.free)
-        if t.name not in LOOP or not len(problem.commands) or not np.isnan(known[here]).all():
+        if t.name not in LOOP or not len(problem.commands) or not np.isnan(known[own]).all():
             continue
         low, high = limits(mean)
         best = -np.inf
         start = x.copy()
-        for i in here:
+        for i in own:
             for amount in GRID:
-                moved = start.copy()
-                moved[i] = np.clip(amount, low[i], high[i])
-                told, cost = problem.commanded(_active(mean, moved))
-                found = problem.likelihood(problem.base, told) - cost
-                if found > best:
-                    best, x = found, moved
+                trial = start.copy()
+                trial[i] = np.clip(amount, low[i], high[i])
+                command_power, cost = problem.commanded(_active(mean, trial))
+                level = problem.likelihood(problem.base, command_power) - cost
+                if level > best:
+                    best, x = level, trial
     return x
 
 
@@ -175,18 +175,18 @@ class Slopes:
         self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
 
     def take(self, x: np.ndarray, anew: bool = False) -> None:
-        """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or when told."""
+        """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or if anew."""
         anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
-        moved = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
-        if not len(moved):
+        stale = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
+        if not len(stale):
             return
         before = _active(self.mean, x)
         values, power = self.problem.values(before), self.problem.of_torque(before)
-        for i in moved:
+        for i in stale:
             step = STEP if x[i] + STEP <= self.high[i] else -STEP
-            there = x.copy()
-            there[i] += step
-            after = _active(self.mean, there)
+            shifted = x.copy()
+            shifted[i] += step
+            after = _active(self.mean, shifted)
             self.columns[i] = (self.problem.values(after) - values) / step
             self.rises[i] = self.problem.commands.rise(before, after) / step
             self.powers[i] = (self.problem.of_torque(after) - power) / step
@@ -197,7 +197,7 @@ class Slopes:
                  ) -> tuple[np.ndarray, np.ndarray]:
         """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
 
-        values, added: what is left, and the power over the floor, flattened.
+        values, added: the residual, and the power over the floor, flattened.
         """
         problem = self.problem
         gradient, information = problem.commands.slopes(_active(self.mean, x), np.array(self.rises), wide)
@@ -212,7 +212,7 @@ class Slopes:
 def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
                   spread: np.ndarray | float, wide: bool,
                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Scaled parameters, offsets, covariance of the parameters, and what is left.
+    """Scaled parameters, offsets, covariance of the parameters, and the residual.
 
     The slopes are kept from step to step, as most effects are close to linear; a step that gains nothing, or ends far
     from where they were taken, takes them anew.
@@ -230,13 +230,13 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
         return x, offsets, covariance, problem.base
 
     def at(x: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-        """What is left, the power over the floor, and minus the log of the posterior."""
+        """Residual, power over the floor, and minus the log of the posterior."""
         active = _active(mean, x)
         values = problem.values(active) if mean else problem.base.copy()
-        for amount, (here, column, _) in zip(offsets, problem.offsets, strict=True):
-            values[here] -= amount * column
-        commanded, price = problem.commanded(active, wide)
-        power = added + commanded
+        for amount, (index, column, _) in zip(offsets, problem.offsets, strict=True):
+            values[index] -= amount * column
+        command_power, price = problem.commanded(active, wide)
+        power = added + command_power
         return values, power, price + cost_of(problem, values, power, x, offsets, prior)
 
     values, power, cost = at(x, offsets)
@@ -264,38 +264,39 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
 
 
 def _strength(problem: Problem, random: Sequence[Term], which: int, values: np.ndarray,
-              told: np.ndarray) -> Term:
+              command_power: np.ndarray) -> Term:
     """A random effect's strength of highest likelihood, the others as they are."""
-    others = told + problem.random_power([t for i, t in enumerate(random) if i != which])
-    return strongest(problem, random[which], values, others)
+    other_power = command_power + problem.random_power([t for i, t in enumerate(random) if i != which])
+    return strongest(problem, random[which], values, other_power)
 
 
-def strongest(problem: Problem, term: Term, values: np.ndarray, others: np.ndarray) -> Term:
-    """A random effect with its strength of highest likelihood. values: what is left; others: power added by others."""
+def strongest(problem: Problem, term: Term, values: np.ndarray, other_power: np.ndarray) -> Term:
+    """A random effect with its strength of highest likelihood. values: the residual; other_power: that of others."""
     _, high = term.bounds()
     unit = problem.random_power([term.fitted(np.ones(len(term.free)))])
     if not unit.any():
         return term
 
-    likelihood = problem.likelihoods(squared(values), others, unit)
+    likelihood = problem.likelihoods(squared(values), other_power, unit)
 
     def cost(log_x: float) -> float:
+        """Minus the log likelihood at the logarithm of the scaled strength."""
         return -likelihood(random_effects.growth(term, np.exp(log_x)))
 
     top = np.log(min(float(high[0]), 1e3))
     grid = np.linspace(np.log(0.003), top, 40)
     costs = [cost(g) for g in grid]
     best = int(np.argmin(costs))
-    found = minimize_scalar(cost, bounds=(grid[max(best - 1, 0)], grid[min(best + 1, 39)]), method="bounded")
-    return term.fitted(np.full(len(term.free), float(np.exp(found.x))))
+    optimum = minimize_scalar(cost, bounds=(grid[max(best - 1, 0)], grid[min(best + 1, 39)]), method="bounded")
+    return term.fitted(np.full(len(term.free), float(np.exp(optimum.x))))
 
 
 def strength_variance(data: Data, part: Part, terms: Sequence[Term], term: Term) -> np.ndarray:
     """Variance (k, k) of a random effect's scaled strength, from the likelihood's curvature; inf for none."""
     x, step = term.scaled(term.values), 0.15
-    at = []
+    levels = []
     for amount in (-step, 0.0, step):
-        moved = term.fitted(x * np.exp(amount))
-        at.append(judge(data, part, [moved if t is term else t for t in terms]))
-    bend = (2.0 * at[1] - at[0] - at[2]) / step ** 2
-    return np.diag(x ** 2 / max(bend, 1e-6))
+        scaled_term = term.fitted(x * np.exp(amount))
+        levels.append(judge(data, part, [scaled_term if t is term else t for t in terms]))
+    curvature = (2.0 * levels[1] - levels[0] - levels[2]) / step ** 2
+    return np.diag(x ** 2 / max(curvature, 1e-6))

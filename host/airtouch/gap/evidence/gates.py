@@ -22,17 +22,17 @@ from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import Term, random_of
 from airtouch.logs.segments import KINDS
 
-MOST_STRETCHES = 4  #: of one flight
-WORST = 0.25  #: share of the blocks that are explained worst
-ROUNDS = 3
-LEAST_BLOCKS = 6  #: in the air
+MOST_STRETCHES = 4  #: stretches of one flight in which an effect may act
+WORST = 0.25  #: share of the blocks, those explained worst, that an effect is first fitted to
+ROUNDS = 3  #: rounds of fitting an effect and choosing its stretches
+LEAST_BLOCKS = 6  #: blocks in the air, below which no stretch is sought
 STEPS_S = (0.64, 0.32, 0.16, 0.08)  #: by which the ends of a stretch are moved
-PIECE_S = 0.16  #: of the force along the thrust, in which bursts are looked for
-LIVELY_HZ = 1.0  #: above which they are
+PIECE_S = 0.16  #: s, length of the pieces of the force along the thrust in which bursts are sought
+LIVELY_HZ = 1.0  #: frequency above which a burst shows
 LIVELY, DEGREES = 6.0, 3.0  #: power of a burst over the flight's median; independent values in a piece
-#: phases in which the floor's own air acts, and no two flights are alike: nothing is told to come and go there
+#: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
-WHOLE = 0.9  #: of a flight's blocks: what acts there does not come and go
+WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
 Gate = tuple[tuple[str, float, float], ...]
 
 
@@ -54,14 +54,15 @@ class Gated:
 def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     """Effects that may come and go, each in the stretches in which it explains most; not those that never act."""
     whole = whole_of(data)
-    nothing = _each(data, whole, ())
-    if len(nothing) < LEAST_BLOCKS:
+    without_effect = _each(data, whole, ())
+    if len(without_effect) < LEAST_BLOCKS:
         return {}
     level, bursts = {wide: judge(data, whole, (), wide) for wide in (False, True)}, _bursts(data)
     out = {}
     for name, variants in candidates.gated(without).items():
-        judged = [_judged(data, whole, name, terms, gate, cost, level, len(nothing)) for variant in variants
-                  for terms, gate, cost in (_by_blocks(data, whole, nothing, variant), (variant, *bursts)) if gate]
+        judged = [_judged(data, whole, name, terms, gate, cost, level, len(without_effect)) for variant in variants
+                  for terms, gate, cost in (_by_blocks(data, whole, without_effect, variant), (variant, *bursts))
+                  if gate]
         if judged:
             out[name] = max(judged, key=lambda j: j.gain)
     return out
@@ -147,8 +148,9 @@ def _at_the_ends(data: Data, problem: Problem) -> np.ndarray:
 def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Gate:
     """The gate with each end moved by less and less, as long as the likelihood grows."""
 
-    def level(tried: Gate) -> float:
-        return judge(data, whole, [replace(t, gate=tried) for t in terms])
+    def level(gate_tried: Gate) -> float:
+        """Log likelihood with the effect in a gate."""
+        return judge(data, whole, [replace(t, gate=gate_tried) for t in terms])
 
     best = level(gate)
     for step in STEPS_S:
@@ -158,9 +160,9 @@ def _sharpened(data: Data, whole: Part, terms: Sequence[Term], gate: Gate) -> Ga
                     flight, *ends = gate[i]
                     ends[end] += sign * step
                     begin, stop = ends
-                    tried = (*gate[:i], (flight, begin, stop), *gate[i + 1:])
-                    if begin < stop and (found := level(tried)) > best:
-                        best, gate = found, tried
+                    gate_tried = (*gate[:i], (flight, begin, stop), *gate[i + 1:])
+                    if begin < stop and (gain := level(gate_tried)) > best:
+                        best, gate = gain, gate_tried
     return gate
 
 
@@ -168,8 +170,8 @@ def _each(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
     """Log likelihood (b,) of every block in the air under a hypothesis."""
     problem, values, power = left_over(data, part, terms)
     each = problem.each(values, power - problem.power)
-    here = problem.block >= 0
-    return np.bincount(problem.block[here], each[here])
+    in_air = problem.block >= 0
+    return np.bincount(problem.block[in_air], each[in_air])
 
 
 def _part(whole: Part, on: np.ndarray) -> Part:
@@ -184,20 +186,20 @@ def _part(whole: Part, on: np.ndarray) -> Part:
 
 def _stretches(gain: np.ndarray, flight: np.ndarray, price: float) -> list[tuple[int, int]]:
     """Disjoint stretches (first, last) of blocks of one flight with the largest sums of gain, each over its price."""
-    left, out = gain.copy(), []
+    remaining, out = gain.copy(), []
     while len(out) < MOST_STRETCHES * (int(flight.max()) + 1):
-        best, found = price, None
+        best, stretch = price, None
         total, begin = 0.0, 0
-        for k in range(len(left)):
+        for k in range(len(remaining)):
             if total <= 0.0 or (k and flight[k] != flight[k - 1]):
                 total, begin = 0.0, k
-            total += left[k]
+            total += remaining[k]
             if total > best:
-                best, found = total, (begin, k)
-        if found is None:
+                best, stretch = total, (begin, k)
+        if stretch is None:
             break
-        out.append(found)
-        left[found[0]:found[1] + 1] = -np.inf
+        out.append(stretch)
+        remaining[stretch[0]:stretch[1] + 1] = -np.inf
     return sorted(out)
 
 

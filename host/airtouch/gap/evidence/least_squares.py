@@ -10,12 +10,14 @@ from airtouch.gap.signatures.candidates import Term
 
 
 def limits(mean: Sequence[Term]) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest scaled parameters (k,) of all terms."""
     pairs = [t.bounds() for t in mean]
     return (np.concatenate([p[0] for p in pairs]), np.concatenate([p[1] for p in pairs])) if pairs \
         else (np.zeros(0), np.zeros(0))
 
 
 def weights_of(problem: Problem, values: np.ndarray, added: np.ndarray | float) -> np.ndarray:
+    """Weights of a least-squares step whose optimum is that of the tailed likelihood, flattened; 0 where unknown."""
     power = problem.power + added
     e = squared(values) / power
     return OVERLAP_WEIGHT * (problem.freedom + 1.0) / (problem.tail + e) / power * problem.known
@@ -42,33 +44,34 @@ def bounded_step(columns: Sequence[np.ndarray] | np.ndarray, prior: np.ndarray, 
 
     damping: share of the normal matrix's diagonal that is added to it for the step.
     """
-    at, n = np.concatenate([x, offsets]), len(x)
-    free = np.ones(len(at), bool)
+    all_parameters, n = np.concatenate([x, offsets]), len(x)
+    free = np.ones(len(all_parameters), bool)
     covariance = np.zeros((n, n))
-    gradient, information = np.zeros(len(at)), np.zeros((len(at), len(at)))
+    gradient, information = np.zeros(len(all_parameters)), np.zeros((len(all_parameters), len(all_parameters)))
     gradient[:n], information[:n, :n] = commands
-    normal, slope = _normal(columns, prior, values, weights, at, (gradient, information))
+    normal, slope = _normal(columns, prior, values, weights, all_parameters, (gradient, information))
     for _ in range(n + 1):
-        change = np.zeros(len(at))
+        change = np.zeros(len(all_parameters))
         where = np.flatnonzero(free)
         if not len(where):
             break
         full = np.linalg.pinv(normal[np.ix_(where, where)], hermitian=True)
         damped = normal[np.ix_(where, where)] + damping * np.diag(np.diag(normal)[where])
         change[where] = np.linalg.solve(damped, slope[where]) if damping else full @ slope[where]
-        stuck = np.zeros(len(at), bool)
+        stuck = np.zeros(len(all_parameters), bool)
         stuck[:n] = free[:n] & (((x <= low) & (change[:n] < 0.0)) | ((x >= high) & (change[:n] > 0.0)))
         if not stuck.any():
-            inside = where[where < n]
+            free_parameters = where[where < n]
             covariance = np.diag(1.0 / np.maximum(np.diag(normal)[:n], 1e-300))  # of those at a bound: all else known
-            covariance[np.ix_(inside, inside)] = full[:len(inside), :len(inside)]
+            covariance[np.ix_(free_parameters, free_parameters)] = full[:len(free_parameters), :len(free_parameters)]
             break
         free &= ~stuck
     return change, covariance
 
 
 def cost_of(problem: Problem, values: np.ndarray, added: np.ndarray | float, x: np.ndarray,
-          offsets: np.ndarray, prior: np.ndarray) -> float:
+            offsets: np.ndarray, prior: np.ndarray) -> float:
+    """Minus the log of the posterior of a residual, of parameters x and of offsets, both with a Gaussian prior."""
     return -problem.likelihood(values, added) + 0.5 * float(((np.concatenate([x, offsets]) / prior) ** 2).sum())
 
 
@@ -78,13 +81,14 @@ def without_offsets(problem: Problem, values: np.ndarray, added: np.ndarray | fl
     An offset is that of one channel of one flight, so each is found alone, in two steps of weighted ridge regression.
     """
     power, residual, cost = problem.power + added, values.copy(), 0.0
-    for here, column, spread in problem.offsets:
-        amount, most = 0.0, OVERLAP_WEIGHT * (problem.freedom[here] + 1.0) * problem.known[here] / power[here]
+    for index, column, spread in problem.offsets:
+        amount = 0.0
+        largest_weight = OVERLAP_WEIGHT * (problem.freedom[index] + 1.0) * problem.known[index] / power[index]
         for _ in range(2):
-            weights = most / (problem.tail[here] + squared(residual[here]) / power[here])
+            weights = largest_weight / (problem.tail[index] + squared(residual[index]) / power[index])
             normal = 2.0 * float(weights @ squared(column)) + 1.0 / spread ** 2
-            slope = 2.0 * float(np.vdot(column, weights * residual[here]).real) - amount / spread ** 2
+            slope = 2.0 * float(np.vdot(column, weights * residual[index]).real) - amount / spread ** 2
             amount += slope / normal
-            residual[here] = values[here] - amount * column
+            residual[index] = values[index] - amount * column
         cost += 0.5 * (amount / spread) ** 2
     return residual, cost

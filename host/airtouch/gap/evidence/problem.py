@@ -27,11 +27,11 @@ from airtouch.simulation.effects import Active
 
 OFFSETS = 6  #: channels (force, torque) whose mean may differ from flight to flight
 LOOP = frozenset({"sensor_latency", "controller_gain"})  #: effects that only the loop's spectra show
-DOUBT = 0.25  #: of a change of the torque by effects that change the loop: the loop model is no better
-BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
+DOUBT = 0.25  #: relative error of the loop model in a change of the torque by effects that change the loop
+BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: edges of the bands of a cell
 REST_VIEW, COMMAND_VIEW = 1, 2  #: thousands of a group's number: on the ground, of the commands
 GROUPS = 3000  #: numbers that `Problem.groups` gives are below it
-FREEDOM = 12.0  #: of the Student-like tail at most
+FREEDOM = 12.0  #: most degrees of freedom of the Student-like tail
 
 
 @dataclass(frozen=True)
@@ -122,14 +122,14 @@ class Problem:
 
     def values(self, active: Sequence[Active]) -> np.ndarray:
         """Spectra with effects in the model, flattened."""
-        seen = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
-        own = self._gather(spectra(self.data, seen)) if seen else self.base[:self.own]
-        moved = self.commands.moved([a for a in active if not a.gate])
-        return np.where(self.known, self.with_commands(own, moved), 0.0)
+        replayed = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP]
+        replay_values = self._gather(spectra(self.data, replayed)) if replayed else self.base[:self.own]
+        command_values = self.commands.moved([a for a in active if not a.gate])
+        return np.where(self.known, self.with_commands(replay_values, command_values), 0.0)
 
-    def with_commands(self, own: np.ndarray, told: np.ndarray | float = 0.0) -> np.ndarray:
-        """Elements of the replay view, then one value or one each for those of the commands."""
-        return np.concatenate([own, np.broadcast_to(told, len(self.commands))])
+    def with_commands(self, own: np.ndarray, of_commands: np.ndarray | float = 0.0) -> np.ndarray:
+        """Elements of the replay view, followed by one value, or one each, for those of the commands."""
+        return np.concatenate([own, np.broadcast_to(of_commands, len(self.commands))])
 
     def commanded(self, active: Sequence[Active], wide: bool = False) -> tuple[np.ndarray, float]:
         """Power that a hypothesis adds to the commands' floor, flattened, and its cost. `wide`: CommandView."""
@@ -140,13 +140,13 @@ class Problem:
         """A hypothesis: spectra that its mean effects leave, the power that it adds, and what its floor costs."""
         random = random_of(terms)
         mean = [t.active() for t in terms if t.kind == MEAN]
-        told, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
-        return self.values(mean), self.random_power(random) + told, cost
+        command_power, cost = self.commanded([*mean, *(t.active() for t in random)], wide or bool(random))
+        return self.values(mean), self.random_power(random) + command_power, cost
 
     def of_torque(self, active: Sequence[Active]) -> np.ndarray:
-        """Power (own,) that effects of the loop add to the floor of the torque: what another loop makes of noise, less
+        """Power (own,) that effects of the loop add to the floor of the torque.
 
-        what this one does, and what the loop model may be wrong by.
+        It is the power that the changed loop makes of noise, less the present one's, and the loop model's error.
         """
         law = self.data.study.controller
         loop = [a for a in active if a.effect.name not in COMMAND_ONLY or a.effect.name in LOOP] if law else []
@@ -158,7 +158,7 @@ class Problem:
         return doubt + self.noise * self._noise(law.torque_change(loop, frequencies(AIR)))
 
     def _noise(self, change: Change) -> np.ndarray:
-        """By what a changed loop multiplies the torque's floor (own,), less 1, as far as it is noise of the loop."""
+        """Factor (own,) of a changed loop on the torque's floor, less 1, as far as the floor is noise of the loop."""
         before, after = change.unexplained
         table = np.zeros((len(before), COUNT))
         nominal = self.data.study.floor.power[AIR][:, TORQUE]
@@ -186,16 +186,16 @@ class Problem:
 
     def _constants(self) -> list[tuple[np.ndarray, float]]:
         columns = []
-        tell = self.data.study.floor.offset
+        spread = self.data.study.floor.offset
         for i, flight in enumerate(self.data.flights):
             for c in range(OFFSETS):
-                if tell[c] <= 0.0:
+                if spread[c] <= 0.0:
                     continue
                 ones = np.zeros((len(flight), COUNT))
                 ones[~flight.on_ground, c] = 1.0
-                made = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
+                unit = [{r: blocks(ones, f[r], r) if j == i else np.zeros_like(self.data.base[j][r])
                          for r in f} for j, f in enumerate(self.data.first)]
-                columns.append((self.with_commands(self._gather(made)), float(tell[c])))
+                columns.append((self.with_commands(self._gather(unit)), float(spread[c])))
         return columns
 
     def random_power(self, terms: Sequence[Term]) -> np.ndarray:
@@ -206,7 +206,7 @@ class Problem:
         return total
 
     def likelihood(self, values: np.ndarray, added: np.ndarray | float = 0.0) -> float:
-        """Log likelihood of what is left, over nothing in particular; only differences mean something."""
+        """Log likelihood of a residual; only differences mean something."""
         return self.likelihood_of(squared(values), added)
 
     def likelihood_of(self, size: np.ndarray, added: np.ndarray | float = 0.0) -> float:
@@ -214,9 +214,9 @@ class Problem:
         return float(self._each(size, added).sum())
 
     def power_slopes(self, values: np.ndarray, added: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Slope (own,) of the log likelihood against the expected power of each value of the replay view, and its
+        """Slope and expected curvature (own,) of the log likelihood against the expected power of each value.
 
-        expected curvature.
+        Values are those of the replay view.
         """
         own = slice(self.own)
         power = self.power[own] + added[own]
@@ -229,14 +229,15 @@ class Problem:
         return self._each(squared(values), added)
 
     def likelihoods(self, size: np.ndarray, others: np.ndarray, unit: np.ndarray) -> Callable[[float], float]:
-        """`likelihood_of` of others + x * unit as a function of x: only what changes with x is worked out anew."""
+        """`likelihood_of` of others + x * unit as a function of x: only what changes with x is computed anew."""
         each = self._each(size, others)
         own = np.flatnonzero((unit != 0.0) & self.known)
         floor, tail, falls = self.power[own], self.tail[own], self._falls[own]
-        some, beside, moved = size[own], others[own], unit[own]
+        own_size, own_others, own_unit = size[own], others[own], unit[own]
 
         def at(x: float) -> float:
-            each[own] = _each(some, floor + (beside + x * moved), tail, falls)
+            """Log likelihood at x."""
+            each[own] = _each(own_size, floor + (own_others + x * own_unit), tail, falls)
             return float(each.sum())
 
         return at

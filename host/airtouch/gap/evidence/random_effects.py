@@ -1,4 +1,4 @@
-"""Spectra that random effects add to the gap, for a flight as it was flown.
+"""Power spectra that random effects add to the gap of a flight.
 
 White noise of the IMU and the rotors' lines in closed form; random forces by running the
 effect itself on the flight's signals with several seeds.
@@ -21,7 +21,7 @@ from airtouch.simulation.body import rigid_body
 from airtouch.simulation.flight import prepare
 from airtouch.simulation.sensors import filters
 
-SEEDS = 4
+SEEDS = 4  #: runs of a random effect from which its power is estimated
 LEAST_PASSED = 0.1  #: power that a mean of two samples keeps, below which it is not divided by
 SENSED = ("imu_noise", "vibration")  #: effects that no loop fights: they act on the IMU
 
@@ -54,18 +54,19 @@ def _covered(data: Any, i: int, regime: str, gate: Sequence[tuple[str, float, fl
     acts = inside(gate, data.flights[i]).astype(float)
     length, first = LENGTH[regime], data.first[i][regime]
     weight = np.hanning(length + 1)[:-1] ** 2
-    cut = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
-    return (cut @ weight / weight.sum())[:, None, None]
+    windows = acts[first[:, None] + np.arange(length)] if len(first) else np.zeros((0, length))
+    return (windows @ weight / weight.sum())[:, None, None]
 
 
 def _unit_power(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
+    """PSD (blocks, bins, COUNT) by regime that a random effect of unit strength adds to flight i."""
     shape = {r: (len(v), *data.base[i][r].shape[1:]) for r, v in data.first[i].items()}
     maker = {"imu_noise": _imu_noise, "motor_noise": _motor_noise, "vibration": _vibration}.get(term.name)
-    made = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
+    power_by_regime = _by_running(data, i, term) if maker is None else maker(data, i, term, shape)
     response = data.study.response
     if response is not None and data.flights[i].rates is not None:
-        made[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.name in SENSED)
-    return made
+        power_by_regime[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.name in SENSED)
+    return power_by_regime
 
 
 def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarray]:
@@ -75,17 +76,17 @@ def _imu_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarra
     out = {}
     for r in shape:
         f = frequencies(r)
-        made = np.zeros((len(f), COUNT))
-        made[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
+        white = np.zeros((len(f), COUNT))
+        white[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
         if data.flights[i].rates is not None:
             gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
-            made[:, TORQUE] = _difference(r)[:, None] * gyro
-            made[:, RATE] = gyro
+            white[:, TORQUE] = _difference(r)[:, None] * gyro
+            white[:, RATE] = gyro
             if r == AIR and r in data.study.floor.power:
                 floor = np.nan_to_num(data.study.floor.power[r][:, TORQUE])
-                beyond = _gyro_share(data.study) * np.maximum(floor - made[:, TORQUE], 0.0)
-                made[:, TORQUE] = np.minimum(made[:, TORQUE], floor) + beyond  # part of it the commands foretell
-        out[r] = np.broadcast_to(extra * made, shape[r]).copy()
+                beyond = _gyro_share(data.study) * np.maximum(floor - white[:, TORQUE], 0.0)
+                white[:, TORQUE] = np.minimum(white[:, TORQUE], floor) + beyond  # part of it the commands foretell
+        out[r] = np.broadcast_to(extra * white, shape[r]).copy()
     return out
 
 
@@ -111,8 +112,8 @@ def _gyro_share(study: Any) -> np.ndarray:
         return share
     row = prepare(study.vehicle, study.calibration)[0][0]
     for i, axis in enumerate(AXES[1:]):
-        strength, made = loop.strengths[i + 1], noise_power(loop.controllers[i + 1], row, axis, f)
-        share[:, i] = strength[0] * made[0] / np.maximum(strength @ made, 1e-300)
+        strength, powers = loop.strengths[i + 1], noise_power(loop.controllers[i + 1], row, axis, f)
+        share[:, i] = strength[0] * powers[0] / np.maximum(strength @ powers, 1e-300)
     return share
 
 
@@ -138,14 +139,14 @@ def _motor_noise(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndar
         density = 4.0 * tau / (1.0 + (2.0 * np.pi * tau * aliases) ** 2)
         folded = np.repeat(density.sum(axis=0)[:, None], 4, axis=1)
         folded[:, 1:] = (density * np.sinc(aliases * PERIOD_S) ** 2).sum(axis=0)[:, None]  # the gyro's differences
-        made = np.zeros(shape[r])
+        power_of_blocks = np.zeros(shape[r])
         for b, first in enumerate(data.first[i][r]):
             size = (thrust[first:first + 256] ** 2).mean(axis=0)
             strength = rms ** 2 * (arms ** 2 @ size)
-            made[b, :, 2:6] = folded * strength
+            power_of_blocks[b, :, 2:6] = folded * strength
         if r != "air":
-            made[:] = 0.0
-        out[r] = made
+            power_of_blocks[:] = 0.0
+        out[r] = power_of_blocks
     return out
 
 
@@ -162,27 +163,27 @@ def _vibration(data: Any, i: int, term: Any, shape: dict) -> dict[str, np.ndarra
 
 
 def _over_a_sample() -> np.ndarray:
-    """Power (bins,) of the gyro's differences, which are means over a sample, over that of means of two samples,
+    """Power (bins,) of the gyro's differences over that of means of two samples, as `channels.residual` takes them.
 
-    as `channels.residual` takes them; near 50 Hz, where the latter have none, no more than LEAST_PASSED allows.
+    A difference is a mean over a sample. Near 50 Hz, where means of two samples pass nothing, LEAST_PASSED limits it.
     """
     turns = frequencies(AIR) * PERIOD_S
     return np.sinc(turns) ** 2 / np.maximum(np.cos(np.pi * turns) ** 2, LEAST_PASSED)
 
 
 def _by_running(data: Any, i: int, term: Any) -> dict[str, np.ndarray]:
-    """The effect run on the flight's own signals with several seeds: one shape of the spectrum a channel,
+    """Power by regime of an effect that is run on the flight's own signals with several seeds.
 
-    at the strength that it has in each block.
+    A channel has one shape of the spectrum, at the strength of each block.
     """
     flight: Flight = data.flights[i]
     study = data.study
     runs = [residual(flight, study.vehicle, (*study.calibration, term.active()), seed=seed + 1)
             for seed in range(SEEDS)]
-    middle = np.mean(runs, axis=0)
+    mean = np.mean(runs, axis=0)
     out = {}
     for r, first in data.first[i].items():
-        changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - middle)) for run in runs]
+        changes = [np.where((flight.phase == GROUND)[:, None], 0.0, np.nan_to_num(run - mean)) for run in runs]
         total = np.sum([np.abs(blocks(change, first, r)) ** 2 / (SEEDS - 1) for change in changes], axis=0)
         if not len(total):
             out[r] = np.zeros(data.base[i][r].shape)

@@ -34,9 +34,10 @@ FREEDOM = 12.0  #: of the tails of a block's power, as in `problem`
 
 @dataclass(frozen=True)
 class Lines:
-    """power: for each flight (blocks, bins), PSD of an accelerometer axis, lines of 1 m/s^2 together in hover;
+    """The lines of some flights, together 1 m/s^2 in hover.
 
-    shift: bins from the place that the vehicle's thrust over speed squared gives; spread_hz.
+    power: PSD (blocks, bins) of an accelerometer axis, for each flight; shift: bins from the place that the vehicle's
+    thrust over speed squared gives; spread_hz: of the single rotors' lines around it.
     """
 
     power: list[np.ndarray]
@@ -45,8 +46,8 @@ class Lines:
 
 
 def lines(data: Any) -> Lines:
-    """The lines of the flights of `data` (`data.Data`), worked out once."""
-    return data.workspace.once("lines", (), lambda: _found(data))
+    """The lines of the flights of `data` (`data.Data`); computed once."""
+    return data.workspace.once("lines", (), lambda: _search(data))
 
 
 def two_sided(speed: np.ndarray, hover: float, first: np.ndarray) -> np.ndarray:
@@ -80,34 +81,34 @@ def folded(power: np.ndarray, shift: int = 0) -> np.ndarray:
 
 
 def speeds(flight: Flight, study: Any) -> np.ndarray:
-    """Rotor speeds (n, 4), rad/s: logged ones, or the mean of what the commands give with each rotor's trim."""
+    """Rotor speeds (n, 4), rad/s: logged ones, or those of the mean command with each rotor's trim."""
     if flight.log.has(*RPM):
         return np.nan_to_num(flight.log.stack(RPM)) * np.pi / 30.0
-    told = replay.run(flight.log, study.vehicle, study.calibration, period_s=PERIOD_S,
+    replayed = replay.run(flight.log, study.vehicle, study.calibration, period_s=PERIOD_S,
                       signals=flight.signals.copy(), pwm=flight.pwm).rotor_speed
-    common = told.mean(axis=1, keepdims=True)
-    return common + (told - common)[flight.phase != GROUND].mean(axis=0)
+    common = replayed.mean(axis=1, keepdims=True)
+    return common + (replayed - common)[flight.phase != GROUND].mean(axis=0)
 
 
-def _found(data: Any) -> Lines:
+def _search(data: Any) -> Lines:
     study = data.study
     hover = hover_speed(prepare(study.vehicle, study.calibration)[0])
     each = [two_sided(speeds(f, study), hover, s[AIR]) for f, s in zip(data.flights, data.first, strict=True)]
     known = all(f.log.has(*RPM) for f in data.flights) or study.vehicle.thrust_per_speed2 > 0.0
     turns = hover / (2.0 * np.pi)
     reach = int(min(np.ceil(KNOWN_SPEED * turns * PERIOD_S * BINS), BINS // 2)) if known else BINS // 2
-    seen = _Seen(data, each)
-    if not len(seen.share):
+    sample = _Sample(data, each)
+    if not len(sample.share):
         return Lines([folded(widened(z, 0.0)) for z in each], 0, 0.0)
-    wide, some = SPREADS_HZ[1], range(-reach, reach + 1, 2)
-    rough = max(some, key=lambda s: seen.gain(wide, s))
-    near = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
-    spread, shift = max(near, key=lambda x: seen.gain(*x))
+    wide, shifts = SPREADS_HZ[1], range(-reach, reach + 1, 2)
+    rough = max(shifts, key=lambda s: sample.gain(wide, s))
+    fine_grid = [(h, s) for h in SPREADS_HZ for s in range(max(rough - 3, -reach), min(rough + 3, reach) + 1)]
+    spread, shift = max(fine_grid, key=lambda x: sample.gain(*x))
     power = [folded(widened(z, spread), shift) for z in each]
-    return Lines(_shared(data, power), int(shift), spread)
+    return Lines(_with_flight_shares(data, power), int(shift), spread)
 
 
-class _Seen:
+class _Sample:
     """Some blocks of all flights, and how well lines at a place explain them."""
 
     def __init__(self, data: Any, each: list[np.ndarray]) -> None:
@@ -118,6 +119,7 @@ class _Seen:
         self.two = {h: widened(two, h) for h in SPREADS_HZ}
 
     def gain(self, spread_hz: float, shift: int) -> float:
+        """Log likelihood that lines of the best strength gain over none."""
         return _best(self.share, folded(self.two[spread_hz], shift)[:, _judged()] / self.floor)[0]
 
 
@@ -139,22 +141,23 @@ def _best(over: np.ndarray, shape: np.ndarray) -> tuple[float, float]:
     size = STRENGTHS / max(float(shape.mean()), 1e-300)
 
     def likelihood(strength: float) -> float:
+        """Log likelihood of lines of a strength (power)."""
         power = 1.0 + strength * shape
         return float((-np.log(power) - (FREEDOM + 1.0) * np.log1p(over / power / FREEDOM)).sum())
 
-    found = [likelihood(s) for s in size]
-    best = int(np.argmax(found))
+    levels = [likelihood(s) for s in size]
+    best = int(np.argmax(levels))
     fine = size[best] * np.geomspace(10.0 ** -0.5, 10.0 ** 0.5, 9)
-    more = [likelihood(s) for s in fine]
-    return max(more) - likelihood(0.0), float(fine[int(np.argmax(more))])
+    fine_levels = [likelihood(s) for s in fine]
+    return max(fine_levels) - likelihood(0.0), float(fine[int(np.argmax(fine_levels))])
 
 
-def _shared(data: Any, power: list[np.ndarray]) -> list[np.ndarray]:
+def _with_flight_shares(data: Any, power: list[np.ndarray]) -> list[np.ndarray]:
     """Lines of several flights, each with its share of the power; 1 on average."""
     if len(power) < 2:
         return power
     share = np.array([_best(over, p[:, _judged()] / floor)[1] if len(p) else 0.0
                       for p, (over, floor) in ((p, _over_floor(data, b[AIR][:, :, :3]))
                                                for p, b in zip(power, data.base, strict=True))])
-    usual = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
-    return [p * s / usual for p, s in zip(power, share, strict=True)]
+    mean_share = share[share > 0.0].mean() if (share > 0.0).any() else 1.0
+    return [p * s / mean_share for p, s in zip(power, share, strict=True)]

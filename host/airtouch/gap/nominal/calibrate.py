@@ -28,7 +28,7 @@ from airtouch.gap.signals.response import Response, TorqueSpectra, response_of
 from airtouch.gap.signals.spectra import AIR, REST, Floor, blocks, floor_of, frequencies, sensor_power, starts
 from airtouch.gap.signatures.candidates import Term, terms
 from airtouch.gap.signatures.nominal_scatter import scatter_of
-from airtouch.gap.unnamed.generic import usual_of
+from airtouch.gap.unnamed.generic import unnamed_floor
 from airtouch.simulation.effects import Active
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
@@ -79,7 +79,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
         found = fit(data, whole_of(data), chosen, start, prior)
         study = _study(vehicle, tuple(t.active() for t in found.terms), flights)
-    study = replace(study, usual=usual_of(Data(study, flights)))
+    study = replace(study, unnamed_floor=unnamed_floor(Data(study, flights)))
     if scatter:
         study = replace(study, scatter=scatter_of([apparent(Data(study, [f]), without) for f in _some(flights)],
                                                     any(_recorded(f) for f in flights), vehicle.name))

@@ -1,4 +1,4 @@
-"""The flight's own signals, for a regression of what a hypothesis leaves (gap.unnamed.generic)."""
+"""The flight's own signals, for a regression of a hypothesis's residual (gap.unnamed.generic)."""
 
 import numpy as np
 from scipy.signal import lfilter
@@ -9,8 +9,8 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-LAG_S = 0.05  #: unit of the derivatives of thrust
-TIME_S = 20.0  #: unit of time
+LAG_S = 0.05  #: s, unit of the derivatives of thrust
+TIME_S = 20.0  #: s, unit of time
 HEIGHT_M = 0.05  #: of a rotor, at which its ground effect is one unit
 LOW_M = 0.2  #: above the floor, at which a force that fades slowly has half its strength
 BASIS = ("one", "in_air", "thrust", "roll", "pitch", "yaw", "d_thrust", "d_roll", "d_pitch", "d_yaw", "vx", "vy",
@@ -22,20 +22,20 @@ def basis(flight: Flight, vehicle: Vehicle) -> np.ndarray:
     """Signals (n, columns, 3) that a flight holds, of order one; the last axis: of x, y and z channels."""
     row = prepare(vehicle, ())[0][0]
     air = ~flight.on_ground
-    keep = float(np.exp(-PERIOD_S / row["motor_rise"]))
-    thrust = lfilter([1.0 - keep], [1.0, -keep], vehicle.thrust(flight.pwm), axis=0) @ MIX.T
+    decay = float(np.exp(-PERIOD_S / row["motor_rise"]))
+    thrust = lfilter([1.0 - decay], [1.0, -decay], vehicle.thrust(flight.pwm), axis=0) @ MIX.T
     thrust /= 0.25 * float(row["mass"]) * vehicle.gravity_mps2
     changing = np.gradient(thrust, axis=0) / PERIOD_S * LAG_S
     speed = flight.signals[:, at.VELOCITY:at.VELOCITY + 3]
     time = np.arange(len(flight)) * PERIOD_S / TIME_S
-    near = (HEIGHT_M / np.maximum(flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4], HEIGHT_M)) ** 2
-    height = near @ MIX[:3].T
+    closeness = (HEIGHT_M / np.maximum(flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4], HEIGHT_M)) ** 2
+    height = closeness @ MIX[:3].T
     above = flight.signals[:, at.HEIGHT]
     low = 1.0 / (1.0 + (above / LOW_M) ** 2)
-    made = np.column_stack([np.ones(len(flight)), air, thrust, changing, speed, np.hypot(*speed[:, :2].T),
+    columns = np.column_stack([np.ones(len(flight)), air, thrust, changing, speed, np.hypot(*speed[:, :2].T),
                             np.zeros((len(flight), 3)), time, time * thrust[:, 0], height, low, above])
-    made[:, 1:] *= air[:, None]
-    out = np.repeat(made[:, :, None], 3, axis=2)
+    columns[:, 1:] *= air[:, None]
+    out = np.repeat(columns[:, :, None], 3, axis=2)
     place = BASIS.index("world_x")
     out[:, place:place + 3] = flight.turn * air[:, None, None]
     return out

@@ -24,22 +24,22 @@ TURNS = (1.0, 1.0j)  #: with the commands, and a quarter turn later
 LOOP_HZ = BANDS_HZ[1:]  #: bands above the means, which the law of the response leaves alone
 LOOP = len(TURNS) * (len(LOOP_HZ) - 1)  #: columns of a torque beside the basis
 WIDEST = len(BASIS) + LOOP
-NOTHING = 1e-9  #: variance of a coefficient that has no scatter
+NOTHING = 1e-9  #: variance that a coefficient without scatter is given
 #: columns of the command that turns the vehicle about each axis of the torque
 OF_COMMAND = {c: [BASIS.index(n) for n in (a, f"d_{a}")] for c, a in enumerate(("roll", "pitch", "yaw"), TORQUE.start)}
 
 
 @dataclass(frozen=True)
-class Usual:
-    """Nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, GROUPS)."""
+class UnnamedFloor:
+    """Scatter of nominal flights: rms of coefficients (CHANNELS, WIDEST), log power's mean and rms (2, GROUPS)."""
 
     columns: np.ndarray
     power: np.ndarray
 
 
-def nothing_usual() -> Usual:
-    """Where no nominal flight is known: columns and bands as the floor has them."""
-    return Usual(np.zeros((CHANNELS, WIDEST)), np.zeros((2, GROUPS)))
+def no_floor() -> UnnamedFloor:
+    """The floor where no nominal flight is known: coefficients and powers without scatter."""
+    return UnnamedFloor(np.zeros((CHANNELS, WIDEST)), np.zeros((2, GROUPS)))
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ class Cell:
         """Columns whose coefficient may be anything."""
         return self.columns.shape[1] - len(self.offsets)
 
-    def precision(self, usual: Usual) -> np.ndarray:
+    def precision(self, floor: UnnamedFloor) -> np.ndarray:
         """Of what is believed of each column's coefficient in a nominal flight, and of the offsets."""
-        nominal = np.maximum(usual.columns[self.channel, :self.free] ** 2, NOTHING)
+        nominal = np.maximum(floor.columns[self.channel, :self.free] ** 2, NOTHING)
         return np.concatenate([1.0 / nominal, 1.0 / self.offsets ** 2])
 
 

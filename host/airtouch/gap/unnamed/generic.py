@@ -1,8 +1,8 @@
-"""What no named effect explains: a model without names of what a hypothesis leaves.
+"""A model without names of the residual that a hypothesis leaves.
 
-Two parts, both found on one half of the data and judged on the other. The first is a `regression` of every force,
-torque and rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity, tilt,
-height over what is below, time. The second is a free power in every view, channel and band (`powers`). Only columns and
+Its two parts are both fitted to one half of the data and judged on the other. The first is a `regression` of every
+force, torque and rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity,
+tilt, height over what is below, time. The second is a free power in every view, channel and band (`powers`). Only columns and
 bands that gain more than chance among so many does are used. What nominal flights have of a column or a band is no
 evidence: as far as they scatter, the coefficient is taken away at no gain.
 """
@@ -15,9 +15,9 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import Part, whole_of
 from airtouch.gap.signatures.candidates import Term
 from airtouch.gap.unnamed.basis import BASIS
-from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, Usual, answerable, nothing_usual
-from airtouch.gap.unnamed.powers import power_gain, usual_powers
-from airtouch.gap.unnamed.regression import HalfResiduals, coefficients, linear_gain, usual_columns
+from airtouch.gap.unnamed.columns import CHANNELS, WIDEST, UnnamedFloor, answerable, no_floor
+from airtouch.gap.unnamed.powers import power_floor, power_gain
+from airtouch.gap.unnamed.regression import HalfResiduals, coefficients, column_floor, linear_gain
 
 LIFT, OF_HEIGHT = 2, ("height", "low", "high")  #: channel of the force along the thrust; columns of the height
 
@@ -28,35 +28,35 @@ def generic_gain(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Ter
     terms: the hypothesis as fitted on each of the two parts. Less power than nominal flights have counts in simulated
     flights alone: a recorded one had calm air; and not in the band of the means, of which offsets take what they may.
     """
-    usual = data.study.usual or nothing_usual()
+    floor = data.study.unnamed_floor or no_floor()
     linear = power = 0.0
     for train, test in ((0, 1), (1, 0)):
         a, b = (HalfResiduals(data, parts[k], terms[train]) for k in (train, test))
-        left = [h.values.copy() for h in (a, b)]
+        residuals = [h.values.copy() for h in (a, b)]
         for channel in range(CHANNELS):
-            found = coefficients(a, channel, usual, answerable(data, terms[train], channel))
+            fitted = coefficients(a, channel, floor, answerable(data, terms[train], channel))
             for k, h in enumerate((a, b)):
                 for cell in (c for c in h.cells if c.channel == channel):
-                    left[k][cell.own], _ = h.without(cell, found, usual)
-            linear += linear_gain(b, channel, found, usual)
-        one, two = (h.powers(x) for x, h in zip(left, (a, b), strict=True))
-        power += power_gain(one, two, usual, data.study.simulated)
+                    residuals[k][cell.own], _ = h.without(cell, fitted, floor)
+            linear += linear_gain(b, channel, fitted, floor)
+        one, two = (h.powers(x) for x, h in zip(residuals, (a, b), strict=True))
+        power += power_gain(one, two, floor, data.study.simulated)
     return linear, power
 
 
 def height_gain(data: Data, parts: Sequence[Part]) -> float:
     """Held-out log likelihood that a force along the thrust gains which follows the height over what is below."""
-    usual = data.study.usual or nothing_usual()
+    floor = data.study.unnamed_floor or no_floor()
     halves = [HalfResiduals(data, part, ()) for part in parts]
     among = np.isin(np.arange(WIDEST), [BASIS.index(name) for name in OF_HEIGHT])
-    return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, usual, among), usual)
+    return sum(linear_gain(halves[test], LIFT, coefficients(halves[train], LIFT, floor, among), floor)
                for train, test in ((0, 1), (1, 0)))
 
 
-def usual_of(data: Data) -> Usual:
+def unnamed_floor(data: Data) -> UnnamedFloor:
     """How coefficients and powers of nominal flights scatter beyond what chance alone gives."""
     halves = [HalfResiduals(data, whole_of(data, [i]), ()) for i in range(len(data.flights))]
     if len(halves) < 2:
-        return nothing_usual()
-    usual = Usual(usual_columns(halves), nothing_usual().power)
-    return Usual(usual.columns, usual_powers([h.rest(usual) for h in halves]))
+        return no_floor()
+    floor = UnnamedFloor(column_floor(halves), no_floor().power)
+    return UnnamedFloor(floor.columns, power_floor([h.floor_powers(floor) for h in halves]))

@@ -1,4 +1,4 @@
-"""Free powers of what is left, in every view, channel and band: found on one half of the data, judged on the other."""
+"""Free powers of the residual in every view, channel and band, fitted to one half of the data, judged on the other."""
 
 from collections.abc import Sequence
 
@@ -7,12 +7,13 @@ import numpy as np
 from airtouch.gap.evidence.problem import GROUPS
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import OVERLAP_WEIGHT
-from airtouch.gap.unnamed.columns import NOTHING, Usual
+from airtouch.gap.unnamed.columns import NOTHING, UnnamedFloor
 
-BELIEF = 2.0  #: nominal flights that the scatter of power in all channels together counts as, for each band of one
-#: of the logarithm of power between flights, at least: no effect's spectrum is modelled any better, and in recorded
-LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1  #: ones no air is
-CHANCE = 4.0  #: gain on the half that it is found on by which a band is used: about one by chance
+BELIEF = 2.0  #: nominal flights that the scatter of all channels together counts as in the band of one
+#: Least standard deviation of the logarithm of power between flights, simulated and recorded: no effect's spectrum, and
+#: no recorded flight's air, is modelled any better.
+LEAST_SCATTER, RECORDED_SCATTER = 0.05, 0.1
+CHANCE = 4.0  #: nats that a band must gain on the half that it is fitted to; chance gives about one
 #: for each group the first of its view and sensor: force, torque, rate; commands, one axis each
 SENSOR = np.arange(GROUPS) // 1000 * 1000 + np.arange(GROUPS) % 1000 % COUNT // 3 * 3
 ABOVE_MEANS = np.arange(GROUPS) % 1000 >= COUNT  #: groups above the lowest band
@@ -43,48 +44,48 @@ def power_factors(e: np.ndarray, nu: np.ndarray, tail: np.ndarray, groups: np.nd
     return out, level - 0.5 * (out - middle) ** 2 * precision
 
 
-def power_gain(one: Powers, two: Powers, usual: Usual, simulated: bool) -> float:
-    """What free powers, found on one half, gain on the other: of every cell, or of all the bands of a sensor together,
+def power_gain(one: Powers, two: Powers, floor: UnnamedFloor, simulated: bool) -> float:
+    """Log likelihood that free powers, fitted to one half, gain on the other.
 
-    as noise that is a little stronger shows nowhere alone.
+    They are those of every cell, or of all the bands of a sensor together, where slightly stronger noise shows.
     """
-    middle, spread = usual.power
+    middle, spread = floor.power
     spread = spread if simulated else np.maximum(spread, RECORDED_SCATTER)
     judged = ABOVE_MEANS if simulated else np.zeros(GROUPS, bool)  # with less power than usual as well
-    usually, before = (power_factors(*half, middle, spread)[1] for half in (one, two))
+    trained_before, before = (power_factors(*half, middle, spread)[1] for half in (one, two))
     pools = [(power_factors(*one, middle, LOOSE[1])[0], np.arange(GROUPS))]
     if simulated:  # recorded flights' noise differs from day to day
         pools.append((_of_sensors(one, middle), SENSOR))
     gains = []
-    for found, pool in pools:
+    for factors, pool in pools:
         free = spread if pool is SENSOR else LOOSE[1]
         trained, gained = (np.bincount(pool, x, GROUPS) for x in (
-            power_factors(*one, found, free)[1] - usually, power_factors(*two, found, spread)[1] - before))
-        used = (trained > CHANCE) & (np.bincount(pool, (found > middle) | judged, GROUPS) > 0)
-        gains.append(float(gain_at_even_odds(gained[used]).sum()))
+            power_factors(*one, factors, free)[1] - trained_before, power_factors(*two, factors, spread)[1] - before))
+        above_chance = (trained > CHANCE) & (np.bincount(pool, (factors > middle) | judged, GROUPS) > 0)
+        gains.append(float(gain_at_even_odds(gained[above_chance]).sum()))
     return max(gains)
 
 
 def _of_sensors(powers: Powers, middle: np.ndarray) -> np.ndarray:
     """Logarithm (GROUPS,) of the powers' factors where all bands of a sensor but that of the means share one."""
     e, nu, tail, groups = powers
-    there = ABOVE_MEANS[groups]
-    over = (e * np.exp(-middle[groups]))[there]
-    shared, _ = power_factors(over, nu[there], tail[there], SENSOR[groups][there], *LOOSE)
-    return middle + np.where(ABOVE_MEANS, shared[SENSOR], 0.0)
+    above_means = ABOVE_MEANS[groups]
+    relative = (e * np.exp(-middle[groups]))[above_means]
+    common, _ = power_factors(relative, nu[above_means], tail[above_means], SENSOR[groups][above_means], *LOOSE)
+    return middle + np.where(ABOVE_MEANS, common[SENSOR], 0.0)
 
 
-def usual_powers(flights: Sequence[Powers]) -> np.ndarray:
+def power_floor(flights: Sequence[Powers]) -> np.ndarray:
     """Log power's mean and rms (2, GROUPS) in nominal flights, two or more, beyond what chance alone gives."""
     log_power, chance = np.zeros((len(flights), GROUPS)), np.full((len(flights), GROUPS), np.nan)
     for i, (e, nu, tail, groups) in enumerate(flights):
         log_power[i] = power_factors(e, nu, tail, groups, *LOOSE)[0]
         count = np.bincount(groups, OVERLAP_WEIGHT * nu / (nu + 3.0), GROUPS)
         chance[i, count > 0.0] = 1.0 / count[count > 0.0]
-    there = np.isfinite(chance)
-    count = np.maximum(there.sum(axis=0), 1)
-    middle = np.where(there, log_power, 0.0).sum(axis=0) / count
-    squares = np.where(there, (log_power - middle) ** 2 - chance, 0.0).sum(axis=0)
+    known = np.isfinite(chance)
+    count = np.maximum(known.sum(axis=0), 1)
+    middle = np.where(known, log_power, 0.0).sum(axis=0) / count
+    squares = np.where(known, (log_power - middle) ** 2 - chance, 0.0).sum(axis=0)
     pooled = np.maximum(_of_band(squares) / np.maximum(_of_band(count - 1.0), 1.0), LEAST_SCATTER ** 2)
     own = (np.maximum(squares, 0.0) + BELIEF * pooled) / (count - 1 + BELIEF)
     return np.stack([middle, np.sqrt(own * (1.0 + 1.0 / count))])
