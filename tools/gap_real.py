@@ -91,9 +91,9 @@ def swarm(folder: Path, part: str) -> Iterator[Case]:
 
 
 def nominal(folder: Path, part: str) -> Iterator[Case]:
-    """Every nominal flight against the others of its group: of the authors' a day and condition, of neural-swarm's the
+    """Every nominal flight against the others of its group.
 
-    baseline flights of a drone and day.
+    A group of the authors' is a day and condition, one of neural-swarm's the baseline flights of a drone and day.
     """
     made: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):

@@ -99,8 +99,9 @@ class Step:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """verdict "effect", "none" or "unknown"; gap: {"before", "after", "floor"} as rms over the floor's
+    """The answer to where, which and how far.
 
+    verdict: "effect", "none" or "unknown"; gap: {"before", "after", "floor"} as rms over the floor's
     unit (dimensionless, floor 1 per bin), judged on held-out blocks; control: the same with
     a deliberately wrong effect; arms: shrink with the vehicle as declared and as calibrated.
     Terminal, report and JSON show this and compute nothing of their own.

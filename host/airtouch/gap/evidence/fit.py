@@ -14,16 +14,15 @@ from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.least_squares import bounded_step, cost_of, limits, weights_of, without_offsets
 from airtouch.gap.evidence.problem import GROUPS, LOOP, Part, Problem, problem_of
+from airtouch.gap.evidence.slopes import Slopes, active_at
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import MEAN, SPECTRUM, Term, random_of
 from airtouch.simulation.effects import Active
 
 ITERATIONS = 8
 ENOUGH = 0.02  #: nats that a step must gain for the fit to go on
-STEP = 0.02  #: change of a scaled parameter over which slopes are taken
 TRIES = 5  #: attempts at a step, each shorter than the one before (Levenberg-Marquardt)
 LEAST_DAMPING, CALMED = 0.01, 0.1  #: damping after a step that failed; factor on it after a step that gained
-FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew
 TURNS, SETTLED = 6, 0.3  #: most turns of fitting mean, then random effects; nats that a further turn must gain
 ROUNDS = 4  #: rounds in which the strengths of several random effects are fitted in turn
 PRIOR_UNITS = 30.0  #: standard deviation of a parameter's prior, in its natural steps
@@ -58,18 +57,18 @@ def fit(data: Data, part: Part, terms: Sequence[Term], start: np.ndarray | None 
     offsets, covariance = np.zeros(0), np.zeros((0, 0))
     random_power: np.ndarray | float = 0.0
     if random and mean and start is not None:
-        random_power = _random_power(problem, random, problem.values(_active(mean, x)), _active(mean, x))
+        random_power = _random_power(problem, random, problem.values(active_at(mean, x)), active_at(mean, x))
     last_level = -np.inf
     for _ in range(TURNS if random and mean else 1):
         x, offsets, covariance, values = _gauss_newton(problem, mean, x, random_power, prior, bool(random))
-        command_power, cost = problem.commanded(_active(mean, x), bool(random))
-        random_power = _random_power(problem, random, values, _active(mean, x)) if random else 0.0
+        command_power, cost = problem.commanded(active_at(mean, x), bool(random))
+        random_power = _random_power(problem, random, values, active_at(mean, x)) if random else 0.0
         level = problem.likelihood(values, random_power + command_power) - cost
         if level < last_level + SETTLED:
             break
         last_level = level
     if random:
-        command_power, cost = problem.commanded([*_active(mean, x), *(t.active() for t in random)], True)
+        command_power, cost = problem.commanded([*active_at(mean, x), *(t.active() for t in random)], True)
     fitted, first = [], 0
     random_fits = iter(random)
     for t in terms:
@@ -145,68 +144,11 @@ def _start(problem: Problem, mean: Sequence[Term], known: np.ndarray | None) -> 
             for amount in GRID:
                 trial = start.copy()
                 trial[i] = np.clip(amount, low[i], high[i])
-                command_power, cost = problem.commanded(_active(mean, trial))
+                command_power, cost = problem.commanded(active_at(mean, trial))
                 level = problem.likelihood(problem.base, command_power) - cost
                 if level > best:
                     best, x = level, trial
     return x
-
-
-def _active(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
-    """Mean effects at scaled parameters x (k,), without those that are neutral there."""
-    out, place = [], 0
-    for t in mean:
-        own = x[place:place + len(t.free)]
-        place += len(t.free)
-        if own.any() or t.acts_when_neutral:
-            out.append(t.active(own))
-    return out
-
-
-class Slopes:
-    """First-order changes of the spectra by the mean effects' parameters, taken anew only where a fit has moved far."""
-
-    def __init__(self, problem: Problem, mean: Sequence[Term], high: np.ndarray) -> None:
-        self.problem, self.mean, self.high = problem, mean, high
-        size = sum(len(t.free) for t in mean)
-        self.at = np.full(size, np.inf)  #: scaled parameters (k,) at which they were taken
-        self.columns = [np.zeros(0)] * size
-        self.rises, self.powers = [np.zeros(0)] * size, [np.zeros(0)] * size
-        self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
-
-    def take(self, x: np.ndarray, anew: bool = False) -> None:
-        """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or if anew."""
-        anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
-        stale = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
-        if not len(stale):
-            return
-        before = _active(self.mean, x)
-        values, power = self.problem.values(before), self.problem.of_torque(before)
-        for i in stale:
-            step = STEP if x[i] + STEP <= self.high[i] else -STEP
-            shifted = x.copy()
-            shifted[i] += step
-            after = _active(self.mean, shifted)
-            self.columns[i] = (self.problem.values(after) - values) / step
-            self.rises[i] = self.problem.commands.rise(before, after) / step
-            self.powers[i] = (self.problem.of_torque(after) - power) / step
-            self.bent[i] = self.problem.bends(before, after)
-        self.at = x.copy() if anew else self.at
-
-    def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
-                 ) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
-
-        values, added: the residual, and the power over the floor, flattened.
-        """
-        problem = self.problem
-        gradient, information = problem.commands.slopes(_active(self.mean, x), np.array(self.rises), wide)
-        powers = np.array(self.powers)
-        if powers.any():
-            push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))
-            gradient = gradient + powers @ push
-            information = information + (powers * weight) @ powers.T
-        return gradient, information
 
 
 def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: np.ndarray | float,
@@ -231,7 +173,7 @@ def _gauss_newton(problem: Problem, mean: Sequence[Term], x: np.ndarray, added: 
 
     def at(x: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Residual, power over the floor, and minus the log of the posterior."""
-        active = _active(mean, x)
+        active = active_at(mean, x)
         values = problem.values(active) if mean else problem.base.copy()
         for amount, (index, column, _) in zip(offsets, problem.offsets, strict=True):
             values[index] -= amount * column

@@ -25,11 +25,11 @@ GROUND = KINDS.index("ground")
 LEAST_AIR_S = 3.0  #: less time in the air than this is not diagnosed
 LARGEST = 1e5  #: no column holds more
 LEAST_GOOD = 0.5  #: part of a column's values that must be there
-SETTLED_S = 1.0  #: after the motors have stopped, in which it may still bounce
-KNOCK = 7.0  #: usual deviations
-CONTACT_S = 0.3  #: left out around the moments at which the vehicle touches the ground
-JOLT = 40.0  #: usual deviations in flight: it hit something (set-points that step reach 35)
-MOST_JOLTED = 0.1  #: of a flight; more is no accident
+SETTLED_S = 1.0  #: s after the motors have stopped in which the vehicle may still bounce
+KNOCK = 7.0  #: standard deviations (of the median kind) on the ground from which a sample is a knock
+CONTACT_S = 0.3  #: s, excluded around the moments at which the vehicle touches the ground
+JOLT = 40.0  #: standard deviations in flight above which it hit something (steps of a set-point reach 35)
+MOST_JOLTED = 0.1  #: share of a flight; more is no accident
 TOUCH_M, TOUCH_S = 0.006, 0.05  #: height above standing below which legs may touch in flight; how long that rings
 
 

@@ -16,15 +16,19 @@ from airtouch.gap.flights.flight import Flight
 STILL_RAD = np.radians(1.0)  #: variation of tilt below which a vehicle is not flown calmer
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)  #: one slope each
 PRIOR = (1.0, 1.0)  #: mean and standard deviation of slopes before any flight: errors are a share of what is flown
-STEEPEST = 3.0
+STEEPEST = 3.0  #: largest slope
 #: hardness below the calmest and over the hardest nominal block, to which the slopes are trusted
 CALMER, HARDER = 0.5, 1.5
-ROUNDS = 8
+ROUNDS = 8  #: Newton steps of the gamma regression
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """slope (bins, COUNT) of log power against hardness, whose nominal range is calmest to hardest, its mean usual."""
+    """How the power of the gap rises with hardness, and the nominal range of hardness.
+
+    slope (bins, COUNT): of log power against hardness; nominal flights lie between calmest and hardest, their mean is
+    usual.
+    """
 
     slope: np.ndarray
     calmest: float
@@ -51,7 +55,7 @@ def hardness_of(flight: Flight, first: np.ndarray, length: int) -> np.ndarray:
 
 def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray,
               flat: np.ndarray | bool = False) -> Slopes:
-    """From the power (blocks, bins, COUNT) of what nominal flights leave; NaN where it is not known.
+    """Slopes from the power (blocks, bins, COUNT) of nominal flights' residuals; NaN where it is not known.
 
     flat (bins, COUNT): where power does not go with hardness, whatever these flights say.
     """

@@ -64,9 +64,10 @@ def declared(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
 
 def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = True, without: Sequence[str] = (),
                ) -> tuple[Study, Calibration]:
-    """Fit the vehicle to nominal flights, then measure the floor that is left and, with `scatter`, how strong
+    """The study of a vehicle fitted to nominal flights, and the calibration.
 
-    every effect but those of `without` seems to be in them (seconds a flight; naming effects needs it, a map does not).
+    scatter: measure as well how strong every effect but those of `without` seems to be in them (seconds a flight;
+    naming effects needs it, a map does not).
 
     Flights that cannot be nominal like the others (a touch of the ground, a swapped
     propeller) are left out and named, as long as most agree.

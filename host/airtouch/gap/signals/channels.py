@@ -40,7 +40,7 @@ CHANNELS = (
 )
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)
-KEPT = 12  #: residuals of one flight that gates are put together from
+KEPT = 12  #: residuals of one flight that are cached for gates to be put together from
 
 
 def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
@@ -67,6 +67,7 @@ def residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active] = (),
     always, made = [a for a in active if not a.gate], {} if kept is None else kept
 
     def of(some: Sequence[Active]) -> np.ndarray:
+        """Residual of effects that always act; cached."""
         key = tuple((a.effect.name, *a.values.values()) for a in some)
         if key not in made:
             if len(made) >= KEPT:

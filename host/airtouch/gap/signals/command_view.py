@@ -2,7 +2,7 @@
 
 A hypothesis multiplies the floor by a ratio. What the floor may be wrong by (few nominal
 flights, other air on other days) is a few smooth shapes of its logarithm, each with a
-prior, found anew for every flight and axis.
+prior, fitted anew for every flight and axis.
 """
 
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ from airtouch.gap.workspace import Workspace
 from airtouch.simulation.effects import Active
 
 FIRST_CHANNEL = 9  #: of the commands, in `channels.CHANNELS`
-EDGE_FREEDOM = 6.0
-ROUNDS = 4
-WIDE = 6.0  #: times the spread where random effects shake the loop in ways that logs do not hold
-DOUBT = 0.1  #: of the logarithm of a change of the spectra by effects: the loop model is no better
-KEPT = 300  #: hypotheses whose expected power is kept
-SMALL = 1e-3  #: of a scaled parameter, over which the likelihood's slope is taken
+EDGE_FREEDOM = 6.0  #: degrees of freedom of the tails of responses at edges
+ROUNDS = 4  #: Newton steps to the floor's correction
+WIDE = 6.0  #: factor on the spread where random effects shake the loop in ways that no log holds
+DOUBT = 0.1  #: relative error of the loop model in the logarithm of a change of the spectra by effects
+KEPT = 300  #: hypotheses whose expected power is cached
+SMALL = 1e-3  #: change of a scaled parameter over which the likelihood's slope is taken
 NOTHING = np.zeros(0)
 
 
@@ -85,7 +85,7 @@ class CommandView:
 
     @property
     def _edge_floor(self) -> edge_response.EdgeFloor:
-        """The same of responses at edges."""
+        """The floor of responses at edges; only asked for where there are any."""
         assert self.loop.edges is not None
         return self.loop.edges
 
@@ -158,9 +158,9 @@ class CommandView:
         return total
 
     def _shift(self, s: np.ndarray, ratio: np.ndarray, wide: bool) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Log of the floor's correction (bins, axes), its cost, weight of all blocks, covariance of the shapes'
+        """Log of the floor's correction (bins, axes), its cost, weight of all blocks, and covariance of the shapes.
 
-        amounts. s: power (blocks, bins, axes) of a flight.
+        s: power (blocks, bins, axes) of a flight.
         """
         e0 = s / (self.loop.floor * ratio)
         spread = self.spread * (WIDE if wide else 1.0)

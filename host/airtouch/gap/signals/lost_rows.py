@@ -1,4 +1,4 @@
-"""What bridging lost rows by straight lines adds to the spectra of the gap.
+"""Power that straight lines across lost rows add to the spectra of the gap.
 
 A row that never reached the log takes a command with it that the motors have followed, so the replay is off until their
 thrust has settled. How far, the same flight tells: the same rows, taken out where they did arrive, change its residuals
@@ -19,7 +19,7 @@ from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, squared
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
-SHIFTS = 12  #: times that the pattern of lost rows is moved along the flight
+SHIFTS = 12  #: places along the flight at which the pattern of lost rows is tried
 WIDTH = 1.5  #: bins over which the power is averaged, Gaussian, as that of the floor is
 
 

@@ -19,9 +19,9 @@ from airtouch.gap.signals.channels import CHANNELS, COUNT
 AIR, REST = "air", "ground"
 LENGTH = {AIR: 256, REST: 24}  #: samples
 OVERLAP_WEIGHT = 0.5  #: half overlapping Hann blocks hold every sample twice
-MOST_LOST = 0.1  #: of a block
+MOST_LOST = 0.1  #: share of lost rows that a block may have
 HANN_POWER = 1.5  #: noise bandwidth of a Hann window, bins
-LEAST_LEFT = 0.1  #: of a value's power, once what lost rows add on average is taken off
+LEAST_LEFT = 0.1  #: share of a value's power that stays at least when the mean power of lost rows is subtracted
 TRIM_HZ = 0.6  #: below it torque and rate hold the trim of a flight, which does not go with how hard it is flown
 
 
@@ -43,7 +43,7 @@ def starts(flight: Flight, regime: str) -> np.ndarray:
 
 
 def frequencies(regime: str) -> np.ndarray:
-    """Hz, (bins,)."""
+    """Frequencies (bins,) of a regime's blocks, Hz."""
     return np.fft.rfftfreq(LENGTH[regime], PERIOD_S)
 
 
@@ -95,9 +95,10 @@ def judged(regime: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Floor:
-    """What nominal flights leave: power[regime] (bins, COUNT), unit^2/Hz, from `blocks` blocks;
+    """Power of the residuals of nominal flights, against which a gap is held.
 
-    offset (COUNT,): standard deviation between flights of a channel's mean in the air;
+    power[regime] (bins, COUNT): unit^2/Hz, from `blocks` blocks; offset (COUNT,): standard deviation between flights
+    of a channel's mean in the air;
     clock_s: rms of the logged times around regular ones; lost: share of lost samples.
     """
 
@@ -154,9 +155,9 @@ def floor_of(flights: Sequence[Flight], residuals: Sequence[np.ndarray], first: 
 
 def _between(flights: Sequence[Flight], residuals: Sequence[np.ndarray], lowest: np.ndarray,
              ) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviation (COUNT,) of flights' means in the air, and the same without what the power in the lowest bin
+    """Standard deviation (COUNT,) of flights' means in the air, as measured and beyond chance.
 
-    gives them by chance.
+    Chance is what the power in the lowest bin gives the means.
     """
     if len(flights) < 2:
         return np.zeros(COUNT), np.zeros(COUNT)
@@ -177,7 +178,7 @@ def sensor_power(least: np.ndarray, regime: str) -> np.ndarray:
 
 
 def _smooth(power: np.ndarray) -> np.ndarray:
-    """Averaged over neighbouring bins in the logarithm, the lowest two (the means) left as they are."""
+    """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged."""
     out = power.copy()
     out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], 1e-300)), 1.5, axis=0, mode="nearest"))
     return out

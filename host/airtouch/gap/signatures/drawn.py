@@ -89,9 +89,10 @@ SHAPED = {"weak_motor": "rotor", "gust": "length", "motor_noise": "time", "slung
 
 
 def kinds_of(effect: Effect) -> dict[str, Kind]:
-    """The kinds of an effect by their names; for one that KINDS lacks, such as a user's own, all its free parameters
+    """The kinds of an effect by their names.
 
-    together, up to STEPS natural steps in any direction.
+    One that KINDS lacks, such as a user's own, has one: all its free parameters together, up to STEPS natural steps in
+    any direction.
     """
     known = {name: kind for name, kind in KINDS.items() if kind.effect == effect.name}
     return known or {effect.name: Kind(effect.name, STEPS, _any(effect))}

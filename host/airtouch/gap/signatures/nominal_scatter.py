@@ -56,10 +56,11 @@ class Apparent:
 
 
 def size_of(rate: float, strength: np.ndarray) -> float:
-    """How much there is of an effect that comes and goes: the geometric mean of the root of the nats a second that it
+    """Size of an effect that comes and goes: the geometric mean of the root of its rate and of its strength.
 
-    gains and of its strength (k,) in natural steps. What nominal flights seem to have gains much in calm ones with
-    hardly any strength, and has strength in hard ones but gains little: only what does both is out of the ordinary.
+    rate: nats a second that it gains; strength (k,): in natural steps. What nominal flights seem to have gains much
+    in calm ones with hardly any strength, and has strength in hard ones but gains little: only what does both is
+    out of the ordinary.
     """
     return math.sqrt(math.sqrt(max(rate, 0.0)) * float(np.linalg.norm(strength)))
 
@@ -116,9 +117,10 @@ class Scatter:
         return 0.5 * (self.freedom + 1.0) * math.log1p(over / self.freedom)
 
     def _compromise(self, found: np.ndarray, precision: np.ndarray, further: int, usual: np.ndarray) -> float:
-        """Least sum of how rare a strength `usual` is and how far off by chance the one found is; it is looked for from
+        """Least sum of how rare a strength is in nominal flights and how far off by chance the fitted one is.
 
-        the given one on, by weighted least squares (of Student's density, Lange et al. 1989).
+        found: the fitted strength; usual: the one from which the search begins, by weighted least squares (of Student's
+        density, Lange et al. 1989).
         """
         for _ in range(STEPS):
             weight = (self.freedom + 1.0) / (self.freedom + float(usual @ usual))

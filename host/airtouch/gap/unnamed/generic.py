@@ -2,9 +2,9 @@
 
 Its two parts are both fitted to one half of the data and judged on the other. The first is a `regression` of every
 force, torque and rate on the flight's own signals: thrust and how it changes, roll, pitch and yaw commands, velocity,
-tilt, height over what is below, time. The second is a free power in every view, channel and band (`powers`). Only columns and
-bands that gain more than chance among so many does are used. What nominal flights have of a column or a band is no
-evidence: as far as they scatter, the coefficient is taken away at no gain.
+tilt, height over what is below, time. The second is a free power in every view, channel and band (`powers`). Only
+columns and bands that gain more than chance among so many does are used. What nominal flights have of a column or a
+band is no evidence: as far as they scatter, the coefficient is taken away at no gain.
 """
 
 from collections.abc import Sequence

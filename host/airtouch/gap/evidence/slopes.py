@@ -1,0 +1,69 @@
+"""Slopes of the spectra by the parameters of mean effects, for the steps of a fit."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airtouch.gap.evidence.problem import Problem
+from airtouch.gap.signatures.candidates import Term
+from airtouch.simulation.effects import Active
+
+STEP = 0.02  #: change of a scaled parameter over which slopes are taken
+FAR = 0.3  #: change of a scaled parameter, of its size or of 1, over which slopes are taken anew
+
+
+def active_at(mean: Sequence[Term], x: np.ndarray) -> list[Active]:
+    """Mean effects at scaled parameters x (k,), without those that are neutral there."""
+    out, place = [], 0
+    for t in mean:
+        own = x[place:place + len(t.free)]
+        place += len(t.free)
+        if own.any() or t.acts_when_neutral:
+            out.append(t.active(own))
+    return out
+
+
+class Slopes:
+    """First-order changes of the spectra by the mean effects' parameters, taken anew only where a fit has moved far."""
+
+    def __init__(self, problem: Problem, mean: Sequence[Term], high: np.ndarray) -> None:
+        self.problem, self.mean, self.high = problem, mean, high
+        size = sum(len(t.free) for t in mean)
+        self.at = np.full(size, np.inf)  #: scaled parameters (k,) at which they were taken
+        self.columns = [np.zeros(0)] * size
+        self.rises, self.powers = [np.zeros(0)] * size, [np.zeros(0)] * size
+        self.bent = np.ones(size, bool)  #: parameters that change the loop, in which nothing is linear
+
+    def take(self, x: np.ndarray, anew: bool = False) -> None:
+        """Take them at scaled parameters x (k,): those that bend; all where x is far from the last, or if anew."""
+        anew = anew or bool((np.abs(x - self.at) > FAR * np.maximum(np.abs(x), 1.0)).any())
+        stale = np.arange(len(x)) if anew else np.flatnonzero(self.bent)
+        if not len(stale):
+            return
+        before = active_at(self.mean, x)
+        values, power = self.problem.values(before), self.problem.of_torque(before)
+        for i in stale:
+            step = STEP if x[i] + STEP <= self.high[i] else -STEP
+            shifted = x.copy()
+            shifted[i] += step
+            after = active_at(self.mean, shifted)
+            self.columns[i] = (self.problem.values(after) - values) / step
+            self.rises[i] = self.problem.commands.rise(before, after) / step
+            self.powers[i] = (self.problem.of_torque(after) - power) / step
+            self.bent[i] = self.problem.bends(before, after)
+        self.at = x.copy() if anew else self.at
+
+    def of_power(self, x: np.ndarray, values: np.ndarray, added: np.ndarray | float, wide: bool,
+                 ) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient (k,) and information (k, k) of the likelihood by what parameters x (k,) do to the expected power.
+
+        values, added: the residual, and the power over the floor, flattened.
+        """
+        problem = self.problem
+        gradient, information = problem.commands.slopes(active_at(self.mean, x), np.array(self.rises), wide)
+        powers = np.array(self.powers)
+        if powers.any():
+            push, weight = problem.power_slopes(values, np.broadcast_to(added, values.shape))
+            gradient = gradient + powers @ push
+            information = information + (powers * weight) @ powers.T
+        return gradient, information
