@@ -91,8 +91,10 @@ def check_free(path: Path | None, force: bool) -> None:
     if path.exists() and not force:
         raise AirTouchError(f"{path}: exists already; use --force to replace it")
     make_folder(path.parent)
-    if not os.access(path.parent, os.W_OK):
-        raise AirTouchError(f"{path.parent}: cannot be written to")
+    try:  # rights alone do not tell: a file system may refuse root as well
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise AirTouchError(f"{path.parent}: cannot be written to: {error.strerror}; choose another folder") from None
 
 
 def write_bytes(data: bytes, path: Path, force: bool = False) -> None:

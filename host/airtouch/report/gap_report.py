@@ -59,8 +59,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         pictures=diagnosis.pictures, how_far=gap_tables.how_far(diagnosis) if diagnosis.effects else None,
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
         remaining=words.remaining_in_words(left[:gap_tables.MOST_LEFT]), remaining_count=len(left),
-        unexplained=[words.open_in_words(u) for u in diagnosis.unexplained],
-        nearest=words.nearest_in_words(diagnosis.unexplained[0]) if diagnosis.unexplained else [],
+        unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
         calibration=gap_tables.named(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),
                ("Notes", _notes(diagnosis.notes, diagnosis.pictures))],
@@ -78,7 +77,7 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
     own = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
     return template.render({
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
-        "legend": gap_tables.LEGEND, "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
+        "legend": gap_tables.LEGEND, "has_headline": headline is not None, "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
         "example": example_effect() if own else "",
         "has_after": any(c.after is not None for c in cells), "version": __version__})
 

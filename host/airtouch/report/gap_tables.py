@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from airtouch.gap.answer.words import quantity, seconds_in_words
+from airtouch.gap.answer.words import digits, quantity, seconds_in_words
 from airtouch.gap.result import Cell, Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNELS
 from airtouch.gap.where import summary
@@ -26,7 +26,7 @@ def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
 def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
     """One table for each phase, that with the most energy first. Rows are channels, columns are bands.
 
-    The first table and that of the headline's phase are open, the others folded.
+    The headline's phase is open, and the first where any cell stands out; the others are folded.
     """
     place = {(c.phase, c.channel, c.band_hz): c for c in cells if c.regime == "all"}
     marked = (headline.phase, headline.channel, headline.band_hz) if headline else None
@@ -38,7 +38,7 @@ def maps(cells: Sequence[Cell], headline: Cell | None = None) -> list[dict[str, 
             if any(some):
                 rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [
                     c and {**shaded(c), "headline": (c.phase, c.channel, c.band_hz) == marked} for c in some]})
-        shown = n == 0 or (headline is not None and phase.name == headline.phase)
+        shown = (n == 0 and phase.over > 0) or (headline is not None and phase.name == headline.phase)
         worse = f", {phase.worse} worse than before" if phase.worse else ""
         out.append({"name": capital(PHASE_WORDS[phase.name]), "rows": rows, "open": shown,
                     "text": f"{phase.over} of {phase.cells} cells over the floor"
@@ -76,14 +76,14 @@ def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[di
     return [{"words": in_words(c).split(":")[0], "headline": c is headline or c == headline, "gap": f"{short(c.gap)}",
              "interval": interval(c),
              "after": "-" if c.after is None else f"{short(c.after)}", "floor": f"{short(c.floor)}",
-             "unit": c.unit + (f"; {c.by}" if c.by else ""),
+             "unit": c.unit + (f"; caused by {c.by}" if c.by else ""),
              "ratio": short(ratio(c))} for c in cells]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Rows of the parameters of the named effects."""
-    return [{"effect": e.name if i == 0 else "", "parameter": k, "value": f"{q.value:.3g}",
-             "interval": "" if q.low is None or q.high is None else f"{q.low:.3g} to {q.high:.3g}",
+    return [{"effect": e.name if i == 0 else "", "parameter": k, "value": (form := digits(q)).format(q.value),
+             "interval": "" if q.low is None or q.high is None else f"{form.format(q.low)} to {form.format(q.high)}",
              "unit": "" if q.unit == "1" else q.unit,
              "seconds": "acts " + seconds if i == 0 and (seconds := seconds_in_words(e))
              else ""}

@@ -4,6 +4,7 @@ The client that sent to the log port last gets the log data.
 """
 
 import contextlib
+import errno
 import math
 import select
 import socket
@@ -197,6 +198,9 @@ def _bind(host: str, port: int) -> socket.socket:
         udp.bind((host, port))
     except (OSError, OverflowError) as error:
         udp.close()
+        if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+            raise AirTouchError(f"port {port} of {host} is in use, perhaps by another `airtouch sitl`: end that one, "
+                                "or choose another port with --port") from None
         raise AirTouchError(f"port {port} of {host}: {error}; choose another with --port") from None
     return udp
 

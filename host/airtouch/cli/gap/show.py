@@ -67,7 +67,7 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
     for effect in found.effects:
         screen.print("  " + words.effect_in_words(effect))
     table = Table(title="Ranking", title_justify="left", caption_justify="left",
-                  caption="shrink: part of the gap above the floor that goes away on data held out, 90 %")
+                  caption="shrink: part of the gap above the floor that goes away on data held out, with its 90 % interval")
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
@@ -78,9 +78,8 @@ def diagnosis(screen: Console, found: Diagnosis) -> None:
         screen.print(f"cannot be told apart here: {', '.join(group)}")
     if found.where:
         screen.print(cells(found.where, "Where", screen.width))
-    remarks(screen, "What stays open", [words.open_in_words(u) for u in found.unexplained])
-    if found.unexplained:
-        remarks(screen, "Nearest effects", words.nearest_in_words(found.unexplained[0]))
+    remarks(screen, "What stays open", words.all_open_in_words(found.unexplained))
+    remarks(screen, "Other near effects", words.nearest_in_words(found))
     if found.next:
         screen.print("Next:")
     for step in found.next:

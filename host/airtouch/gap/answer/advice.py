@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.result import Cell, Found, Step
 from airtouch.gap.signatures import candidates
+from airtouch.gap.where.gap_map import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
@@ -92,7 +93,7 @@ def _open(headline: Cell | None, vehicle: str) -> list[Step]:
     """What to do about a gap that no known effect explains: more of the phase with most of it, and a suspicion."""
     said = []
     if headline is not None and headline.phase in MISSIONS:
-        said.append(Step(f"Repeat the flight with more of {headline.phase}, where most of the gap is.",
+        said.append(Step(f"Repeat the flight with more time {PHASE_WORDS[headline.phase]}, where most of the gap is.",
                          collect(MISSIONS[headline.phase])))
     elif headline is not None:
         said.append(Step("Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))

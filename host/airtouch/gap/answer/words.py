@@ -60,7 +60,8 @@ def _how_far(diagnosis: Diagnosis) -> str:
         return "How far it would close is not known."
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         if diagnosis.verdict == "none":
-            return f"Over all it is {short(before)} times the floor, so there is nothing to close."
+            size = "at the floor" if short(before) == "1" else f"{short(before)} times the floor"
+            return f"Over all it is {size}, so there is nothing to close."
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
@@ -77,8 +78,9 @@ def _how_far(diagnosis: Diagnosis) -> str:
 
 
 def _after_in_words(cell: Cell) -> str:
-    return (f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} "
-            f"({short(ratio(cell))} to {short(summary.after(cell))} times the floor)")
+    before, after = short(ratio(cell)), short(summary.after(cell))
+    change = f"{before} to {after} times the floor" if after != before else f"{after} times the floor, as before"
+    return f"{PHASE_WORDS[cell.phase]} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)} ({change})"
 
 
 def remaining_in_words(cells: Sequence[Cell]) -> list[str]:
@@ -108,6 +110,15 @@ def seconds_in_words(effect: Found) -> str:
     return ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
 
 
+def all_open_in_words(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One line for each place where the gap stays open. Phases that share their worst seconds share a line."""
+    lines: dict[str, tuple[Mapping[str, Any], list[str]]] = {}
+    for entry in entries:
+        same = open_in_words({**entry, "phase": ""})
+        lines.setdefault(same, (entry, []))[1].append(entry["phase"])
+    return [open_in_words({**entry, "phase": joined(phases)}) for entry, phases in lines.values()]
+
+
 def open_in_words(entry: Mapping[str, Any]) -> str:
     """`lift, 0.5-2 Hz, cruise: up to 6.1 times the floor from 12.0 to 18.4 s of log.csv; follows height`."""
     low, high = entry["band_hz"]
@@ -117,13 +128,24 @@ def open_in_words(entry: Mapping[str, Any]) -> str:
             f"floor from {entry['from_s']:.1f} to {entry['to_s']:.1f} s of {Path(entry['flight']).name}{follows}")
 
 
-def nearest_in_words(entry: Mapping[str, Any]) -> list[str]:
-    """Why each of the nearest effects was not named."""
-    return [f"{plain(n['name'])}: {n['fails']}" for n in entry["nearest"]]
+def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
+    """Why each of the nearest effects was not named, of those that the ranking does not show with a reason."""
+    if not diagnosis.unexplained:
+        return []
+    shown = {r.name for r in summary.leading(diagnosis.ranking) if r.why}
+    return [f"{plain(n['name'])}: {n['fails']}" for n in diagnosis.unexplained[0]["nearest"] if n["name"] not in shown]
 
 
-def quantity(q: Quantity, form: str = "{:.3g}") -> str:
+def digits(q: Quantity) -> str:
+    """The format that shows a number, and its interval as an interval: three digits, six at most."""
+    if q.low is None or q.high is None or q.low == q.high:
+        return "{:.3g}"
+    return next((form for form in ("{:.3g}", "{:.4g}", "{:.5g}") if form.format(q.low) != form.format(q.high)), "{:.6g}")
+
+
+def quantity(q: Quantity, form: str | None = None) -> str:
     """A number with unit and interval."""
+    form = form or digits(q)
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
     interval = "" if q.low is None or q.high is None else f" ({form.format(q.low)} to {form.format(q.high)})"
     return form.format(q.value) + unit + interval

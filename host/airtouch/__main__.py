@@ -1,0 +1,7 @@
+"""`python -m airtouch` is the `airtouch` command."""
+
+import sys
+
+from airtouch.cli import main
+
+sys.exit(main())
