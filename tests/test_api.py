@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,3 +86,19 @@ def test_types_are_marked():
     from importlib import resources
 
     assert (resources.files("airtouch") / "py.typed").is_file()
+
+
+def test_a_folder_stands_for_its_flights_and_a_list_is_no_flight(tmp_path):
+    (tmp_path / "flown").mkdir()
+    for number in range(2):
+        at.write(at.simulate("hover", seed=number)[0], tmp_path / "flown" / f"{number}.csv")
+    (tmp_path / "flown" / "manifest.csv").write_text("file,use\n0.csv,clean\n")
+    found = at.gap.measure(tmp_path / "flown")
+    assert [Path(f).name for f in found.flights] == ["0.csv", "1.csv"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(at.AirTouchError, match="no flights in this folder"):
+        at.gap.measure(tmp_path / "empty")
+    with pytest.raises(at.AirTouchError, match="a pandas table, not list"):
+        at.detect([])
+    with pytest.raises(at.AirTouchError, match="no flight to score"):
+        at.evaluate([])

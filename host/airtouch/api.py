@@ -38,7 +38,11 @@ def read(flight: "Flight") -> FlightLog:
 
     if isinstance(flight, FlightLog):
         return flight
-    return logs.read(flight) if isinstance(flight, (str, Path)) else from_pandas(flight)
+    if isinstance(flight, (str, Path)):
+        return logs.read(flight)
+    if not hasattr(flight, "columns"):
+        raise AirTouchError(f"a flight is a file name, a FlightLog or a pandas table, not {type(flight).__name__}")
+    return from_pandas(flight)
 
 
 def write(flight: "Flight", path: str | Path, *, force: bool = False) -> None:
@@ -108,6 +112,8 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 
     module, inputs = registry.get(detector), _several(flights)
+    if not inputs:
+        raise AirTouchError("no flight to score")
     trained = module.load(Path(model) if model else None)
     paths = [f for f in inputs if isinstance(f, (str, Path))]
     scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained) if paths else ([], [])
@@ -153,8 +159,8 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     from airtouch.gap import diagnose as module
     from airtouch.report import gap_report
 
-    logs = [read(f) for f in _several(flights)]
-    diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), [read(f) for f in _several(baseline)], without=without,
+    logs = _logs(flights)
+    diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), _logs(baseline), without=without,
                                 pictures=report is not None)
     if report is not None:
         gap_report.write_diagnosis(Path(report), diagnosis, command="airtouch.gap.diagnose(...)", force=force)
@@ -166,8 +172,8 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
     """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
     from airtouch.gap import measure as module
 
-    logs = [read(f) for f in _several(flights)]
-    return module.measure(logs, _vehicle(vehicle, logs), [read(f) for f in _several(baseline)])
+    logs = _logs(flights)
+    return module.measure(logs, _vehicle(vehicle, logs), _logs(baseline))
 
 
 def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin: str | Path | None = None,
@@ -205,6 +211,27 @@ def _flown_speed(log: FlightLog) -> float | None:
     """Commanded speed, m/s, in a log's metadata (of a converted or a simulated flight); None without one."""
     drawn = log.meta.get("condition")
     return log.meta.get("speed_mps") or (drawn.get("speed") if isinstance(drawn, Mapping) else None)
+
+
+def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:
+    """The logs of flights; a folder stands for the logs in it.
+
+    Raises AirTouchError for a flight that cannot be read and for a folder without one.
+    """
+    from airtouch.logs.files import ENDINGS, in_folder
+    from airtouch.logs.formats.rosbag import is_bag
+
+    logs = []
+    for flight in _several(flights):
+        folder = Path(flight) if isinstance(flight, (str, Path)) else None
+        if folder is None or not folder.is_dir() or is_bag(folder):
+            logs.append(read(flight))
+            continue
+        files = in_folder(folder)
+        if not files:
+            raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(ENDINGS)})")
+        logs += [read(f) for f in files]
+    return logs
 
 
 def _several(flights: Any) -> list[Any]:

@@ -37,6 +37,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     """
     need("map", "a map")
     from airtouch.detector.evaluation import edge_map
+    from airtouch.detector.evaluation.evaluate import remarks
 
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
     out = out.with_suffix(".geojson") if out.suffix == ".png" else out
@@ -47,6 +48,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
         raise AirTouchError(f"{flight}: a folder; a map is of one flight, name its log")
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)
+    for line in remarks(log):
+        click.echo(f"airtouch: {flight}: {line}", err=True)
     edge_map.track(log, speed or file.condition.speed_mps)  # raises if both are missing, before the detector runs
     source = edge_map.true_edges_of(log) if truth else edge_map.detected_edges(log, detector, model)
     plane = edge_map.edge_map(log, source.edges, lag_s=source.lag_s, sigma_s=sigma or source.sigma_s,

@@ -110,7 +110,8 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     there = flights - len(store.missing(out, scene.name, seed, flights))
     diverged = [f for f in store.failures(out) if f["flight"] < flights]
     store.write_manifest(out, scene, seed, flights)
-    click.echo(f"{there - len(diverged)} flights in {out}")
+    whole = there - len(diverged)
+    click.echo(f"{whole} flight{'s' * (whole != 1)} in {out}")
     if diverged:
         _say_diverged(diverged, out / store.FAILED)
         raise SystemExit(1)

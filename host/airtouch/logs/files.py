@@ -15,6 +15,9 @@ from airtouch.logs.table import Sheet, names_of, sheet
 
 PIECE_BYTES = 1 << 14  #: bytes read or unpacked at a time
 
+ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")  #: of the files in a folder that count as flights
+MANIFEST = "manifest.csv"
+
 
 def read(path: str | Path) -> FlightLog:
     """The flight log in a file of any known format, gzipped or not, or in the folder of a ROS 2 bag.
@@ -51,6 +54,11 @@ def load_bytes(path: str | Path) -> bytes:
 def load_text(path: str | Path) -> bytes:
     """A text file's bytes, unpacked if it is gzipped, with LF line ends. Raises AirTouchError as `read` does."""
     return _text(load_bytes(path), str(path))
+
+
+def in_folder(folder: Path) -> list[Path]:
+    """The flight logs of a folder by the ending of their names, in order, without its manifest."""
+    return [p for p in sorted(folder.iterdir()) if p.name.endswith(ENDINGS) and p.name != MANIFEST]
 
 
 def write(log: FlightLog, path: str | Path, force: bool = False) -> None:
@@ -170,6 +178,8 @@ def _by_header(text: Sheet, source: str) -> FlightLog:
         return imrclab.read(text, source)
     if {"pwm", "vbat[V]", "rpm1"} <= set(names):
         raise AirTouchError(f"{source}: a thrust-stand run, not a flight; leave it out")
+    if {"file", "use"} <= set(names):
+        raise AirTouchError(f"{source}: a list of flights, not a flight; name its folder")
     header = printable(text.first[:200].decode("utf-8", "replace"), 60)
     raise AirTouchError(f"{source}:{text.line}: unknown header '{header}'; "
                         "name the columns as in the table of columns")

@@ -77,7 +77,8 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
     own = any(s.page == ADD_AN_EFFECT for s in context.get("steps", ()))
     return template.render({
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
-        "legend": gap_tables.LEGEND, "has_headline": headline is not None, "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
+        "legend": gap_tables.LEGEND, "has_headline": headline is not None,
+        "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
         "example": example_effect() if own else "",
         "has_after": any(c.after is not None for c in cells), "version": __version__})
 

@@ -55,3 +55,17 @@ def test_right_names_pass_and_are_the_tables():
 def test_a_mistyped_effect_gets_the_nearest():
     with pytest.raises(AirTouchError, match="no effect 'weak_moter'; did you mean weak_motor"):
         effects.get("weak_moter")
+
+
+@pytest.mark.parametrize(("right", "wrong", "said"), [
+    ("wrench=push", "wrnch=push", "mine.py:15: Effect takes no 'wrnch'; did you mean wrench"),
+    ("Parameter, wrench\n", "Paramter, wrench\n", "airtouch.simulation.effects has no 'Paramter'; did you mean Param"),
+    ("@wrench\n", "", "effect late_push: put @wrench above the function push"),
+    ("p[1]:", "p[3]:", "mine.py:7: p[3] does not exist; the last place is p[2]"),
+    ("out[2]", "out[6]", "mine.py:8: out[6] does not exist; the last place is out[5]"),
+    ("p[0] *", "memory[12] *", "mine.py:8: memory[12] does not exist; the last place is memory[11]"),
+])
+def test_what_compiled_code_would_not_notice_is_refused_with_its_line(right, wrong, said):
+    with pytest.raises(AirTouchError) as error:
+        effects.load_text(FILE.replace(right, wrong), "mine.py")
+    assert said in str(error.value)

@@ -49,6 +49,9 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without)
         if not each:
             logs = list(flights)
+            if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
+                click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
+                           f"give it once ({len(same)} of {len(flights)} flights)", err=True)
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
             diagnosis = case(logs, progress=bar, pictures=bool(report))

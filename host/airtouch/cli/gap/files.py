@@ -8,13 +8,12 @@ import click
 
 from airtouch import logs, vehicle
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import MANIFEST, in_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.rosbag import is_bag
 from airtouch.vehicle import Vehicle
 
-ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")
 DEFAULT = "crazyflie-2.1-flow"
-MANIFEST = "manifest.csv"
 
 
 class Flights:
@@ -54,8 +53,7 @@ def files_of(names: Sequence[str]) -> list[Path]:
         if path.is_dir() and is_bag(path):
             paths = [path]
         elif path.is_dir():
-            paths = [p for p in sorted(path.iterdir())
-                    if p.name.endswith(ENDINGS) and p.name != MANIFEST]
+            paths = in_folder(path)
         elif path.exists():
             if path.name == MANIFEST:  # which a shell's *.csv names too
                 if len(names) == 1:

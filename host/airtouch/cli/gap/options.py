@@ -22,7 +22,13 @@ class Greedy(click.Command):
                 spread += ["--baseline", word] if taking else [word]
         if args and args[-1] == "--baseline":
             spread.append("--baseline")  # click says that its value is missing
-        return super().parse_args(ctx, spread)
+        try:
+            return super().parse_args(ctx, [*spread])  # click empties its list
+        except click.MissingParameter as error:
+            if "--baseline" in spread and error.param is not None and error.param.name == "real":
+                raise click.UsageError("no flight to examine: give REAL before --baseline, which takes every name "
+                                       "up to the next option", ctx) from None
+            raise
 
 
 def inputs_and_outputs(function: Callable) -> Callable:

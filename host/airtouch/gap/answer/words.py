@@ -140,7 +140,8 @@ def digits(q: Quantity) -> str:
     """The format that shows a number, and its interval as an interval: three digits, six at most."""
     if q.low is None or q.high is None or q.low == q.high:
         return "{:.3g}"
-    return next((form for form in ("{:.3g}", "{:.4g}", "{:.5g}") if form.format(q.low) != form.format(q.high)), "{:.6g}")
+    forms = (f"{{:.{n}g}}" for n in (3, 4, 5))
+    return next((form for form in forms if form.format(q.low) != form.format(q.high)), "{:.6g}")
 
 
 def quantity(q: Quantity, form: str | None = None) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Container
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -83,6 +84,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     name, notes = log.source, []
     if nothing_logged(log):
         raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
+    notes += [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
     log, unfit = _sane(log)
     if unfit:
         notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")

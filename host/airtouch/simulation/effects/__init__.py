@@ -4,13 +4,15 @@
 one of your own; `load_file` registers those of a Python file.
 """
 
+import dataclasses
 import importlib
 import re
+import sys
 import traceback
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from airtouch.errors import AirTouchError, unknown
+from airtouch.errors import AirTouchError, nearest, unknown
 from airtouch.simulation.effects import names
 from airtouch.simulation.effects.effect import Active, Effect, Parameter, wrench
 
@@ -134,8 +136,7 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
     except AirTouchError:
         raise
     except Exception as error:
-        raise AirTouchError(f"{source}{_line_of(error, source)}: {type(error).__name__}: "
-                            f"{str(error).splitlines()[0]}") from None
+        raise AirTouchError(f"{source}{_line_of(error, source)}: {_in_words(error)}") from None
     defined = [v for v in scope.values() if isinstance(v, Effect)]
     if not defined:
         raise AirTouchError(f"{source}: defines no Effect")
@@ -146,6 +147,20 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
 def source_of(name: str) -> str:
     """The file that an effect of a user's own was loaded from, "" for one of the package."""
     return _SOURCE.get(name, "")
+
+
+def _in_words(error: Exception) -> str:
+    """The error in a line, with the nearest right names where a name was wrong."""
+    said = str(error).splitlines()[0]
+    if missing := re.match(r"cannot import name '(\w+)' from '([\w.]+)'", said):
+        name, module = missing.groups()
+        return f"{module} has no {name!r}{nearest(name, vars(sys.modules[module]))}"
+    if argument := re.match(r"(\w+)\.__init__\(\) got an unexpected keyword argument '(\w+)'", said):
+        kind, name = argument.groups()
+        known = {"Effect": Effect, "Parameter": Parameter}.get(kind)
+        if known:
+            return f"{kind} takes no {name!r}{nearest(name, [f.name for f in dataclasses.fields(known)])}"
+    return f"{type(error).__name__}: {said}"
 
 
 def _line_of(error: Exception, source: str) -> str:

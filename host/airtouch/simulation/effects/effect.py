@@ -1,5 +1,6 @@
 """What an effect is: parameters with units and bounds, and how it enters the equations."""
 
+import inspect
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -66,6 +67,12 @@ class Effect:
     settings: Callable[[Any, Mapping[str, float]], None] | None = None
     wrench: Any = None
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  #: values measured together
+
+    def __post_init__(self) -> None:
+        """Raise AirTouchError for a wrench that nobody compiled."""
+        if inspect.isfunction(self.wrench):
+            raise AirTouchError(f"effect {self.name}: put @wrench above the function {self.wrench.__name__}, "
+                                "so that it is compiled")
 
     def values(self, overrides: Mapping[str, float | str] | None = None) -> dict[str, float]:
         """Every parameter: what is overridden, else what the preset says, else its default.

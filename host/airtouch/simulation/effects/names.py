@@ -8,13 +8,14 @@ from collections.abc import Iterator
 
 from airtouch.errors import AirTouchError, nearest
 from airtouch.simulation import plant, signals
+from airtouch.simulation.effects.effect import MEMORY, PARAMETERS
 
 SIGNALS = tuple(name for name in vars(signals) if name.isupper())
 FIELDS = tuple(name for name, *_ in plant.FIELDS)
 
 
 def check(text: str, source: str) -> None:
-    """Raise AirTouchError for a signal, plant field or parameter that there is not.
+    """Raise AirTouchError for a signal, plant field or parameter that there is not, and for a place outside its array.
 
     It reads `file:line: ...; did you mean ...`.
     """
@@ -34,6 +35,28 @@ def check(text: str, source: str) -> None:
                 _check(node.slice.value, (*FIELDS, "firmware"), "plant field", source, node.lineno)
             elif node.value.id == values and parameters:
                 _check(node.slice.value, parameters, "parameter of this file", source, node.lineno)
+    for function in _wrenches(tree):
+        _check_places(function, len(parameters), source)
+
+
+def _check_places(function: ast.FunctionDef, parameters: int, source: str) -> None:
+    """Raise AirTouchError where a wrench names a place that its array lacks: compiled code does not look."""
+    values, _, memory, _, out = (a.arg for a in function.args.args)
+    places = {values: parameters or PARAMETERS, memory: MEMORY, out: 6}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id in places:
+            last = places[node.value.id] - 1
+            if isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, int) and node.slice.value > last:
+                raise AirTouchError(f"{source}:{node.lineno}: {node.value.id}[{node.slice.value}] does not exist; "
+                                    f"the last place is {node.value.id}[{last}]")
+
+
+def _wrenches(tree: ast.Module) -> Iterator[ast.FunctionDef]:
+    """Functions marked with @wrench that take its five arguments."""
+    for node in tree.body:
+        if (isinstance(node, ast.FunctionDef) and len(node.args.args) == 5
+                and any(isinstance(d, ast.Name) and d.id == "wrench" for d in node.decorator_list)):
+            yield node
 
 
 def _check(name: str, names: tuple[str, ...], what: str, source: str, line: int) -> None:
