@@ -133,12 +133,14 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
              without: Sequence[str] = (), seed: int = 0) -> list[FlightLog]:
     """Simulate flights of a scenario. A flight depends on these arguments and its number only.
 
-    scenario, vehicle: built-in names, .toml files or objects. effects: {name: {parameter: value}} to switch on;
+    scenario: a scenario's or mission's name, a .toml file or an object; so is vehicle. effects: {name: {parameter: value}} to switch on;
     without: names to switch off. Raises AirTouchError for an unknown name and for a flight that diverges.
     """
+    from airtouch.crazyflie import mission
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
 
+    scenario = mission.scene_of(scenario) if isinstance(scenario, str) and scenario in mission.names() else scenario
     pairs = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
     logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=pairs, without=without, seed=seed))
     lost = [f for f in logs if isinstance(f, Diverged)]

@@ -35,10 +35,13 @@ def _list_effects(ctx: click.Context, _: click.Parameter, value: bool) -> None:
 def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     if not value:
         return
+    from airtouch.crazyflie import mission
     from airtouch.simulation import scenario
 
     for name in scenario.names():
         click.echo(f"{name}: {scenario.load(name).summary}")
+    for name in mission.names():
+        click.echo(f"{name}: {mission.scene_of(name).summary} (a mission: `airtouch collect` flies it too)")
     ctx.exit()
 
 
@@ -74,6 +77,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     reported with their number and never written; the exit code is then 1.
     """
     from airtouch import vehicle as vehicles
+    from airtouch.crazyflie import mission
     from airtouch.simulation import batch, effects
     from airtouch.simulation import scenario as scenarios
     from airtouch.simulation.flight import choose, refuse_off
@@ -84,7 +88,8 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     plugins = [_read(path) for path in files]
     for path in files:
         effects.load_file(path)
-    scene, craft = scenarios.load(scenario), vehicles.load(vehicle)
+    scene = mission.scene_of(scenario) if scenario in mission.names() else scenarios.load(scenario)
+    craft = vehicles.load(vehicle)
     pairs = [effects.parse(text) for text in chosen]
     plan = scenarios.draw_flight(scene, seed, 0)
     refuse_off(plan, without)

@@ -2,6 +2,7 @@
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -104,9 +105,13 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
         files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
     else:
         files = sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith(SUFFIXES))
+    if not files and listed:
+        uses = Counter(str(condition.use) for condition in listed.values())
+        raise AirTouchError(f"{folder}: no clean flight in its manifest, but "
+                            f"{', '.join(f'{count} {use}' for use, count in uses.items())}; name the logs themselves "
+                            "to take them")
     if not files:
-        raise AirTouchError(f"{folder}: no flights in this folder "
-                            "(.csv, .csv.gz or .parquet, clean in its manifest)")
+        raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(SUFFIXES)})")
     return files
 
 
