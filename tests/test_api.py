@@ -102,3 +102,8 @@ def test_a_folder_stands_for_its_flights_and_a_list_is_no_flight(tmp_path):
         at.detect([])
     with pytest.raises(at.AirTouchError, match="no flight to score"):
         at.evaluate([])
+
+
+def test_a_mission_is_simulated_by_its_name():
+    (log,) = at.simulate("sweep")
+    assert log.meta["scenario"] == "sweep" and log["zrange_m"].max() > 0.7
