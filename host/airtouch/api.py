@@ -133,8 +133,9 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
              without: Sequence[str] = (), seed: int = 0) -> list[FlightLog]:
     """Simulate flights of a scenario. A flight depends on these arguments and its number only.
 
-    scenario: a scenario's or mission's name, a .toml file or an object; so is vehicle. effects:
-    {name: {parameter: value}} to switch on; without: names to switch off. Raises AirTouchError for an unknown name and for a flight that diverges.
+    scenario: a scenario's or mission's name, a .toml file or an object; so is vehicle. effects: {name: {parameter:
+    value}} to switch on; without: names to switch off. Raises AirTouchError for an unknown name and for a flight that
+    diverges.
     """
     from airtouch.crazyflie import mission
     from airtouch.simulation import batch

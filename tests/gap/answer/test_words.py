@@ -39,7 +39,7 @@ def test_what_got_worse_is_said():
     cells = [cell("force_z", "hover", 1.0, after=0.05), cell("force_x", "ground", 1.5, after=2.2),
              cell("force_y", "ground", 2.6, after=8.8)]
     said = words.sentences(diagnosis(cells))[2]
-    assert "2 of 3 cells still stand out, the largest on the ground in sideways force" in said
+    assert "2 of 3 cells still stand out, mostly on the ground in sideways force" in said
     assert "(26 to 88 times the floor)" in said
     assert said.endswith("and 2 got worse.")
     ground = next(p for p in summary.phases(cells) if p.name == "ground")
@@ -108,3 +108,16 @@ def test_advised_commands_can_be_given():
         assert given[0] == name and given[1] == pytest.approx({k: q.value for k, q in values.items()}, rel=1e-3)
     for name in (*advice.MISSIONS.values(), *(m for _, m in advice.SEPARATES.values() if m)):
         assert mission.load(name).legs
+
+
+def test_phases_with_the_same_worst_seconds_share_a_line():
+    entry = {"channel": "force_z", "band_hz": (0.0, 0.5), "over_floor": 6.0, "from_s": 1.0, "to_s": 3.0,
+             "flight": "a.csv", "follows": [], "nearest": []}
+    lines = words.all_open_in_words([{**entry, "phase": "cruise"}, {**entry, "phase": "landing"},
+                                     {**entry, "phase": "hover", "from_s": 2.0}])
+    assert [line.split(":")[0] for line in lines] == ["lift, 0-0.5 Hz, cruise and landing", "lift, 0-0.5 Hz, hover"]
+
+
+def test_an_interval_has_the_digits_that_show_it():
+    assert words.quantity(Quantity(0.1203, 0.12028, 0.12034)) == "0.1203 (0.12028 to 0.12034)"
+    assert words.quantity(Quantity(0.12, 0.09, 0.13)) == "0.12 (0.09 to 0.13)"

@@ -31,5 +31,5 @@ def test_headline_of_named_effects_is_where_they_take_most():
     cells = [cell("torque_x", "hover", 16.0, 0.9, after=15.9), cell("force_z", "over platform", 0.43, 0.04, after=0.04)]
     found = diagnosis(cells, effects=(Found("ground_effect", {}),))
     assert found.headline is cells[1] and "lift" in words.sentences(found)[0]
-    assert ("1 of 2 cells still stand out, the largest in hover in roll torque at 0-0.5 Hz "
+    assert ("1 of 2 cells still stand out, mostly in hover in roll torque at 0-0.5 Hz "
             "(18 times the floor, as before)") in words.answer(found)

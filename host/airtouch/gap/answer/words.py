@@ -69,7 +69,7 @@ def _how_far(diagnosis: Diagnosis) -> str:
     over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
     more = ""
     if left:
-        more = f"; {len(left)} of {over} cells still stand out, the largest {_after_in_words(left[0])}"
+        more = f"; {len(left)} of {over} cells still stand out, mostly {_after_in_words(left[0])}"
     if bad:
         more += f", and {len(bad)} got worse"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
