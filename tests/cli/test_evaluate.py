@@ -51,6 +51,21 @@ def test_a_fold_without_flights_is_named(generated):
     assert str(result.exception) == "no flight is in fold 77 of the manifest"
 
 
+def test_flights_that_the_manifest_leaves_out_are_counted(generated, tmp_path):
+    names = ["f0.csv.gz", "f1.csv.gz", "f2.csv.gz", "f3.csv.gz"]
+    for name in names:
+        shutil.copy(generated / name, tmp_path)
+    (tmp_path / "manifest.csv").write_text("file,use,fold,speed_mps\nf0.csv.gz,clean,0,0.3\nf1.csv.gz,clean,1,0.3\n"
+                                           "f2.csv.gz,messy,0,0.3\n")
+    said = ("airtouch: 1 flights are scored, 3 are not: 1 messy in the manifest, 1 not in the manifest, "
+            "1 of another fold")
+    result = run(tmp_path, "--detector", "baseline", "--fold", 0)
+    assert result.exit_code == 0
+    assert said in result.stderr.splitlines(), result.stderr
+    # a flight that is named is taken
+    assert "are not" not in run(tmp_path / "f2.csv.gz", "--detector", "baseline").stderr
+
+
 def test_bad_files_are_named_once_and_the_others_go_on(generated, bad, tmp_path):
     out = tmp_path / "out.json"
     result = run(generated / "f0.csv.gz", *bad.values(), "--speed", 0.3, "--detector", "baseline", "--json", out)

@@ -38,9 +38,15 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     check_free(json_path, force)
     module = registry.get(detector)
     trained = module.load(model)
-    files = [f for f in dataset.collect(flights, speed) if not folds or f.condition.fold in folds]
+    collected = dataset.collect(flights, speed)
+    files = [f for f in collected if not folds or f.condition.fold in folds]
     if not files:
         raise AirTouchError(f"no flight is in fold {', '.join(map(str, folds))} of the manifest")
+    reasons = dataset.not_taken(flights)
+    reasons["of another fold"] += len(collected) - len(files)
+    if reasons.total():
+        click.echo(f"airtouch: {len(files)} flights are scored, {reasons.total()} are not: "
+                   + ", ".join(f"{count} {reason}" for reason, count in (+reasons).items()), err=True)
     remarks: dict[str, list[str]] = {}
     with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
         def done(result: evaluate.Result | Exception) -> None:

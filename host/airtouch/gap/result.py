@@ -97,7 +97,7 @@ class Step:
         return {k: v for k, v in asdict(self).items() if v}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """The answer to where, which and how far.
 
@@ -138,6 +138,16 @@ class Diagnosis:
         answer = (named or ["effect"])[0] if self.verdict == "effect" else self.verdict
         if self.ranking and (answer != self.ranking[0].name or bool(named) != (self.verdict == "effect")):
             raise ValueError(f"the ranking begins with {self.ranking[0].name}, the verdict is {self.verdict} {named}")
+
+    def __repr__(self) -> str:
+        """One line: verdict, effects, the answer's probability, gap before and after; `plain` has everything."""
+        said = [self.verdict, ", ".join(e.name for e in self.effects)]
+        if self.ranking:
+            said.append(f"probability {self.ranking[0].probability:.0%}")
+        before, after = (self.gap.get(k) for k in ("before", "after"))
+        if before is not None and after is not None:
+            said.append(f"gap {before:.3g} before, {after:.3g} after (floor 1)")
+        return f"Diagnosis({'; '.join(s for s in said if s)})"
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, GAP.md's fields and more; floats rounded to six digits."""

@@ -98,10 +98,15 @@ def ranking_rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
              else f"{r.shrink.low:.2f} to {r.shrink.high:.2f}"} for r in summary.leading(diagnosis.ranking)]
 
 
+#: why the arm with the vehicle as declared has another gap before
+OTHER_START = ("without the calibration on the baseline flights, so model, floor and the gap before are others than "
+               "above")
+
+
 def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
     """Table of the gap before and after, the floor and the shrink: right effect, wrong effect, and both arms.
 
-    None without figures.
+    `why` of a row says why its gap before differs from the first row's, or is empty. None without figures.
     """
     keys = ("before", "after", "floor", "shrink")
     sources: list[tuple[str, Mapping[str, Any]]] = []
@@ -113,7 +118,10 @@ def how_far(diagnosis: Diagnosis) -> dict[str, Any] | None:
     sources += [(f"{named}, vehicle as {name}", arm) for name, arm in diagnosis.arms.items()
                 if isinstance(arm, Mapping)
                 and arm.get("shrink") != (diagnosis.shrink.plain() if diagnosis.shrink else None)]
-    rows = [{"name": name, "cells": [figure(some.get(k)) for k in keys]} for name, some in sources]
+    starts = [figure(some.get("before")) for _, some in sources]
+    rows = [{"name": name, "cells": [figure(some.get(k)) for k in keys],
+             "why": OTHER_START if start not in ("-", starts[0]) else ""}
+            for (name, some), start in zip(sources, starts, strict=True)]
     rows = [r for r in rows if any(v != "-" for v in r["cells"])]
     return {"columns": keys, "rows": rows} if rows else None
 

@@ -11,7 +11,7 @@ from airtouch.gap.answer import advice, words
 from airtouch.gap.answer.ranking import agreeing
 from airtouch.gap.result import Found, Quantity
 from airtouch.gap.where import summary
-from airtouch.report import gap_tables
+from airtouch.report import gap_report, gap_tables
 from airtouch.simulation import effects as registry
 from airtouch.simulation.effects import EFFECTS
 from made_diagnosis import VEHICLE, cell, diagnosis, of_flights
@@ -58,6 +58,15 @@ def test_headline_and_ranking_cannot_disagree():
             replace(good, **wrong)
 
 
+def test_a_diagnosis_prints_as_one_line():
+    cells = [cell("force_z", "hover", 1.0, after=0.1)]
+    two = diagnosis(cells, effects=(Found("motor_noise", {}), Found("weak_motor", {})))
+    assert repr(two) == str(two) == ("Diagnosis(effect; motor_noise, weak_motor; probability 93%; "
+                                     "gap 4 before, 1.3 after (floor 1))")
+    none = replace(diagnosis(cells, "none", ()), ranking=(), gap={})
+    assert str(none) == "Diagnosis(none)"
+
+
 def test_probabilities_agree_with_the_verdict():
     chance = {"wind": 0.2, "mass": 0.5, "none": 0.2, "unknown": 0.1}
     made = agreeing(chance, "unknown")
@@ -78,6 +87,11 @@ def test_closing_figures_are_one(flown, tmp_path):
     assert "from 4 to 1.3 times the floor" in words.sentences(found)[2]
     rows = gap_tables.how_far(found)["rows"]
     assert [r["name"] for r in rows] == ["imu_bias", "wrong effect: wind", "imu_bias, vehicle as declared"]
+    # the row that starts from another gap says why
+    assert [r["why"] for r in rows] == ["", "", gap_tables.OTHER_START]
+    page = tmp_path / "gap.html"
+    gap_report.write_diagnosis(page, found, command="x")
+    assert page.read_text().count(gap_tables.OTHER_START) == 1
 
 
 def test_json_has_headline_map_and_steps(flown):

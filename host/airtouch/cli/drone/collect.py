@@ -3,6 +3,7 @@
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -106,7 +107,7 @@ def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | Non
     from airtouch.crazyflie.connection.drone import Drone
     from airtouch.crazyflie.connection.link import default_cache
 
-    drone = Drone(plan.uri, cache or default_cache())
+    drone = Drone(plan.uri, cache or default_cache(), unanswered=waiting(plan.uri, stop))
     try:
         ready = readiness.make_ready(drone, plan.settings, plan.least_v, click.echo)
         for number, mission in missions.items():
@@ -143,6 +144,22 @@ def stopping(quiet: bool = False):
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def waiting(uri: str, stop: threading.Event) -> Callable[[str], None]:
+    """For `Drone`: what to say while nobody answers, once, on stderr. It raises AirTouchError after `stop`."""
+    from airtouch.crazyflie.connection.link import remedy
+
+    said: list[str] = []
+
+    def unanswered(reason: str) -> None:
+        if stop.is_set():
+            raise AirTouchError(f"{uri}: stopped before anybody answered")
+        if not said:
+            said.append(reason)
+            click.echo(f"airtouch: {uri}: no answer yet: {reason}; {remedy(uri)} Still trying.", err=True)
+
+    return unanswered
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.drone.collect import stopping
+from airtouch.cli.drone.collect import stopping, waiting
 from airtouch.cli.drone.replay import screen
 
 
@@ -36,7 +36,7 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
 
     pairs = [parse_setting(text) for text in settings]
     with stopping(quiet=True) as stop:
-        drone = Drone(uri, cache or default_cache())
+        drone = Drone(uri, cache or default_cache(), unanswered=waiting(uri, stop))
         try:
             for name, text in pairs:
                 drone.set_parameter(name, text)

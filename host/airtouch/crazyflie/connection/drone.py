@@ -25,10 +25,12 @@ KINDS = {code: kind for kind, code in CODES.items()} | {4: "go"}
 class Drone:
     """A connected drone. cflib's threads fill `samples` and `answers`; call the methods from one thread.
 
+    unanswered: called with the reason after each attempt to connect without an answer (`link.connect`).
     Raises AirTouchError if nobody answers at the URI.
     """
 
-    def __init__(self, uri: str, cache: Path | None = None, patience_s: float = CONNECT_S) -> None:
+    def __init__(self, uri: str, cache: Path | None = None, patience_s: float = CONNECT_S,
+                 unanswered: Callable[[str], None] = lambda reason: None) -> None:
         self.uri, self.cache = uri, cache
         self.samples: queue.SimpleQueue[Sample] = queue.SimpleQueue()
         self.answers: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
@@ -39,7 +41,7 @@ class Drone:
         self._log = LogBlocks(self.samples)
         self._reviving: threading.Thread | None = None
         self.crazyflie: Any = None  #: cflib's, while there is a link
-        self._listen(connect(uri, cache, patience_s, self._console.put))
+        self._listen(connect(uri, cache, patience_s, self._console.put, unanswered))
 
     # connection
 

@@ -47,10 +47,20 @@ def default_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "airtouch" / "drones"
 
 
-def connect(uri: str, cache: Path | None, patience_s: float, console: Callable[[str], None]) -> Any:
+def remedy(uri: str) -> str:
+    """What to check when nobody answers at the URI, as a question."""
+    if uri.startswith("udp"):
+        return "is `airtouch sitl` running and ready?"
+    return ("is the drone on, the radio plugged in and the URI right (radio://0/80/2M/E7E7E7E7E7, "
+            "udp://127.0.0.1:19850)?")
+
+
+def connect(uri: str, cache: Path | None, patience_s: float, console: Callable[[str], None],
+            unanswered: Callable[[str], None] = lambda reason: None) -> Any:
     """A connected cflib Crazyflie. A drone that keeps sending packets may take longer than `patience_s`.
 
-    console: called with pieces of the console's text, from the first on.
+    console: called with pieces of the console's text, from the first on. unanswered: called with the reason after each
+    attempt without an answer, the first about FIRST_S after the call; what it raises ends the attempts.
     Raises AirTouchError if nobody answers.
     """
     cflib_or_error()
@@ -77,10 +87,8 @@ def connect(uri: str, cache: Path | None, patience_s: float, console: Callable[[
             reason = failure[0].strip().splitlines()[0]
             time.sleep(min(0.5, max(deadline - time.monotonic(), 0.0)))
         disconnect(cf)
-    if uri.startswith("udp"):
-        raise AirTouchError(f"{uri}: no connection: {reason}; is `airtouch sitl` running and ready?")
-    raise AirTouchError(f"{uri}: no connection: {reason}; is the drone on, the radio plugged in and the URI "
-                        "right (radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850)?")
+        unanswered(reason)
+    raise AirTouchError(f"{uri}: no connection: {reason}; {remedy(uri)}")
 
 
 def disconnect(cf: Any) -> None:

@@ -94,6 +94,16 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
     return list(members.values())
 
 
+def not_taken(paths: Iterable[str | Path]) -> Counter[str]:
+    """Reason -> number of the flights in folders that `collect` does not take because of the folder's manifest."""
+    reasons: Counter[str] = Counter()
+    for folder in {p.resolve(): p for p in map(Path, paths) if (p / MANIFEST).is_file()}.values():
+        listed = read_manifest(folder / MANIFEST)
+        reasons.update(f"{c.use} in the manifest" for c in listed.values() if c.use not in (None, "clean"))
+        reasons["not in the manifest"] += sum(f.name not in listed for f in _logs(folder) if f.name != MANIFEST)
+    return +reasons
+
+
 def day_of(path: Path) -> str | None:
     """The day in a file's name, four digits before four of the time (`imu_data_0126-1906`), or None."""
     match = re.search(r"(\d{4})-\d{4}", path.name)
@@ -104,7 +114,7 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
     if listed:
         files = [folder / name for name, condition in listed.items() if condition.use in (None, "clean")]
     else:
-        files = sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith(SUFFIXES))
+        files = _logs(folder)
     if not files and listed:
         uses = Counter(str(condition.use) for condition in listed.values())
         raise AirTouchError(f"{folder}: no clean flight in its manifest, but "
@@ -113,6 +123,10 @@ def _flights_of(folder: Path, listed: dict[str, Condition]) -> list[Path]:
     if not files:
         raise AirTouchError(f"{folder}: no flights in this folder ({', '.join(SUFFIXES)})")
     return files
+
+
+def _logs(folder: Path) -> list[Path]:
+    return sorted(f for f in folder.iterdir() if f.is_file() and f.name.endswith(SUFFIXES))
 
 
 def _condition(row: dict[str, str | None], place: str) -> Condition:

@@ -1,0 +1,43 @@
+"""Connecting where nobody answers."""
+
+import socket
+import threading
+import time
+
+import pytest
+
+pytest.importorskip("cflib", reason="flying needs cflib")
+
+from airtouch.cli.drone.collect import waiting
+from airtouch.crazyflie.connection.drone import Drone
+from airtouch.errors import AirTouchError
+
+
+@pytest.fixture
+def silent():
+    """URI of a port that takes packets and never answers."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(("127.0.0.1", 0))
+        yield f"udp://127.0.0.1:{port.getsockname()[1]}"
+
+
+def test_within_three_seconds_it_is_said_that_nobody_answers(silent, capsys):
+    stop, times, began_s = threading.Event(), [], time.monotonic()
+    say = waiting(silent, stop)
+
+    def unanswered(reason):
+        times.append(time.monotonic() - began_s)
+        say(reason)
+
+    with pytest.raises(AirTouchError, match="no connection"):
+        Drone(silent, patience_s=3.0, unanswered=unanswered)
+    said = capsys.readouterr().err
+    assert times[0] < 3.0 and len(times) > 1
+    assert said.count("\n") == 1 and f"{silent}: no answer yet" in said and "is `airtouch sitl` running" in said
+
+
+def test_a_stop_ends_the_attempts(silent):
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(AirTouchError, match="stopped before anybody answered"):
+        Drone(silent, patience_s=30.0, unanswered=waiting(silent, stop))
