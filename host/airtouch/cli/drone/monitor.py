@@ -27,6 +27,7 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
 
     Where another program flies the drone over the same radio, let that one log instead.
     """
+    click.echo(f"connecting to {uri}", err=True)  # the imports may take seconds
     from airtouch.crazyflie import monitor
     from airtouch.crazyflie.checks import parse_setting
     from airtouch.crazyflie.connection.drone import Drone
