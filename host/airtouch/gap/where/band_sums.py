@@ -16,22 +16,25 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
+#: edges of the map's bands, Hz; the last ends at half the 100 Hz of the flights
 BANDS_HZ = ((0.0, 0.5), (0.5, 2.0), (2.0, 6.0), (6.0, 12.0), (12.0, 25.0), (25.0, 50.0))
-CROSSOVER = 0.3  #: half width of a crossover, in parts of its frequency
-BLOCK = 256  #: samples of a block at most
+CROSSOVER = 0.3  #: half the width of a crossover between two bands, as a fraction of its frequency
+BLOCK = 256  #: samples (2.56 s) that a block has about: a phase is cut into equal blocks of nearly this length
+#: names of the thirds of a flight, by its time in the air
 THIRDS = ("first", "second", "last")
-#: regimes beside "all": what they bound, unit, limits of the three bins
+#: regimes beside "all" and the thirds: the quantity, its unit, the two limits between its three bins
 BINS = (("height", "m", (0.1, 0.3)), ("speed", "m/s", (0.15, 0.5)), ("cell voltage", "V", (3.6, 3.9)))
 
 
-def _names() -> tuple[str, ...]:
+def _regime_names() -> tuple[str, ...]:
+    """Names of the regimes, in the order of their columns."""
     names = ["all"]
-    for what, unit, (low, high) in BINS:
-        names += [f"{what} < {low:g} {unit}", f"{what} {low:g}-{high:g} {unit}", f"{what} > {high:g} {unit}"]
-    return (*names, *(f"{t} third of the flight" for t in THIRDS))
+    for quantity, unit, (low, high) in BINS:
+        names += [f"{quantity} {limits} {unit}" for limits in (f"< {low:g}", f"{low:g}-{high:g}", f"> {high:g}")]
+    return (*names, *(f"{third} third of the flight" for third in THIRDS))
 
 
-REGIMES = _names()
+REGIMES = _regime_names()  #: names of the regimes; column r of every array over regimes belongs to REGIMES[r]
 
 
 @dataclass(frozen=True)
@@ -54,12 +57,12 @@ class Sums:
         keys, row = np.unique(np.column_stack([self.flight, self.phase]), axis=0, return_inverse=True)
         row = row.ravel()
 
-        def added(values: np.ndarray) -> np.ndarray:
+        def total(values: np.ndarray) -> np.ndarray:
             out = np.zeros((len(keys), *values.shape[1:]))
             np.add.at(out, row, values)
             return out
 
-        return Sums(keys[:, 1], keys[:, 0], added(self.weight), added(self.power), added(self.mean))
+        return Sums(keys[:, 1], keys[:, 0], total(self.weight), total(self.power), total(self.mean))
 
 
 def join(parts: Sequence[Sums]) -> Sums:
@@ -74,13 +77,13 @@ def join(parts: Sequence[Sums]) -> Sums:
 
 
 def gains(f: np.ndarray) -> np.ndarray:
-    """Amplitude gain (bands, len(f)) of each band at frequencies f, Hz; squares add up to 1."""
-    below = [np.zeros(len(f))]
+    """Amplitude gain (bands, len(f)) of each band at frequencies f, Hz; the squares of all bands add up to 1."""
+    lowpass = [np.zeros(len(f))]
     for _, edge in BANDS_HZ[:-1]:
-        place = np.clip((f - edge) / (2.0 * CROSSOVER * edge) + 0.5, 0.0, 1.0)
-        below.append(np.cos(0.5 * np.pi * place) ** 2)
-    below.append(np.ones(len(f)))
-    return np.sqrt(np.maximum(np.diff(below, axis=0), 0.0))
+        position = np.clip((f - edge) / (2.0 * CROSSOVER * edge) + 0.5, 0.0, 1.0)
+        lowpass.append(np.cos(0.5 * np.pi * position) ** 2)
+    lowpass.append(np.ones(len(f)))
+    return np.sqrt(np.maximum(np.diff(lowpass, axis=0), 0.0))
 
 
 def filtered(values: np.ndarray) -> np.ndarray:
@@ -93,23 +96,23 @@ def filtered(values: np.ndarray) -> np.ndarray:
 
 
 def regimes(flight: Flight, vehicle: Vehicle) -> np.ndarray:
-    """Which samples belong to each of REGIMES, bool (n, r); only "all" on the ground."""
+    """Membership of every sample in each of REGIMES, bool (n, r); samples on the ground are in "all" alone."""
     n, log = len(flight), flight.log
     out = np.zeros((n, len(REGIMES)), bool)
     out[:, 0] = True
     air = flight.phase != GROUND
-    known = {
+    quantities = {
         "height": flight.signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4].mean(axis=1) if log.has("zrange_m")
         else None,
         "speed": np.hypot(log["vx_mps"], log["vy_mps"]) if log.has("vx_mps", "vy_mps") else None,
         "cell voltage": log["vbat_V"] / vehicle.battery_cells if log.has("vbat_V") else None,
     }
-    for i, (what, _, limits) in enumerate(BINS):
-        value = known[what]
+    for i, (quantity, _, limits) in enumerate(BINS):
+        value = quantities[quantity]
         if value is not None:
-            place = np.where(np.isfinite(value), np.digitize(value, limits), -1)
+            bin_index = np.where(np.isfinite(value), np.digitize(value, limits), -1)
             for k in range(3):
-                out[:, 1 + 3 * i + k] = air & (place == k)
+                out[:, 1 + 3 * i + k] = air & (bin_index == k)
     third = np.minimum(3 * np.cumsum(air) // max(int(air.sum()) + 1, 1), 2)
     for k in range(3):
         out[:, 1 + 3 * len(BINS) + k] = air & (third == k)
@@ -117,17 +120,17 @@ def regimes(flight: Flight, vehicle: Vehicle) -> np.ndarray:
 
 
 def sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
-    """Sums of one flight's gap (n, COUNT)."""
+    """Block sums of one flight's residual (n, COUNT), in the channels' units; lost samples are left out."""
     member = regimes(flight, vehicle)
     parts: list[tuple] = []
     for start, stop in stretches(flight):
-        good = ~flight.bridged[start:stop]
-        values = _bridged(residual[start:stop], good)
+        valid = ~flight.bridged[start:stop]
+        values = _interpolated(residual[start:stop], valid)
         bands = filtered(values)
         flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
         for first, last in _blocks(flight.phase[start:stop]):
             here = slice(first, last)
-            mask = (member[start:stop][here] & good[here, None]).T.astype(np.float64)
+            mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
             if mask[0].any():
                 parts.append((flight.phase[start + first], mask.sum(axis=1),
                               (mask @ flat[here]).reshape(len(REGIMES), len(BANDS_HZ), COUNT),
@@ -147,34 +150,37 @@ def stretches(flight: Flight) -> list[tuple[int, int]]:
 
 
 def sensor_rms(vehicle: Vehicle) -> np.ndarray:
-    """What the declared sensor noise alone gives in each band, (bands, COUNT); 0 for commands."""
+    """Rms (bands, COUNT) that the declared sensor noise alone has in each band; 0 for commands.
+
+    White noise is averaged over 2,000 frequencies up to half the sampling rate; torque is its difference quotient.
+    """
     row = prepare(vehicle, ())[0][0]
     f = (np.arange(2000) + 0.5) * 0.00025 / PERIOD_S
-    share = gains(f) ** 2
-    flat = share.mean(axis=1)
-    rising = (share * 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2).mean(axis=1) / PERIOD_S ** 2
+    gain = gains(f) ** 2
+    white = gain.mean(axis=1)
+    differenced = (gain * 4.0 * np.sin(np.pi * f * PERIOD_S) ** 2).mean(axis=1) / PERIOD_S ** 2
     out = np.zeros((len(BANDS_HZ), COUNT))
-    out[:, :3] = flat[:, None] * np.asarray(row["acc_noise"]) ** 2
-    out[:, TORQUE] = rising[:, None] * np.asarray(row["gyro_noise"]) ** 2
-    out[:, RATE] = flat[:, None] * np.asarray(row["gyro_noise"]) ** 2
+    out[:, :3] = white[:, None] * np.asarray(row["acc_noise"]) ** 2
+    out[:, TORQUE] = differenced[:, None] * np.asarray(row["gyro_noise"]) ** 2
+    out[:, RATE] = white[:, None] * np.asarray(row["gyro_noise"]) ** 2
     return np.sqrt(out)
 
 
-def _bridged(values: np.ndarray, good: np.ndarray) -> np.ndarray:
-    """Lost samples replaced by straight lines; channels that a flight cannot have stay NaN."""
+def _interpolated(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """The values (n, c) with straight lines over the samples that are not valid; absent channels stay NaN."""
     out = np.array(values)
-    if not good.all() and good.any():
+    if not valid.all() and valid.any():
         index = np.arange(len(out))
         for c in range(out.shape[1]):
-            out[:, c] = np.interp(index, index[good], out[good, c])
+            out[:, c] = np.interp(index, index[valid], out[valid, c])
     return out
 
 
 def _blocks(phase: np.ndarray) -> list[tuple[int, int]]:
     """Runs of one phase cut into equal blocks of about BLOCK samples; short phases are one block."""
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
-    found = []
+    blocks = []
     for a, b in zip(bounds[:-1], bounds[1:], strict=True):
         cuts = np.linspace(a, b, max(round((b - a) / BLOCK), 1) + 1).astype(int)
-        found += list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
-    return found
+        blocks += list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
+    return blocks

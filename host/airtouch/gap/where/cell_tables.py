@@ -1,4 +1,4 @@
-"""Cells of the gap map from block sums: rms with its interval, and the floors."""
+"""The cells of the gap map, made from block sums: their rms with its interval, and their floors."""
 
 from dataclasses import dataclass
 
@@ -9,20 +9,25 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums
 from airtouch.logs.segments import KINDS
 
-DRAWS = 400
-LEAST_FLIGHTS = 5  #: with fewer, blocks are drawn and not flights
-LEAST_SECONDS = 0.3  #: a cell with less is left out
-INTERVAL = (5.0, 95.0)
-SIGMAS = 1.645  #: the same of a normal distribution
-FREEDOM = 4.0  #: independent values that a block counts for at most: blocks differ by more than chance
-AIR = "air"  #: floor of phases that no nominal flight had
+DRAWS = 400  #: bootstrap samples of each phase
+LEAST_FLIGHTS = 5  #: flights from which on the bootstrap draws flights; of fewer it draws blocks
+LEAST_SECONDS = 0.3  #: seconds that a cell needs; one with less is left out
+INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
+SIGMAS = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
+FREEDOM = 4.0  #: degrees of freedom of a block at most, as blocks differ by more than chance
+AIR = "air"  #: key of the floor of phases in which no nominal flight was
 
+#: phase, or AIR: floor and its upper end, (regimes, bands, COUNT) each
 Floors = dict[int | str, tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class Table:
-    """rms (regimes, bands, COUNT) of one phase with its interval; seconds (regimes,)."""
+    """The cells of one phase.
+
+    rms, low, high (regimes, bands, COUNT): root mean square and the ends of its 90 % interval, in the channels' units;
+    seconds, blocks, flights (regimes,): time, blocks and flights of which they are made.
+    """
 
     rms: np.ndarray
     low: np.ndarray
@@ -33,7 +38,7 @@ class Table:
 
 
 def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
-    """One phase's rms with intervals."""
+    """The cells of one phase from all sums, None where no flight has it; seed: of the bootstrap."""
     rows = all_sums.phase == phase
     if not rows.any():
         return None
@@ -49,70 +54,74 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
     low, high = _bootstrap(part.weight, part.power, seed)
     seconds = weight * PERIOD_S
     width = np.array([b - a for a, b in BANDS_HZ])
-    most = np.maximum(FREEDOM * blocks, 1.0)[:, None]
-    freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, most)[:, :, None]
+    limit = np.maximum(FREEDOM * blocks, 1.0)[:, None]
+    freedom = np.clip(2.0 * seconds[:, None] * width, 1.0, limit)[:, :, None]
     narrow, wide = (mean_square * freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
     narrow[:, 0], wide[:, 0] = _offset(part.mean.sum(axis=0) / total[:, 0], mean_square[:, 0], freedom[:, 0])
     low, high = np.minimum(low, narrow), np.maximum(high, wide)
     return Table(np.sqrt(mean_square), np.sqrt(low), np.sqrt(high), seconds, blocks, flights)
 
 
-def _rows(some: Sums, rows: np.ndarray) -> Sums:
-    return Sums(some.phase[rows], some.flight[rows], some.weight[rows], some.power[rows], some.mean[rows])
+def _rows(sums: Sums, rows: np.ndarray) -> Sums:
+    """The sums of some of the rows: rows is an index or a mask."""
+    return Sums(sums.phase[rows], sums.flight[rows], sums.weight[rows], sums.power[rows], sums.mean[rows])
 
 
 def _offset(mean: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Interval of a mean square that is a constant and something that varies around it."""
-    rest = np.maximum(square - mean ** 2, 0.0)
-    error = SIGMAS * np.sqrt(rest / freedom)
+    variance = np.maximum(square - mean ** 2, 0.0)
+    error = SIGMAS * np.sqrt(variance / freedom)
     below, above = (freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
     size = np.abs(mean)
-    return np.maximum(size - error, 0.0) ** 2 + rest * below, (size + error) ** 2 + rest * above
+    return np.maximum(size - error, 0.0) ** 2 + variance * below, (size + error) ** 2 + variance * above
 
 
 def _bootstrap(weight: np.ndarray, power: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Percentiles of the mean square, rows drawn with replacement, (regimes, bands, COUNT) each."""
+    """The two percentiles of INTERVAL of the mean square (regimes, bands, COUNT), by a bootstrap over the rows."""
     n = len(weight)
     draws = np.random.default_rng(seed).multinomial(n, np.full(n, 1.0 / n), DRAWS).astype(np.float64)
     low, high = np.zeros(power.shape[1:]), np.zeros(power.shape[1:])
     for r in range(weight.shape[1]):
-        drawn = draws @ weight[:, r]
-        usable = drawn > 0
+        samples = draws @ weight[:, r]
+        usable = samples > 0
         if not usable.any():
             continue
-        means = (draws[usable] @ power[:, r].reshape(n, -1)) / drawn[usable, None]
+        means = (draws[usable] @ power[:, r].reshape(n, -1)) / samples[usable, None]
         low[r], high[r] = np.percentile(means, INTERVAL, axis=0).reshape(2, *power.shape[2:])
     return low, high
 
 
 def floors_of(nominal: Sums, count: int, sensor: np.ndarray) -> Floors:
-    """Phase -> floor and its upper end, (regimes, bands, COUNT); AIR for phases never flown."""
+    """The floors by phase, of `count` nominal flights; that of AIR serves phases in which none was.
+
+    sensor: `sensor_rms`, below which no floor lies.
+    """
     shape = (len(REGIMES), *sensor.shape)
     least = np.broadcast_to(sensor, shape)
-    found: Floors = {GROUND: (least, least), AIR: (least, least)}
+    floors: Floors = {GROUND: (least, least), AIR: (least, least)}
     air = Sums(np.where(nominal.phase == GROUND, GROUND, 1), nominal.flight, nominal.weight, nominal.power,
                nominal.mean)
-    of: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
-    for key, source, phase in of:
+    sources: list[tuple[int | str, Sums, int]] = [(AIR, air, 1), *((k, nominal, k) for k in range(len(KINDS)))]
+    for key, source, phase in sources:
         spread = _without_common(source, phase, count)
         table = table_of(spread, phase, seed=100) if spread is not None else None
         if table is None:
             continue
-        wide = table.rms[:1], table.high[:1]  # where a regime was never flown, the phase as a whole
-        there = (table.seconds >= LEAST_SECONDS)[:, None, None]
+        whole = table.rms[:1], table.high[:1]  # of the phase, for regimes in which no nominal flight was
+        enough = (table.seconds >= LEAST_SECONDS)[:, None, None]
         own = table.rms, table.high
-        level, top = (np.where(there, one, every) for one, every in zip(own, wide, strict=True))
+        level, top = (np.where(enough, *pair) for pair in zip(own, whole, strict=True))
         level, top = (np.where(np.isfinite(v), v, least) for v in (level, top))
-        found[key] = np.maximum(level, least), np.maximum(top, least)
-    return found
+        floors[key] = np.maximum(level, least), np.maximum(top, least)
+    return floors
 
 
-def spreads_of(found: Sums, sensor: np.ndarray) -> Floors:
-    """Phase -> floor without a baseline: sensor noise, and the spread between flights (a single one: blocks)."""
+def spreads_of(sums: Sums, sensor: np.ndarray) -> Floors:
+    """The floors by phase without a baseline: sensor noise, and the spread between flights (of one: its blocks)."""
     spreads: dict[int | str, np.ndarray] = {}
     for k in range(len(KINDS)):
-        rows = found.phase == k
-        part = _rows(found, rows)
+        rows = sums.phase == k
+        part = _rows(sums, rows)
         if len(np.unique(part.flight)) > 1:
             part = part.by_phase()
         long = part.weight[:, 0] >= LEAST_SECONDS / PERIOD_S
@@ -129,7 +138,10 @@ def spreads_of(found: Sums, sensor: np.ndarray) -> Floors:
 
 
 def _without_common(nominal: Sums, phase: int, count: int) -> Sums | None:
-    """One phase of the baseline less what all its flights have in common in the lowest band."""
+    """The sums of one phase of the baseline without the mean that all its flights share in the lowest band.
+
+    None where no flight has the phase. count: number of nominal flights, for the unbiased variance.
+    """
     rows = nominal.phase == phase
     if not rows.any():
         return None

@@ -23,7 +23,8 @@ from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums, gains, join, s
 from airtouch.gap.where.cell_tables import AIR, LEAST_SECONDS, Table, floors_of, spreads_of, table_of
 from airtouch.logs.segments import KINDS
 
-LEAST_SHARE = 0.05  #: an effect that takes less of a cell's gap is not its cause
+LEAST_SHARE = 0.05  #: fraction of a cell's gap over the floor that an effect must take to be given as its cause
+TINY = 1e-12  #: denominator at least, in a channel's unit: no rms over a floor of 0 is infinite
 
 CHANNEL_WORDS = {
     "force_x": "forward force", "force_y": "sideways force", "force_z": "lift",
@@ -38,13 +39,13 @@ PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "i
 
 @dataclass(frozen=True)
 class Part:
-    """What one flight adds to a map."""
+    """The block sums of one flight, without effects (before) and with those named in the model (after)."""
 
     name: str
     before: Sums
     after: Sums | None
     has_gyro: bool
-    alone: tuple[Sums, ...] = ()  #: with one of the effects each, where there are several
+    alone: tuple[Sums, ...] = ()  #: sums with one of the effects in the model each, where there are several
 
 
 def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] = (),
@@ -60,31 +61,31 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] 
 
 def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
-    left = residual(flight, study.vehicle, study.calibration, study.controller)
-    after = _after(study, flight, terms) if terms else None
-    return Part(flight.name, sums(flight, left, study.vehicle), after, flight.rates is not None,
-                tuple(_after(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
+    gap = residual(flight, study.vehicle, study.calibration, study.controller)
+    after = _sums_with(study, flight, terms) if terms else None
+    return Part(flight.name, sums(flight, gap, study.vehicle), after, flight.rates is not None,
+                tuple(_sums_with(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
 
 
 def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
              effects: Sequence[str] = ()) -> GapMap:
-    """The map of flights that were gone through one by one; effects: names of the terms they were given."""
+    """The map made of the parts of flights; effects: names of the terms with which the parts were made."""
     joined, sensor = join([p.before for p in parts]), sensor_rms(study.vehicle)
     floors = floors_of(join([p.before for p in nominal]), len(nominal), sensor) if nominal \
         else spreads_of(joined, sensor)
-    later = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
+    after = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
     alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
-             else [later] if later is not None else [])
+             else [after] if after is not None else [])
     no_gyro = not any(p.has_gyro for p in parts)
     cells = []
     for k, kind in enumerate(KINDS):
         table = table_of(joined, k, seed=k)
         if table is None:
             continue
-        then = table_of(later, k, seed=k) if later is not None else None
+        table_after = table_of(after, k, seed=k) if after is not None else None
         level, top = floors.get(k) or (floors[GROUND] if k == GROUND else floors[AIR])
-        best = _best([_rms(a, k) for a in alone], effects, table.rms, level) if then else None
-        cells += _cells(kind, table, then, best, level, top, bool(nominal), no_gyro)
+        best = _best([_rms(a, k) for a in alone], effects, table.rms, level) if table_after else None
+        cells += _cells(kind, table, table_after, best, level, top, bool(nominal), no_gyro)
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
 
 
@@ -94,7 +95,7 @@ def significant(cell: Cell) -> bool:
 
 
 def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
-    """The significant cells that surely stand out most from their floor, largest first.
+    """The significant cells with the largest ratio of lower end to upper end of the floor, largest first.
 
     Of a channel, band and phase the regime is named in which the gap is significantly
     larger than in the phase as a whole, if there is one.
@@ -114,32 +115,32 @@ def largest(cells: Iterable[Cell], count: int = 10) -> list[Cell]:
     return sorted(best.values(), key=sure_ratio, reverse=True)[:count]
 
 
-def where(made: GapMap, count: int = 10) -> list[Cell]:
+def where(of_map: GapMap, count: int = 10) -> list[Cell]:
     """The largest cells, then the largest of each phase, and those from which the effects take most."""
-    chosen = largest(made.cells, count)
-    every = largest(made.cells, len(made.cells))
-    more = [next((c for c in every if c.phase == kind), None) for kind in KINDS]
-    closed = [((c.after - c.gap) / max(c.floor_high or c.floor, 1e-12), c) for c in every if c.after is not None]
-    more += [c for _, c in sorted(closed, key=lambda x: x[0])[:3]]
+    chosen = largest(of_map.cells, count)
+    ordered = largest(of_map.cells, len(of_map.cells))
+    more = [next((c for c in ordered if c.phase == kind), None) for kind in KINDS]
+    reductions = [((c.after - c.gap) / max(c.floor_high or c.floor, TINY), c) for c in ordered if c.after is not None]
+    more += [c for _, c in sorted(reductions, key=lambda x: x[0])[:3]]
     others = {c for c in more if c is not None and c not in chosen}
     return chosen + sorted(others, key=sure_ratio, reverse=True)
 
 
 def ratio(cell: Cell) -> float:
-    """Gap over floor."""
-    return cell.gap / max(cell.floor, 1e-12)
+    """The cell's gap over its floor."""
+    return cell.gap / max(cell.floor, TINY)
 
 
 def sure_ratio(cell: Cell) -> float:
-    """Lower end of the gap over the upper end of the floor."""
-    return (cell.low or 0.0) / max(cell.floor_high or cell.floor, 1e-12)
+    """The lower end of the cell's gap over the upper end of its floor."""
+    return (cell.low or 0.0) / max(cell.floor_high or cell.floor, TINY)
 
 
 def overall(cells: Iterable[Cell], key: str = "gap") -> float:
-    """Root mean square of gap (or `after`) over floor, all channels, bands and phases in the air alike."""
-    found = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != "ground"
+    """Root mean square over all cells in the air of gap (or `after`) over floor, each with the same weight."""
+    ratios = [getattr(c, key) / c.floor for c in cells if c.regime == "all" and c.phase != "ground"
              and getattr(c, key) is not None and c.floor > 0.0]
-    return float(np.sqrt(np.mean(np.square(found)))) if found else float("nan")
+    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
 
 
 def in_words(cell: Cell) -> str:
@@ -156,79 +157,85 @@ def interval(cell: Cell) -> str:
 
 
 def short(value: float) -> str:
-    """Two digits, or the whole part where that has more."""
+    """The value with two digits, or its whole part where that has more."""
     return f"{value:.0f}" if 10.0 <= abs(value) < 1e5 else f"{value:.2g}"
 
 
-def _after(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
-    """Sums with effects in the model; the power of random ones is taken off, and what is too much counts."""
+def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
+    """A flight's block sums with effects in the model.
+
+    The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
+    as gap.
+    """
     active = [t.active() for t in terms if t.kind == MEAN]
-    left = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
-                study.vehicle)
+    gap = sums(flight, residual(flight, study.vehicle, (*study.calibration, *active), study.controller),
+               study.vehicle)
     random = random_of(terms)
-    if not random or not len(left.phase):
-        return left
+    if not random or not len(gap.phase):
+        return gap
     data = Data(study, [flight])
     sensor = sensor_rms(study.vehicle) ** 2
-    power = left.power.copy()
-    for place, regime in ((left.phase == GROUND, "ground"), (left.phase != GROUND, "air")):
-        share = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
-        added = sum(np.einsum("bf,fc->bc", share, p.mean(axis=0)) if len(p) else 0.0
+    power = gap.power.copy()
+    for rows, regime in ((gap.phase == GROUND, "ground"), (gap.phase != GROUND, "air")):
+        density = gains(frequencies(regime)) ** 2 * frequencies(regime)[1]
+        modelled = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
                     for p in (random_effects.power(data, t)[0][regime] for t in random))
-        weight = left.weight[place][:, :, None, None]
-        rest = np.minimum(sensor * weight, left.power[place])
-        power[place] = rest + np.abs(left.power[place] - rest - weight * added)
-    return replace(left, power=power)
+        weight = gap.weight[rows][:, :, None, None]
+        noise = np.minimum(sensor * weight, gap.power[rows])
+        power[rows] = noise + np.abs(gap.power[rows] - noise - weight * modelled)
+    return replace(gap, power=power)
 
 
-def _rms(found: Sums, phase: int) -> np.ndarray:
-    rows = found.phase == phase
-    samples = np.maximum(found.weight[rows].sum(axis=0), 1.0)
-    return np.sqrt(found.power[rows].sum(axis=0) / samples[:, None, None])
+def _rms(of_sums: Sums, phase: int) -> np.ndarray:
+    """Root mean square (regimes, bands, COUNT) over one phase."""
+    rows = of_sums.phase == phase
+    samples = np.maximum(of_sums.weight[rows].sum(axis=0), 1.0)
+    return np.sqrt(of_sums.power[rows].sum(axis=0) / samples[:, None, None])
 
 
 def _best(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
           floor: np.ndarray) -> np.ndarray:
-    """For each cell the effect that alone takes most from it, "" where each takes little."""
+    """Name of the effect that alone takes most from each cell, "" where none takes LEAST_SHARE of it."""
     with np.errstate(invalid="ignore"):
-        taken = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, 1e-12))
-    best = np.array(effects, dtype=object)[taken.argmax(axis=0)]
-    return np.where((taken.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
+        reduction = np.nan_to_num((gap - np.array(alone)) / np.maximum(gap - floor, TINY))
+    best = np.array(effects, dtype=object)[reduction.argmax(axis=0)]
+    return np.where((reduction.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
 
-def _cells(kind: str, table: Table, then: Table | None, best: np.ndarray | None, level: np.ndarray,
+def _cells(kind: str, table: Table, table_after: Table | None, best: np.ndarray | None, level: np.ndarray,
            top: np.ndarray, baseline: bool, no_gyro: bool) -> list[Cell]:
+    """The cells of one phase; level, top: floor and its upper end; best: name of the effect that takes most."""
     cells = []
-    shown = _shown(kind, baseline, no_gyro)
+    visible = _visible(kind, baseline, no_gyro)
     for r, regime in enumerate(REGIMES):
         if table.seconds[r] < LEAST_SECONDS:
             continue
         for b, band in enumerate(BANDS_HZ):
             for c, channel in enumerate(CHANNELS):
-                if not shown[b, c] or not np.isfinite(table.rms[r, b, c]):
+                if not visible[b, c] or not np.isfinite(table.rms[r, b, c]):
                     continue
                 cells.append(Cell(
                     channel.name, band, kind, float(table.rms[r, b, c]), float(level[r, b, c]), channel.unit,
                     float(table.low[r, b, c]), float(table.high[r, b, c]), regime, int(table.blocks[r]),
-                    int(table.flights[r]), None if then is None else float(then.rms[r, b, c]),
+                    int(table.flights[r]), None if table_after is None else float(table_after.rms[r, b, c]),
                     float(top[r, b, c]), (best[r, b, c] or None) if best is not None else None))
     return cells
 
 
-def _shown(kind: str, baseline: bool, no_gyro: bool) -> np.ndarray:
-    """Which cells mean something, bool (bands, COUNT).
+def _visible(kind: str, baseline: bool, no_gyro: bool) -> np.ndarray:
+    """Mask (bands, COUNT) of the cells that mean something in a phase.
 
     Rates hold turns that were flown, so in the air they are only held against baseline
     flights; without a gyro torque is known at low frequency only; commands need a law.
     """
-    shown = np.ones((len(BANDS_HZ), COUNT), bool)
-    shown[1:, RATE] = False
-    shown[:, RATE] &= kind == "ground" or baseline
-    shown[0, COMMAND], shown[-1, COMMAND] = False, False
+    visible = np.ones((len(BANDS_HZ), COUNT), bool)
+    visible[1:, RATE] = False
+    visible[:, RATE] &= kind == "ground" or baseline
+    visible[0, COMMAND], visible[-1, COMMAND] = False, False
     if kind == "ground":
-        shown[:, COMMAND] = False
+        visible[:, COMMAND] = False
     if no_gyro:
-        shown[1:, TORQUE] = False
+        visible[1:, TORQUE] = False
     if no_gyro and kind == "ground":
-        shown[:, TORQUE] = False
-    return shown
+        visible[:, TORQUE] = False
+    return visible

@@ -14,7 +14,9 @@ from airtouch.logs.segments import KINDS
 
 GROUND = "ground"
 MOST_RANKED = 10  #: candidates of a ranking that are shown
-WORSE = 1.1  #: times the gap before, from which a cell has become worse
+WORSE = 1.1  #: gap with the effects over gap without, from which on a cell has become worse
+TINY = 1e-12  #: floor at least, in a channel's unit: no gap over a floor of 0 is infinite
+HALF = 0.5  #: fraction of a cell's energy from which on the named effects close it
 
 
 @dataclass(frozen=True)
@@ -35,17 +37,18 @@ class Phase:
     energy: float
 
     def plain(self) -> dict[str, Any]:
+        """The figures as JSON has them, without those that there are not."""
         return {k: v for k, v in asdict(self).items() if v is not None}
 
 
 def over_floor(cell: Cell, value: float | None = None) -> float:
-    """Gap, or another value of the cell, over the upper end of the floor."""
-    return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, 1e-12)
+    """The cell's gap, or another value in its unit, over the upper end of its floor."""
+    return (cell.gap if value is None else value) / max(cell.floor_high or cell.floor, TINY)
 
 
 def after(cell: Cell) -> float:
-    """Gap over floor with the named effects in the model; as it was, where they were not tried in it."""
-    return (cell.gap if cell.after is None else cell.after) / max(cell.floor, 1e-12)
+    """The cell's gap over its floor with the named effects in the model; the gap without them, where none was tried."""
+    return (cell.gap if cell.after is None else cell.after) / max(cell.floor, TINY)
 
 
 def stands_out(cell: Cell) -> bool:
@@ -54,11 +57,10 @@ def stands_out(cell: Cell) -> bool:
 
 
 def stays(cell: Cell) -> bool:
-    """Whether the cell stands out with the named effects in the model:
-    its interval, moved with it, above the floor's."""
+    """Whether the cell's interval, moved with the named effects in the model, lies above that of the floor."""
     if cell.after is None:
         return stands_out(cell)
-    low = cell.after * (1.0 if cell.low is None else cell.low / max(cell.gap, 1e-12))
+    low = cell.after * (1.0 if cell.low is None else cell.low / max(cell.gap, TINY))
     return low > (cell.floor_high or cell.floor)
 
 
@@ -68,7 +70,7 @@ def got_worse(cell: Cell) -> bool:
 
 
 def energy(cell: Cell) -> float:
-    """Power of the gap over its floor times the number of blocks: what the cell is in the whole flight."""
+    """Power of the gap over its floor times the number of blocks: the cell's part in the whole flight."""
     return max(cell.blocks, 1) * max(over_floor(cell) ** 2 - 1.0, 0.0) if stands_out(cell) else 0.0
 
 
@@ -81,7 +83,7 @@ def removed(cell: Cell) -> float:
 
 def closes(cell: Cell) -> bool:
     """Whether the named effects take half or more of the cell's power over the floor."""
-    return removed(cell) >= 0.5 * energy(cell) > 0.0
+    return removed(cell) >= HALF * energy(cell) > 0.0
 
 
 def headline(cells: Iterable[Cell], named: bool = False) -> Cell | None:
@@ -120,18 +122,18 @@ def worse(cells: Iterable[Cell]) -> list[Cell]:
 
 
 def phases(cells: Sequence[Cell]) -> tuple[Phase, ...]:
-    """Every phase with its figures, that with most energy first."""
-    made = []
+    """The phases of the flights with their figures, that with most energy first."""
+    out = []
     for kind in KINDS:
-        some = [c for c in cells if c.phase == kind and c.regime == "all"]
-        if not some:
+        own = [c for c in cells if c.phase == kind and c.regime == "all"]
+        if not own:
             continue
-        after = [c.after / max(c.floor, 1e-12) for c in some if c.after is not None]
-        made.append(Phase(kind, rms([c.gap / max(c.floor, 1e-12) for c in some]),
-                          rms(after) if len(after) == len(some) else None, len(some),
-                          sum(stands_out(c) for c in some), sum(stays(c) for c in some),
-                          sum(got_worse(c) for c in some), sum(energy(c) for c in some)))
-    return tuple(sorted(made, key=lambda p: -p.energy))
+        after = [c.after / max(c.floor, TINY) for c in own if c.after is not None]
+        out.append(Phase(kind, rms([c.gap / max(c.floor, TINY) for c in own]),
+                          rms(after) if len(after) == len(own) else None, len(own),
+                          sum(stands_out(c) for c in own), sum(stays(c) for c in own),
+                          sum(got_worse(c) for c in own), sum(energy(c) for c in own)))
+    return tuple(sorted(out, key=lambda p: -p.energy))
 
 
 def leading(ranking: Sequence[Ranked]) -> list[Ranked]:
@@ -140,4 +142,5 @@ def leading(ranking: Sequence[Ranked]) -> list[Ranked]:
 
 
 def rms(values: Sequence[float]) -> float:
+    """Root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values))))
