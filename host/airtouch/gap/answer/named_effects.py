@@ -15,58 +15,66 @@ from airtouch.gap.result import Found
 from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term, parameter_of
 from airtouch.simulation.effects import get
 
-SHAPE_PRICE = 1.0  #: log likelihood that another shape of an effect must gain on all the data
+SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data
 RESTARTS = 12  #: of a fit of several parameters, at most
 WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
-ASSUMED = 0.1  #: of a parameter, by which the model of the loop or of a random effect's spectrum may be wrong
-#: of a parameter, by which the loop's model may be wrong where another measurement stands beside it: replayed inertia
-#: and late sensors lay 27 and 29 % off, the median of nine flights of two opened sealed sets
-LOOP_ASSUMED = 0.25
+#: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong
+MODEL_ERROR = 0.1
+#: fraction of a parameter by which the loop's model may be wrong where the relations of signals measure it too:
+#: replayed inertia and late sensors lay 27 and 29 % off, the median of nine flights of two opened sealed sets
+LOOP_ERROR = 0.25
 
 
 def chosen_effects(data: Data, selection: Selection) -> list[Found]:
-    """The effects chosen, fitted anew on all the data, with 90 % intervals."""
+    """The effects that the selection chose, fitted anew to all the data, with 90 % intervals.
+
+    Their order is that of the selection, so that the first is the first of the ranking.
+    """
     judged = selection.whole
     if selection.chosen is None or judged is None:
         return []
-    others = [t for t in judged.terms if t.kind != CLOCK]
+    replayed = [t for t in judged.terms if t.kind != CLOCK]
     whole = whole_of(data)
-    fitted = (best_shape(data, whole, others, _middle(judged)) if others
+    fitted = (best_shape(data, whole, replayed, _mean_of_halves(judged)) if replayed
               else Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0))
     chosen = {t.name for t in selection.chosen.terms}
-    out, place = [], 0
+    out, first = [], 0
     for t in fitted.terms:
-        part = slice(place, place + len(t.free)) if t.kind == MEAN else None
+        part = slice(first, first + len(t.free)) if t.kind == MEAN else None
         if part is not None:
-            place += len(t.free)
+            first += len(t.free)
         if t.name not in chosen:
             continue
         if t.companion:
             out = [with_random_part(e, t) for e in out]
             continue
         x = fitted.scaled[part] if part is not None else t.scaled(t.values)
-        known = fitted.covariance[part, part] if part is not None else strength_variance(data, whole, fitted.terms, t)
-        spread = _spread(data.study.controller, judged, t, known,
-                         ASSUMED if selection.inference is None else LOOP_ASSUMED)
+        covariance = (fitted.covariance[part, part] if part is not None
+                      else strength_variance(data, whole, fitted.terms, t))
+        spread = _spread(data.study.controller, judged, t, covariance,
+                         MODEL_ERROR if selection.inference is None else LOOP_ERROR)
         out.append(Found(t.name, t.quantities(x, spread), t.gate))
     for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
         out.append(Found(t.name, t.quantities(t.scaled(t.values), _of_clock(t, sum(len(f) for f in data.flights)))))
     if selection.inference is not None:
         out = [with_reading(e, selection.inference.readings.get(e.name, {})) for e in out]
     order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
-    return sorted(out, key=lambda e: order.get(e.name, len(order)))  # the first is that of the ranking
+    return sorted(out, key=lambda e: order.get(e.name, len(order)))
 
 
 def best_shape(data: Data, whole: Part, terms: Sequence[Term], start: np.ndarray | None) -> Fit:
-    """Effects fitted to all the data, in the shape that gains most; another than that found must earn its choice."""
+    """Effects fitted to all the data, in the shape that gains most.
+
+    start: scaled parameters from which the fit begins. A shape other than that of the terms must gain SHAPE_PRICE.
+    """
     best = fit(data, whole, terms, start)
     for i, term in enumerate(terms):
         level = judge(data, whole, best.terms) + SHAPE_PRICE
         for shaped in term.shaped():
-            tried = fit(data, whole, [*terms[:i], shaped, *terms[i + 1:]], start)
-            gained = judge(data, whole, tried.terms)
-            if gained > level:
-                best, level = tried, gained
+            trial = fit(data, whole, [*terms[:i], shaped, *terms[i + 1:]], start)
+            gain = judge(data, whole, trial.terms)
+            if gain > level:
+                best, level = trial, gain
     return converged(data, whole, best)
 
 
@@ -79,17 +87,17 @@ def converged(data: Data, whole: Part, best: Fit) -> Fit:
     level = judge(data, whole, best.terms)
     for _ in range(RESTARTS if len(best.scaled) > 1 else 0):
         again = fit(data, whole, best.terms, best.scaled)
-        gained = judge(data, whole, again.terms)
-        if gained > level:
+        reached = judge(data, whole, again.terms)
+        if reached > level:
             best = again
-        if gained < level + SETTLED:
+        if reached < level + SETTLED:
             break
-        level = gained
+        level = reached
     return best
 
 
 def with_random_part(effect: Found, part: Term) -> Found:
-    """An effect with its random part as fitted, so that it can be switched on as it stands.
+    """The effect with its random part as fitted, so that a simulator can switch it on unchanged.
 
     The part was fitted at its own strength (1, of the published curve), while the effect has one strength for
     mean and random part: the part's parameters are divided by it. A mean too weak to carry them within their
@@ -97,16 +105,16 @@ def with_random_part(effect: Found, part: Term) -> Found:
     """
     if effect.name != part.name:
         return effect
-    own, given = part.values["strength"], effect.parameters["strength"]
+    own, of_mean = part.values["strength"], effect.parameters["strength"]
     limits = {p.name: p.high for p in part.effect.parameters}
-    strength = max(given.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
-    raised = replace(given, value=strength, high=strength if given.high is None else max(given.high, strength))
+    strength = max(of_mean.value, *(own * part.values[k] / limits[k] for k in part.free), 1e-6)
+    raised = replace(of_mean, value=strength, high=strength if of_mean.high is None else max(of_mean.high, strength))
     scaled = {k: replace(effect.parameters[k], value=own * part.values[k] / strength) for k in part.free}
     return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
 
 
 def with_reading(effect: Found, reading: Reading) -> Found:
-    """An effect with its parameters as the replay and the relations of signals say them together.
+    """The effect with the parameters that its replay and the relations of signals give together.
 
     The mean is weighted by precision; where the two differ by more than their deviations, the interval is wider by that
     factor (Birge 1932).
@@ -117,40 +125,45 @@ def with_reading(effect: Found, reading: Reading) -> Found:
         if own.low is None or own.high is None:
             continue
         limits = parameter_of(get(effect.name), name)
-        of_replay = max((own.high - own.low) / (2.0 * WITHIN_90), 1e-3 * deviation)
-        weight = of_replay ** -2, deviation ** -2
-        middle = (weight[0] * own.value + weight[1] * value) / sum(weight)
-        apart = abs(own.value - value) / float(np.hypot(of_replay, deviation))
-        half = WITHIN_90 * sum(weight) ** -0.5 * max(1.0, apart)
-        out[name] = replace(own, value=float(np.clip(middle, limits.low, limits.high)),
-                            low=max(middle - half, limits.low), high=min(middle + half, limits.high))
+        own_deviation = max((own.high - own.low) / (2.0 * WITHIN_90), 1e-3 * deviation)
+        weight = own_deviation ** -2, deviation ** -2
+        mean = (weight[0] * own.value + weight[1] * value) / sum(weight)
+        distance = abs(own.value - value) / float(np.hypot(own_deviation, deviation))
+        half = WITHIN_90 * sum(weight) ** -0.5 * max(1.0, distance)
+        out[name] = replace(own, value=float(np.clip(mean, limits.low, limits.high)),
+                            low=max(mean - half, limits.low), high=min(mean + half, limits.high))
     return replace(effect, parameters=out)
 
 
-def _middle(chosen: Judged) -> np.ndarray | None:
+def _mean_of_halves(chosen: Judged) -> np.ndarray | None:
+    """Mean of the scaled parameters that the two halves of the data gave, None where none is free."""
     scaled = [f.scaled for f in chosen.fits]
     return np.mean(scaled, axis=0) if scaled and len(scaled[0]) else None
 
 
 def _of_clock(term: Term, samples: int) -> np.ndarray:
-    """Variance (1, 1) of the strength of what the log did to its times, from so many samples."""
-    many = 2.0 * samples / 10.0
+    """Variance (1, 1) of the scaled strength of an effect of the logged times, from so many samples.
+
+    A jitter's is that of a standard deviation estimated from a tenth of the samples; that of a COUNTED effect is the
+    variance of a Poisson number of bursts.
+    """
+    count = 2.0 * samples / 10.0
     if term.name in COUNTED:
         share, burst = (term.values[p] for p in COUNTED[term.name])
-        many = share * samples / (2.0 * burst - 1.0)
-    return np.diag(term.scaled(term.values) ** 2 / max(many, 1.0))
+        count = share * samples / (2.0 * burst - 1.0)
+    return np.diag(term.scaled(term.values) ** 2 / max(count, 1.0))
 
 
 def _spread(law: ClosedLoop | None, chosen: Judged, term: Term, covariance: np.ndarray, of_loop: float) -> np.ndarray:
-    """Covariance of a term's parameters: the likelihood's, or the two halves' disagreement and the model's doubt.
+    """Covariance of a term's scaled parameters: of the likelihood, of the two halves' difference and of model errors.
 
-    of_loop: share of a parameter by which the model of the loop may be wrong.
+    of_loop: fraction of a parameter by which the model of the loop may be wrong.
     """
     pairs = [t.scaled(t.values) for f in chosen.fits for t in f.terms
              if t.name == term.name and t.values.get("rotor") == term.values.get("rotor")]
-    apart = np.zeros((len(term.free), len(term.free)))
+    between = np.zeros((len(term.free), len(term.free)))
     if len(pairs) == 2:
-        apart = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
+        between = np.diag((0.5 * (pairs[0] - pairs[1])) ** 2)
     loop = law is not None and law.changes_loop((term.active(),))
-    doubt = max(of_loop if loop else ASSUMED if term.kind == SPECTRUM else 0.0, OWN_SCATTER.get(term.name, 0.0))
-    return covariance + apart + np.diag((doubt * term.scaled(term.values)) ** 2)
+    error = max(of_loop if loop else MODEL_ERROR if term.kind == SPECTRUM else 0.0, OWN_SCATTER.get(term.name, 0.0))
+    return covariance + between + np.diag((error * term.scaled(term.values)) ** 2)

@@ -20,8 +20,11 @@ from airtouch.gap.where.band_sums import BANDS_HZ, filtered, stretches
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
-MOST_FLIGHTS = 40  #: looked at for the curves
-MOST_SPECTRA = 3
+MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones
+MOST_SPECTRA = 3  #: channels whose spectra are drawn
+FEWEST_BLOCKS = 8  #: blocks of nominal flights above which their mean power is the floor of a spectrum
+TINY = 1e-12  #: power of a floor at least, in a channel's unit squared
+#: column of each channel, by its name
 PLACE = {c.name: i for i, c in enumerate(CHANNELS)}
 
 
@@ -71,45 +74,48 @@ def of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effec
     commands = measure.command_spectra(flights, nominal, study.vehicle)
     if headline is None or not flights:
         return Pictures(commands=commands)
-    some = flights[:MOST_FLIGHTS]
+    first = flights[:MOST_FLIGHTS]
     channels = list(dict.fromkeys(c.channel for c in (headline, *cells)))[:MOST_SPECTRA]
-    return Pictures(_signal(study, _telling_flight(study, some, headline), effects, headline), frequencies(AIR),
-                    _spectra(study, some, effects, channels), commands)
+    return Pictures(_signal(study, _median_flight(study, first, headline), effects, headline), frequencies(AIR),
+                    _spectra(study, first, effects, channels), commands)
 
 
-def of_measurement(found: measure.Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
+def of_measurement(measurement: measure.Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
     """The curves of a measurement, of its first flights."""
-    seen = list(measure.usable(islice(logs, MOST_FLIGHTS), vehicle, [])) if found.where else []
-    if not seen:
-        return Pictures(commands=found.spectra)
-    made = of(calibrate.declared(vehicle, ()), seen, [], [], found.where[0], found.where)
-    return Pictures(made.signal, made.frequency_hz, made.spectra, found.spectra)
+    flights = list(measure.usable(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
+    if not flights:
+        return Pictures(commands=measurement.spectra)
+    curves = of(calibrate.declared(vehicle, ()), flights, [], [], measurement.where[0], measurement.where)
+    return Pictures(curves.signal, curves.frequency_hz, curves.spectra, measurement.spectra)
 
 
-def _left(study: Study, flight: Flight, effects: Sequence[Any] = ()) -> np.ndarray:
+def _residual(study: Study, flight: Flight, effects: Sequence[Any] = ()) -> np.ndarray:
+    """Measured minus modelled (n, COUNT) of a flight, with effects in the model."""
     return residual(flight, study.vehicle, (*study.calibration, *effects), study.controller)
 
 
 def _signal(study: Study, flight: Flight, effects: Sequence[Term], cell: Cell) -> Signal:
+    """The curves of one flight in a cell's channel, up to the end of its band."""
     active = [t.active() for t in effects if t.kind == MEAN]
     band = BANDS_HZ.index(cell.band_hz) if cell.band_hz in BANDS_HZ else 0
     c = PLACE[cell.channel]
     measured = _measured(flight, c)
-    def below(values):
-        return None if values is None else _below(flight, values, band)
+    def lowpass(values):
+        return None if values is None else _lowpass(flight, values, band)
     return Signal(flight.name, cell.channel, cell.band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, below(measured), below(_left(study, flight)[:, c]),
-                  below(_left(study, flight, active)[:, c]) if active else None, cell.floor)
+                  flight.phase, lowpass(measured), lowpass(_residual(study, flight)[:, c]),
+                  lowpass(_residual(study, flight, active)[:, c]) if active else None, cell.floor)
 
 
-def _telling_flight(study: Study, flights: Sequence[Flight], cell: Cell) -> Flight:
-    """The flight in which the channel's gap is in the middle of all flights'."""
+def _median_flight(study: Study, flights: Sequence[Flight], cell: Cell) -> Flight:
+    """The flight whose gap in the cell's channel is the median of all flights'."""
     c = PLACE[cell.channel]
-    size = [np.nan_to_num(np.nanstd(_left(study, f)[f.usable & (f.phase != GROUND), c])) for f in flights]
+    size = [np.nan_to_num(np.nanstd(_residual(study, f)[f.usable & (f.phase != GROUND), c])) for f in flights]
     return flights[int(np.argsort(size)[len(size) // 2])]
 
 
 def _measured(flight: Flight, channel: int) -> np.ndarray | None:
+    """What sensors show of a channel (n,): acceleration, or the slope of the rates; None of any other channel."""
     if channel < 3:
         return flight.acceleration[:, channel]
     if TORQUE.start <= channel < TORQUE.stop and flight.rates is not None:
@@ -117,8 +123,8 @@ def _measured(flight: Flight, channel: int) -> np.ndarray | None:
     return None
 
 
-def _below(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
-    """Values up to the end of a band, NaN where nothing is judged."""
+def _lowpass(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
+    """Values (n,) up to the end of a band, NaN where nothing is judged."""
     out = np.full(len(values), np.nan)
     for start, stop in stretches(flight):
         here = values[start:stop]
@@ -130,26 +136,29 @@ def _below(flight: Flight, values: np.ndarray, band: int) -> np.ndarray:
 
 def _spectra(study: Study, flights: Sequence[Flight], effects: Sequence[Term], channels: Sequence[str],
              ) -> tuple[Spectrum, ...]:
-    """Means over all blocks in the air. Of a random effect the power is taken off, as no sample can be predicted."""
+    """The spectra of channels, means over all blocks in the air.
+
+    The power of a random effect is subtracted, as no sample of it can be predicted.
+    """
     active = [t.active() for t in effects if t.kind == MEAN]
     random = random_of(effects)
-    before, after, added = [], [], 0.0
+    before, after, random_power = [], [], 0.0
     for f in flights:
         first = starts(f, AIR)
         if not len(first):
             continue
-        for out, some in ((before, ()), (after, active)):
-            left = np.where(f.lost[:, None], 0.0, _left(study, f, some))
-            out.append((np.abs(blocks(left, first, AIR)) ** 2).mean(axis=0))
+        for out, model in ((before, ()), (after, active)):
+            gap = np.where(f.lost[:, None], 0.0, _residual(study, f, model))
+            out.append((np.abs(blocks(gap, first, AIR)) ** 2).mean(axis=0))
         if random:
             data = Data(study, [f])
-            added = added + sum(random_effects.power(data, t)[0][AIR].mean(axis=0) for t in random)
+            random_power = random_power + sum(random_effects.power(data, t)[0][AIR].mean(axis=0) for t in random)
     if not before:
         return ()
-    floor = np.maximum(study.floor.power[AIR] if study.floor.blocks.get(AIR, 0) > 8 else
-                       sensor_power(calibrate.sensor_noise(study.vehicle), AIR), 1e-12)
-    one, two = np.mean(before, axis=0), np.mean(after, axis=0)
-    two = floor + np.abs(two - floor - added / len(before)) if random else two
-    return tuple(Spectrum(name, CHANNELS[PLACE[name]].unit, one[:, PLACE[name]],
-                          two[:, PLACE[name]] if effects else None, floor[:, PLACE[name]])
-                 for name in channels if np.isfinite(one[:, PLACE[name]]).all())
+    floor = np.maximum(study.floor.power[AIR] if study.floor.blocks.get(AIR, 0) > FEWEST_BLOCKS else
+                       sensor_power(calibrate.sensor_noise(study.vehicle), AIR), TINY)
+    power, power_after = np.mean(before, axis=0), np.mean(after, axis=0)
+    power_after = floor + np.abs(power_after - floor - random_power / len(before)) if random else power_after
+    return tuple(Spectrum(name, CHANNELS[PLACE[name]].unit, power[:, PLACE[name]],
+                          power_after[:, PLACE[name]] if effects else None, floor[:, PLACE[name]])
+                 for name in channels if np.isfinite(power[:, PLACE[name]]).all())

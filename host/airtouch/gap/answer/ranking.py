@@ -12,12 +12,12 @@ from airtouch.gap.result import Found, Quantity, Ranked
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import CLOCK
 
-AT_FLOOR = 1.0  #: gap that is at its floor
-CLOSE = 3.0  #: two candidates whose held-out log likelihood differs by less cannot be told apart
+AT_FLOOR = 1.0  #: gap, in units of its floor, up to which there is none
+CLOSE = 3.0  #: nats of held-out log likelihood; two candidates that differ by less cannot be told apart
 
 
 def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> str:
-    """What does not stand over the floor is nothing, whatever small differences add up to.
+    """The verdict: "none", "effect" or "unknown". A gap at its floor is none, whatever small differences add up to.
 
     What the log has done to itself shows in its times alone, and is no part of the gap; what comes and goes is seldom
     in both halves of the data, in whose common part the gap is measured. In a simulator's flights some bands may be
@@ -26,8 +26,8 @@ def verdict_of(data: Data, selection: Selection, gap: Shrink, cells: Cells) -> s
     """
     if selection.inference is not None:
         return "unknown" if not selection.explained else "none" if selection.chosen is None else "effect"
-    apart = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
-    if gap.before <= AT_FLOOR and not apart:
+    outside_the_gap = selection.chosen is not None and all(t.kind == CLOCK or t.gate for t in selection.chosen.terms)
+    if gap.before <= AT_FLOOR and not outside_the_gap:
         odd_times = selection.of_times > selection.allowed
         if not data.study.simulated or not (odd_times or nearer(data, selection.parts, selection.chosen, cells)):
             return "none"
@@ -46,13 +46,13 @@ def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked]
     chance = agreeing(probabilities(selection, verdict == "none"), answer)
     out = []
     for name, p in chance.items():
-        one = selection.singles.get(name)
+        single = selection.singles.get(name)
         share = Quantity(0.0)
         if name == answer and effects and len(selection.named) == 1:
             share = overall.share
-        elif one is not None and one.full and one.gain > FIRST_GAIN:
-            share = shrink_of(data, parts, one, cells).share
-        nats = None if one is None else selection.gained(one)
+        elif single is not None and single.full and single.gain > FIRST_GAIN:
+            share = shrink_of(data, parts, single, cells).share
+        nats = None if single is None else selection.gained(single)
         out.append(Ranked(name, float(p), share, why_not(selection, name, verdict), nats))
     order = {n: j.gain for n, j in selection.singles.items()}
     out.sort(key=lambda r: (r.name != answer, -r.probability, -order.get(r.name, 0.0)))
@@ -60,7 +60,7 @@ def ranked(data: Data, selection: Selection, cells: Cells) -> tuple[list[Ranked]
 
 
 def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
-    """The probabilities with the answer's at least as large as any other: it changes places with a larger one.
+    """The probabilities, of which the answer's is the largest: a larger one changes places with it.
 
     The verdict weighs what the ranking of single candidates does not, as effects that come and go.
     """
@@ -71,7 +71,7 @@ def agreeing(chance: Mapping[str, float], answer: str) -> dict[str, float]:
 
 
 def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
-    """Sets that these logs cannot tell apart: names of one thing, and candidates as good as the best."""
+    """Sets of names that these logs cannot tell apart: names of one thing, and candidates as good as the best."""
     if not selection.named:
         return ()
     groups = []

@@ -19,10 +19,16 @@ from airtouch.gap.result import Quantity
 from airtouch.gap.signals.spectra import squared
 from airtouch.gap.signatures.candidates import Term
 
-SURE = 4.0  #: standard errors by which a cell must stand over the floor
-FEWEST = 12  #: values in a cell
-DRAWS = 400
-LARGEST = 1e4  #: of a bin's power over the floor: spikes do not make a gap
+SURE = 4.0  #: standard errors, beside MARGIN, by which a cell's mean energy must exceed the floor
+MARGIN = 0.2  #: energy, in units of the floor, by which a cell must exceed it however many values it has
+FEWEST = 12  #: values that a cell needs
+DRAWS = 400  #: bootstrap samples of the shrink
+PIECES = 24  #: equal parts of the held-out values, at most, which the bootstrap draws
+INTERVAL = (5.0, 95.0)  #: percentiles of the bootstrap between which the 90 % interval lies
+LARGEST = 1e4  #: energy of a bin over the floor, at most: spikes do not make a gap
+LEAST_GAP = 0.02  #: gap over the floor, in units of it, up to which no share of it can be given
+LEAST_JITTER_S = 2e-4  #: seconds rms that the floor of the logged times' jitter has at least
+CLOCK_PIECES = 8  #: parts of a flight, of which every other one is a half of the data
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class Cells:
 
 
 def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
-    """The cells of some flights. named: the effects named."""
+    """The cells in which the gap of two halves of the data is measured. named: the effects named."""
     terms = _terms(named)
     chosen = _standing_out(data, parts[1], terms[1]), _standing_out(data, parts[0], terms[0])
     after = _energies(data, parts, terms, chosen)
@@ -57,7 +63,7 @@ def cells_of(data: Data, parts: Sequence[Part], named: Judged | None) -> Cells:
 
 
 def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cells, seed: int = 0) -> Shrink:
-    """The gap over all held-out blocks; each half judged under the fit of the other."""
+    """The gap over all held-out blocks, each half judged under the fit of the other. seed: of the bootstrap."""
     if judged is not None and judged.terms and all(t.name == "time_jitter" for t in judged.terms):
         return _clock(data)
     before = cells.before
@@ -65,11 +71,11 @@ def shrink_of(data: Data, parts: Sequence[Part], judged: Judged | None, cells: C
         return Shrink(1.0, 1.0, Quantity(0.0, 0.0, 0.0))
     after = cells.calm + _energies(data, parts, _terms(judged), cells.chosen)
     rng = np.random.default_rng(seed)
-    pieces = min(24, len(before))
+    pieces = min(PIECES, len(before))
     a, b = (np.array([p.mean() for p in np.array_split(x, pieces)]) for x in (before, after))
     pick = rng.integers(0, pieces, (DRAWS, pieces))
-    drawn = [_share(x, y) for x, y in zip(a[pick].mean(axis=1), b[pick].mean(axis=1), strict=True)]
-    low, high = np.percentile(drawn, [5, 95])
+    shares = [_share(x, y) for x, y in zip(a[pick].mean(axis=1), b[pick].mean(axis=1), strict=True)]
+    low, high = np.percentile(shares, INTERVAL)
     return Shrink(float(np.sqrt(before.mean())), float(np.sqrt(after.mean())),
                   Quantity(_share(before.mean(), after.mean()), float(low), float(high)))
 
@@ -79,23 +85,23 @@ def nearer(data: Data, parts: Sequence[Part], judged: Judged | None, cells: Cell
 
     Another loop makes more of the noise at some frequencies and less at others, so that no gap stands over the floor.
     """
-    without, with_it = (_off_floor(data, parts, terms, cells) for terms in (((), ()), _terms(judged)))
-    return with_it < without
+    without, within = (_off_floor(data, parts, terms, cells) for terms in (((), ()), _terms(judged)))
+    return within < without
 
 
 def _off_floor(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]], cells: Cells) -> float:
-    """Mean distance of a chosen cell's energy from the floor, above or below, over its values."""
-    total, many = np.zeros(GROUPS), np.zeros(GROUPS)
+    """Distance of the chosen cells' energy from the floor, above or below, summed over their values."""
+    total, count = np.zeros(GROUPS), np.zeros(GROUPS)
     for k in (0, 1):
         problem, values, power = left_over(data, parts[k], terms[1 - k])
         use = problem.known & cells.chosen[k][problem.groups]
         total += np.bincount(problem.groups[use], np.minimum(squared(values[use]) / power[use], LARGEST), GROUPS)
-        many += np.bincount(problem.groups[use], minlength=GROUPS)
-    return float(np.abs(total - many).sum())
+        count += np.bincount(problem.groups[use], minlength=GROUPS)
+    return float(np.abs(total - count).sum())
 
 
 def _terms(judged: Judged | None) -> Sequence[Sequence[Term]]:
-    """A hypothesis as fitted to each half; nothing where there is none."""
+    """The terms of a hypothesis as fitted to each half; none where there is no hypothesis."""
     return [f.terms for f in judged.fits] if judged and judged.fits else ((), ())
 
 
@@ -111,30 +117,30 @@ def _energies(data: Data, parts: Sequence[Part], terms: Sequence[Sequence[Term]]
 
 
 def _standing_out(data: Data, part: Part, terms: Sequence[Term]) -> np.ndarray:
-    """Which cells, bool (GROUPS,), show a gap in a part, or are where effects fitted to it gain."""
+    """Mask (GROUPS,) of the cells that show a gap in a part, or in which effects fitted to it gain."""
     problem, values, power = left_over(data, part, ())
-    e = np.minimum(squared(values) / power, LARGEST)
+    energy = np.minimum(squared(values) / power, LARGEST)
     count = np.bincount(problem.groups, problem.known, GROUPS)
-    mean = np.bincount(problem.groups, e * problem.known, GROUPS) / np.maximum(count, 1)
-    out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + 0.2
+    mean = np.bincount(problem.groups, energy * problem.known, GROUPS) / np.maximum(count, 1)
+    out = mean > 1.0 + SURE * np.sqrt(2.0 / np.maximum(count, 1)) + MARGIN
     if terms:
         out |= cell_gains(data, part, terms) > CELL_GAIN
     return out & (count >= FEWEST)
 
 
 def _clock(data: Data) -> Shrink:
-    """Jitter of the logged times: what the rms of one half says of the other's, over the floor's."""
-    usual = max(data.study.floor.clock_s, 2e-4)
+    """The shrink of jitter in the logged times: how well the rms of one half predicts the other's, over the floor."""
+    floor = max(data.study.floor.clock_s, LEAST_JITTER_S)
     rms = [float(np.sqrt(np.mean(np.concatenate([h for f in data.flights
-                                                  for h in np.array_split(f.clock_s, 8)[k::2]]) ** 2)))
+                                                  for h in np.array_split(f.clock_s, CLOCK_PIECES)[k::2]]) ** 2)))
            for k in (0, 1)]
-    before = float(np.mean(rms)) / usual
-    after = 1.0 + abs(rms[0] - rms[1]) / usual
+    before = float(np.mean(rms)) / floor
+    after = 1.0 + abs(rms[0] - rms[1]) / floor
     share = _share(before ** 2, after ** 2)
     return Shrink(before, after, Quantity(share, share, share))
 
 
 def _share(before: float, after: float) -> float:
-    """(before - after) / (before - floor) of rms values with a floor of 1."""
-    top = np.sqrt(before) - 1.0
-    return float(np.clip((np.sqrt(before) - np.sqrt(after)) / top, -1.0, 1.0)) if top > 0.02 else 0.0
+    """The share of the gap that went, (before - after) / (before - floor) of rms values with a floor of 1."""
+    over = np.sqrt(before) - 1.0
+    return float(np.clip((np.sqrt(before) - np.sqrt(after)) / over, -1.0, 1.0)) if over > LEAST_GAP else 0.0

@@ -1,4 +1,4 @@
-"""What a diagnosis leaves open: where and when it is left, what it follows, and why the nearest effects fail."""
+"""What a diagnosis leaves open: where and when, which signals it follows, and why the nearest effects fail."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,10 +17,12 @@ from airtouch.gap.signals.spectra import AIR, LENGTH, blocks, frequencies, start
 from airtouch.gap.signatures.candidates import MEAN
 from airtouch.simulation import signals as at
 
-MOST_CELLS = 5
-NEAREST = 3
-FEWEST = 8  #: blocks in which a relation can be seen
-CHANCE = 0.01  #: of any relation that is not there, all signals together
+MOST_CELLS = 5  #: cells that are reported
+NEAREST = 3  #: effects that are reported with the reason why they fail
+FEWEST = 8  #: blocks that do not overlap, from which on a rank correlation is tested
+CHANCE = 0.01  #: probability of a correlation by chance alone, all signals together (Bonferroni)
+TINY = 1e-9  #: ratio to the floor at least, of which a logarithm is taken
+#: column of each channel, by its name
 PLACE = {c.name: i for i, c in enumerate(CHANNELS)}
 
 
@@ -58,7 +60,7 @@ def nearest(selection: Selection) -> list[dict[str, str]]:
 
 
 def fails(selection: Selection, judged: Judged) -> str:
-    """Why a candidate is not the answer, in nats of held-out log likelihood."""
+    """The reason why a candidate is not the answer, in nats of held-out log likelihood."""
     if selection.inference is not None:
         return fails_by_relations(selection, selection.inference, judged.name)
     least = selection.least[judged.name]
@@ -76,20 +78,20 @@ def fails(selection: Selection, judged: Judged) -> str:
 
 
 def fails_by_relations(selection: Selection, inference: Inference, name: str) -> str:
-    """Why the relations of the signals do not name an effect, in nats."""
-    gains = inference.evidence[name]
+    """The reason why the relations of the signals do not name an effect, in nats."""
+    gain = inference.evidence[name]
     first = [s.name for s in selection.named]
     if name in first:
         return against(selection)
-    if gains < LEAST_EVIDENCE:
-        return f"the relations of the signals gain {gains:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
+    if gain < LEAST_EVIDENCE:
+        return f"the relations of the signals gain {gain:.1f} nats by it, {LEAST_EVIDENCE:.0f} are needed"
     if not first:
-        return f"the relations of the signals gain {gains:.1f} nats by it, and more by a model without names"
-    return f"the relations of the signals gain {gains:.0f} nats by it, {inference.evidence[first[0]]:.0f} by {first[0]}"
+        return f"the relations of the signals gain {gain:.1f} nats by it, and more by a model without names"
+    return f"the relations of the signals gain {gain:.0f} nats by it, {inference.evidence[first[0]]:.0f} by {first[0]}"
 
 
 def against(selection: Selection) -> str:
-    """What speaks against the effects named, in words, with the limit that it exceeds or keeps."""
+    """The evidence against the effects named, in words, with the limit that it exceeds or keeps."""
     lost, worst = selection.contradicted
     if selection.loss == selection.unlike:
         return (f"it loses {lost:.0f} nats where it says more than the flights show, most in {worst}; "
@@ -99,7 +101,7 @@ def against(selection: Selection) -> str:
 
 
 def why_not(selection: Selection, name: str, verdict: str) -> str:
-    """Why a candidate of the ranking is not the answer, "" for the answer."""
+    """The reason why a candidate of the ranking is not the answer, "" for the answer."""
     first = selection.named[0].name if selection.named else ""
     step = next((s for s in selection.named[1:] if s.name == name), None)
     if name == verdict or (verdict == "effect" and name == first):
@@ -114,23 +116,23 @@ def why_not(selection: Selection, name: str, verdict: str) -> str:
                 "may be left"
                 if selection.explained else "the gap as a whole is at its floor")
     if name == "none":
-        gains = selection.inference.evidence[first] if selection.inference and first else \
+        gain = selection.inference.evidence[first] if selection.inference and first else \
             selection.chosen.gain if selection.chosen else 0.0
-        return (f"{first} gains {gains:.0f} nats over it" if selection.chosen else
+        return (f"{first} gains {gain:.0f} nats over it" if selection.chosen else
                 f"a model without names gains {selection.free_after:.0f} nats, up to {selection.allowed:.0f} may be "
                 "left")
     return fails(selection, selection.singles[name])
 
 
 def _over(study: Study, flight: Flight, active: Sequence[Any], cell: Cell) -> np.ndarray:
-    """Root mean square of a cell's channel and band over its floor in every block (b,) in the air."""
+    """Rms of a cell's channel and band over its floor, in each block (b,) in the air; active: effects in the model."""
     begin, c = starts(flight, AIR), PLACE[cell.channel]
     if not len(begin):
         return np.zeros(0)
-    left = held(residual(flight, study.vehicle, (*study.calibration, *active), study.controller)[:, c:c + 1])
+    gap = held(residual(flight, study.vehicle, (*study.calibration, *active), study.controller)[:, c:c + 1])
     f = frequencies(AIR)
     band = (f >= cell.band_hz[0]) & (f <= cell.band_hz[1])
-    power = (np.abs(blocks(left, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
+    power = (np.abs(blocks(gap, begin, AIR)[:, band, 0]) ** 2).mean(axis=1)
     return np.sqrt(power / max(float(study.floor.power[AIR][band, c].mean()), 1e-300))
 
 
@@ -147,7 +149,7 @@ def _stretch(ratio: np.ndarray) -> tuple[int, int]:
 
 
 def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
-    """Signals (n,) of a flight that a gap may follow."""
+    """The signals (n,) of a flight that a gap may follow, by their names in the answer."""
     s, log = flight.signals, flight.log
     thrust = study.vehicle.thrust(flight.pwm).sum(axis=1)
     out = {"thrust": thrust, "tilt": np.hypot(flight.turn[:, 2, 0], flight.turn[:, 2, 1]),
@@ -162,25 +164,25 @@ def _signals(study: Study, flight: Flight) -> Mapping[str, np.ndarray]:
 
 
 def _follows(study: Study, over: Sequence[tuple[Flight, np.ndarray]]) -> list[str]:
-    """Names of signals whose mean over a block ranks like the cell's power (Spearman, CHANCE over all signals)."""
+    """The names of signals whose mean over a block ranks like the cell's power: Spearman, CHANCE over all signals."""
     table: dict[str, list[np.ndarray]] = {}
     power = []
     for flight, ratio in over:
         begin = starts(flight, AIR)
-        power.append(np.log(np.maximum(ratio, 1e-9)))
+        power.append(np.log(np.maximum(ratio, TINY)))
         air = np.where(flight.phase == GROUND, np.nan, 1.0)
         for name, values in _signals(study, flight).items():
-            cut = (values * air)[begin[:, None] + np.arange(LENGTH[AIR])]
-            table.setdefault(name, []).append(np.nanmean(cut, axis=1))
+            in_blocks = (values * air)[begin[:, None] + np.arange(LENGTH[AIR])]
+            table.setdefault(name, []).append(np.nanmean(in_blocks, axis=1))
     level = np.concatenate(power)[::2]  # every other block: they overlap by half
     if len(level) < FEWEST:
         return []
-    found = []
+    correlations = []
     for name, parts in table.items():
         values = np.concatenate(parts)
         if len(values) != sum(len(p) for p in power) or np.ptp(values) == 0.0:
             continue
-        told = spearmanr(values[::2], level)
-        if told.pvalue < CHANCE / len(table):
-            found.append((abs(told.statistic), name))
-    return [name for _, name in sorted(found, reverse=True)]
+        rank = spearmanr(values[::2], level)
+        if rank.pvalue < CHANCE / len(table):
+            correlations.append((abs(rank.statistic), name))
+    return [name for _, name in sorted(correlations, reverse=True)]
