@@ -9,7 +9,7 @@ from airtouch.gap.evidence.fit import fit, judge
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from gap_flights import VEHICLE, flight, noise
 
@@ -40,7 +40,7 @@ def made(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
 
 
 def chosen(names):
-    return {n: v for n, v in every().items() if n in names}
+    return {n: v for n, v in all_candidates().items() if n in names}
 
 
 def found(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: None):

@@ -15,7 +15,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch import vehicle as vehicles
 from airtouch.gap.diagnose import diagnose
-from airtouch.gap.sealed.blind import alike
+from airtouch.gap.sealed.blind import interchangeable
 from airtouch.gap.sealed.blind_score import wilson
 from airtouch.logs import read
 
@@ -41,12 +41,12 @@ def main(folder: Path) -> None:
                          [read(folder / f"cal_{v}_{i}.csv.gz") for i in (0, 1)])
         true = NAMES.get(row["effect"], row["effect"])
         ranked = [r.name for r in found.ranking[:3]]
-        first += alike(ranked[0], true)
-        third += any(alike(r, true) for r in ranked)
+        first += interchangeable(ranked[0], true)
+        third += any(interchangeable(r, true) for r in ranked)
         named = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
                                                    if q.low is not None) for e in found.effects)
         control = found.control.get("shrink", {}).get("value")
-        if found.shrink is not None and alike(ranked[0], true):
+        if found.shrink is not None and interchangeable(ranked[0], true):
             shrinks.append(found.shrink.value)
             wrong += [control] if control is not None else []
         print(f"| {true} | {float(row['strength']):.3g} {row['unit'].split(',')[0][:24]} | {found.verdict} | {named} | "

@@ -35,7 +35,7 @@ from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.gap.diagnose import diagnose
 from airtouch.gap.result import Diagnosis
-from airtouch.gap.sealed.blind import alike
+from airtouch.gap.sealed.blind import interchangeable
 from airtouch.gap.sealed.blind_score import wilson
 from airtouch.logs import read
 from gap_authors import questions
@@ -177,7 +177,7 @@ def answer(case: dict) -> str:
     first = case["effects"][0]
     if case["row"] == "fan" and first["name"] in COMES_AND_GOES and first.get("seconds"):
         return "comes and goes"
-    if case["row"] == "peers" and alike(first["name"], case["truth"]):
+    if case["row"] == "peers" and interchangeable(first["name"], case["truth"]):
         return case["truth"]
     return first["name"]
 

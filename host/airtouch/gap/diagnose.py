@@ -127,7 +127,7 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
     gains of two days differ a little, and that is not what a gap comes from. So must one that comes and goes, where a
     gap stands out that it could take away: nominal flights meet gusts, which is not what their gap comes from either.
     """
-    selection = select(data, candidates.every(without), say, without)
+    selection = select(data, candidates.all_candidates(without), say, without)
     cells = cells_of(data, selection.parts, selection.chosen)
     of_loop, passing = _of_the_loop(data, selection), _comes_and_goes(selection)
     if data.study.recorded and (of_loop or passing):
@@ -171,7 +171,7 @@ def _start(terms: Sequence[Term], chosen: Judged) -> np.ndarray | None:
 def _control(data: Data, selection: Selection, cells: Cells) -> dict[str, object]:
     """The gap with a deliberately wrong effect in the model."""
     taken = {n for g in alike_of(selection) for n in g} | {s.name for s in selection.named}
-    every = candidates.every()
+    every = candidates.all_candidates()
     for name in WRONG:
         if name in every and name not in taken:
             fits = tuple(fit(data, p, every[name][0]) for p in selection.parts)

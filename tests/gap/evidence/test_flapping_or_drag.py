@@ -60,5 +60,5 @@ def test_a_fit_hardly_tells_flapping_from_drag(study, tilt, apart):
 
 
 def test_gusts_have_no_drag_of_their_own_when_drag_is_left_out():
-    out = candidates.every({"rotor_drag", "blade_flapping"})
+    out = candidates.all_candidates({"rotor_drag", "blade_flapping"})
     assert {t.name for name in ("wind", "gust") for terms in out[name] for t in terms} == {"wind", "gust"}

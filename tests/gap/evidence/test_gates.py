@@ -89,7 +89,7 @@ def test_a_wake_that_fills_the_flight_is_not_noise_of_the_motors(study):
 def test_what_adds_most_to_the_others_is_told_first(study, quiet):
     both = pushed(quiet, 0.06)
     both = replace(both, rates=both.rates + np.array([0.0, 0.05, 0.0]))
-    found = select(Data(study, [both]), candidates.every())
+    found = select(Data(study, [both]), candidates.all_candidates())
     shares = {s.name: s.share for s in found.named}
     assert set(shares) == {"downwash", "imu_bias"}
     assert [s.name for s in found.named] == sorted(shares, key=lambda n: -shares[n])

@@ -14,7 +14,7 @@ from airtouch.gap.flights import flight
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
-from airtouch.gap.signatures.candidates import every, terms
+from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.simulation.batch import flights as simulated
 from airtouch.simulation.effects import activate
 from airtouch.simulation.flight import prepare
@@ -134,7 +134,7 @@ def test_power_of_lines_is_that_of_simulated_flights(study_apart, amplitude):
 
 def named(study, flights):
     data = Data(study, flights)
-    found = select(data, every())
+    found = select(data, all_candidates())
     return [s.name for s in found.steps], {e.name: e.parameters for e in chosen_effects(data, found)}, data
 
 

@@ -9,7 +9,7 @@ from airtouch.gap.answer.shrink import Shrink
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
 from airtouch.gap.result import Quantity
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.candidates import all_candidates
 from gap_flights import flown
 
 #: those that were taken for one of a pair, and the pairs' own
@@ -25,7 +25,7 @@ CANDIDATES = ("actuator_delay", "com_offset", "controller_gain", "imu_bias", "im
 ])
 def test_both_effects_are_named_and_nothing_else(study, effects):
     """Each was missed beside the other once: by the fit, by the first look, by what the first must leave."""
-    chosen = select(Data(study, flown(1, 91, effects)), {n: v for n, v in every().items() if n in CANDIDATES})
+    chosen = select(Data(study, flown(1, 91, effects)), {n: v for n, v in all_candidates().items() if n in CANDIDATES})
     assert {s.name for s in chosen.named} == set(effects)
     assert chosen.free_after < chosen.allowed
 
@@ -35,7 +35,7 @@ def delayed(study):
     """A study as of recorded flights, a flight with a delay held against it, and what is selected there."""
     recorded = replace(study, scatter=replace(study.scatter, exact=False))
     data = Data(recorded, flown(1, 93, {"actuator_delay": {"delay": 0.005}}))
-    return recorded, data, select(data, every())
+    return recorded, data, select(data, all_candidates())
 
 
 @pytest.mark.parametrize("closes", [True, False])

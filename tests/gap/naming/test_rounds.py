@@ -10,7 +10,7 @@ from airtouch.gap.evidence.fit import Fit
 from airtouch.gap.naming import rounds, select
 from airtouch.gap.naming.judging import LEAST_GAIN, PRICE, covariance_among_all
 from airtouch.gap.naming.selection import Judged
-from airtouch.gap.signatures.candidates import every, free_of, terms
+from airtouch.gap.signatures.candidates import all_candidates, free_of, terms
 from hovers import chosen
 
 SCREEN = SimpleNamespace(shows=lambda term: True)
@@ -35,7 +35,7 @@ def by_hand(monkeypatch, gain_of=None, look_of=None, first=None):
 
 
 def test_of_variants_with_as_many_terms_the_best_is_taken_however_little_it_gains_more(monkeypatch):
-    gains = {t[0].free: 20.0 + k for k, t in enumerate(every()["controller_gain"])}
+    gains = {t[0].free: 20.0 + k for k, t in enumerate(all_candidates()["controller_gain"])}
     by_hand(monkeypatch, lambda new: gains[new[0].free])
     best = rounds.round_of(BENCH, chosen(["controller_gain"]), None)["controller_gain"]
     assert best.gain == 24.0 and best.terms[0].free == ("height",)
@@ -119,7 +119,7 @@ def test_a_random_effect_that_promises_little_is_looked_at_and_not_fitted(monkey
 
 
 def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
-    _, *alone = every()["controller_gain"]
+    _, *alone = all_candidates()["controller_gain"]
     (attitude,) = next(t for t in alone if t[0].free == ("attitude",))
     expected = np.diag([np.inf, 2.0, np.inf, np.inf])
     np.testing.assert_array_equal(covariance_among_all(attitude, np.array([[2.0]])), expected)

@@ -17,7 +17,7 @@ from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, secon
 from airtouch.gap.naming.selection import Judged, probabilities
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, chosen, found, made, own_gain, scattered
@@ -95,7 +95,7 @@ def test_an_effect_at_its_bound_stands_in_for_another_and_is_not_named():
 
 
 def test_bounds_are_approached_from_within_on_both_sides():
-    mass = every()["mass"][0][0]
+    mass = all_candidates()["mass"][0][0]
     low, high = mass.bounds()
     near = judging.STRETCHED
     for x, at in ((high, True), (high * (near + 1e-6), True), (high * 0.99, False), (low, True), (0.99 * low, False),

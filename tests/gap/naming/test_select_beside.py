@@ -11,7 +11,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import nameless
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, flown, noise
@@ -100,7 +100,7 @@ def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
     data = Data(flying, flown(1, 62))
     on = judging.trial_of(data)
     judged = rounds.round_of(on, chosen(["controller_gain"]), None, thorough=True)["controller_gain"]
-    _, *alone = every()["controller_gain"]
+    _, *alone = all_candidates()["controller_gain"]
     assert judged.strength.shape == judged.variance.shape == (len(alone),) == (4,)
     for i, terms in enumerate(alone):
         tried = judging.crossed(on, "controller_gain", terms, None, np.log(len(alone)))
@@ -166,7 +166,7 @@ def test_a_faint_push_beside_many_lost_rows_is_not_named():
 
 def test_a_model_without_names_has_what_the_times_hold_beyond_the_effects_named():
     data = Data(FLOOR, [replace(made(2), lost=np.random.default_rng(0).random(3000) < 0.1)], slow=True)
-    on, (term,) = judging.trial_of(data), every()["packet_loss"][0]
+    on, (term,) = judging.trial_of(data), all_candidates()["packet_loss"][0]
     known = judging.crossed(on, "packet_loss", (term,), None, 0.0)
     assert known.gain == pytest.approx(loss(data)[1]) and known.gain > 100.0
     assert nameless(on, None) - nameless(on, known) == pytest.approx(known.gain)
@@ -184,14 +184,15 @@ def test_beside_a_random_effect_an_effect_of_the_loop_gains_less_and_the_newcome
     """By definition: what both gain, and what the first one gained while the commands' floor was sure."""
     data = Data(flying, flown(1, 2, {"sensor_latency": {"delay": 0.008}}))
     on = judging.trial_of(data)
-    late = judging.crossed(on, "sensor_latency", every()["sensor_latency"][0], None, 0.0)
-    both = judging.crossed(on, "imu_noise", every()["imu_noise"][0], late, 0.5)
+    late = judging.crossed(on, "sensor_latency", all_candidates()["sensor_latency"][0], None, 0.0)
+    both = judging.crossed(on, "imu_noise", all_candidates()["imu_noise"][0], late, 0.5)
     sure, unsure = (sum(judging.gain_of(on, 1 - k, late.fits[k].terms, wide) for k in (0, 1)) for wide in (False, True))
     together = sum(judging.gain_of(on, 1 - k, both.fits[k].terms) for k in (0, 1))
     assert sure - unsure > 5.0 and late.beyond == 0.0 and both.choice == 0.5
     assert both.beyond == pytest.approx(sure - unsure)
     assert both.gain == pytest.approx(together + (sure - unsure) - 0.5)
-    assert judging.crossed(on, "vibration", every()["vibration"][0], both, 0.0).beyond == both.beyond, "paid once"
+    third = judging.crossed(on, "vibration", all_candidates()["vibration"][0], both, 0.0)
+    assert third.beyond == both.beyond, "paid once"
 
 
 @pytest.mark.parametrize("simulated", [True, False])

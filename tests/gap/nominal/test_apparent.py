@@ -4,7 +4,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent
-from airtouch.gap.signatures.candidates import MEAN, every, telling
+from airtouch.gap.signatures.candidates import MEAN, all_candidates, strength_term
 from gap_flights import flown
 
 
@@ -13,8 +13,8 @@ def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
     flights never differ in it."""
     seen = apparent(Data(study, flown(1, 47)))
     pressed = free = 0
-    for name, hypotheses in every(()).items():
-        term = telling(hypotheses[0])
+    for name, hypotheses in all_candidates(()).items():
+        term = strength_term(hypotheses[0])
         if name not in seen.strengths or term.kind != MEAN:
             continue
         low = term.among_all(term.bounds()[0], -np.inf)

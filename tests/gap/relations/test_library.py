@@ -11,7 +11,7 @@ from airtouch.gap.naming.select import select
 from airtouch.gap.relations import library
 from airtouch.gap.relations.features import features, names
 from airtouch.gap.relations.learning import drawings
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.simulation import batch
 from airtouch.simulation.effects import NAMES
 from gap_flights import VEHICLE, flown, ready
@@ -66,7 +66,7 @@ def test_nominal_flights_lie_as_far_as_their_covariance_says(nominal):
                                      {"controller_gain": {"position": 1.25}}, {"imu_noise": {"factor": 1.15}}])
 def test_weak_effects_are_named_and_withheld_ones_are_not(study, effects):
     """Each too weak for the replay of a single flight; the other names of one that is withheld do not get it."""
-    data, candidates = Data(study, flown(1, 78, effects)), every()
+    data, candidates = Data(study, flown(1, 78, effects)), all_candidates()
     chosen = select(data, candidates)
     assert chosen.inference is not None and [s.name for s in chosen.named] == list(effects)
     left_out = {n: v for n, v in candidates.items() if n not in effects}
@@ -78,7 +78,7 @@ def test_weak_effects_are_named_and_withheld_ones_are_not(study, effects):
 def test_it_is_not_asked_where_it_cannot_answer(study):
     """In recorded flights, and where an effect is a candidate that it has no class of."""
     data = Data(study, flown(1, 79))
-    assert inference_of(data, list(every())) is not None
-    assert inference_of(data, [*every(), "an effect of one's own"]) is None
+    assert inference_of(data, list(all_candidates())) is not None
+    assert inference_of(data, [*all_candidates(), "an effect of one's own"]) is None
     recorded = replace(study, scatter=replace(study.scatter, exact=False))
-    assert inference_of(replace(data, study=recorded), list(every())) is None
+    assert inference_of(replace(data, study=recorded), list(all_candidates())) is None

@@ -8,7 +8,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.select import select
 from airtouch.gap.signals.lost_rows import bridging_power
 from airtouch.gap.signals.spectra import AIR, frequencies
-from airtouch.gap.signatures.candidates import every
+from airtouch.gap.signatures.candidates import all_candidates
 from gap_flights import VEHICLE, flown
 
 PITCH = 4  #: channel of the pitch torque
@@ -47,7 +47,7 @@ def test_lost_rows_alone_are_named_alone(pairs, study):
     """Bursts of lost rows used to look like a wake or like noise of the motors beside them."""
     for flight in pairs[0][:3]:
         data = Data(study, [flight])
-        selection = select(data, every())
+        selection = select(data, all_candidates())
         assert [s.name for s in selection.steps if s.named] == ["packet_loss"]
         share = chosen_effects(data, selection)[0].parameters["share"]
         assert share.high > 1.2 * share.value, "48 rows in 12 bursts say the share to a quarter at best"

@@ -8,9 +8,8 @@ from scipy.stats import t as student
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
 from airtouch.gap.signatures.candidates import ALIKE
 from airtouch.gap.signatures.nominal_scatter import (
-    LEAST,
+    FALSE_SHARE,
     LEAST_RECORDED,
-    ODD,
     Apparent,
     Scatter,
     measured,
@@ -18,6 +17,7 @@ from airtouch.gap.signatures.nominal_scatter import (
     size_of,
     table,
 )
+from airtouch.gap.signatures.posterior import LEAST
 from airtouch.simulation.effects import EFFECTS
 
 
@@ -157,7 +157,7 @@ def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
     rng = np.random.default_rng(11)
     sizes = np.maximum(1.0 + 0.2 * rng.normal(size=100_000), 0.0)
     known = measured([Apparent({}, {}, 0.0, {"downwash": s}) for s in sizes[:2000]])
-    assert np.mean([known.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(ODD, rel=0.3)
+    assert np.mean([known.unusual("downwash", s) > 0.0 for s in sizes[2000:]]) == pytest.approx(FALSE_SHARE, rel=0.3)
 
 
 def test_a_passage_that_gains_much_or_is_strong_is_only_news_where_it_is_both():

@@ -15,7 +15,7 @@ from airtouch.gap.evidence.problem import Part
 from airtouch.gap.naming.screen import Screen
 from airtouch.gap.naming.selection import Hypothesis, Judged
 from airtouch.gap.signals.spectra import AIR, REST
-from airtouch.gap.signatures.candidates import CLOCK, MEAN, Term, random_of, telling
+from airtouch.gap.signatures.candidates import CLOCK, MEAN, Term, random_of, strength_term
 
 GROUP = 3  #: neighbouring blocks that stay on one side of the split: 5 s
 LEAST_GAIN = 12.0  #: held-out log likelihood that an effect must add
@@ -104,7 +104,7 @@ def crossed(on: Trial, name: str, terms: Hypothesis, chosen: Judged | None, choi
         on_clock, clock_nats = clock_gain(on.data, t)
         fitted.append(on_clock)
         gain += clock_nats if t in timed else 0.0
-    strength, covariance, apart = strength_of(telling(terms), fitted, fits)
+    strength, covariance, apart = strength_of(strength_term(terms), fitted, fits)
     return Judged(name, tuple(fitted), gain, tuple(fits), choice=paid, strength=strength, covariance=covariance,
                   apart=apart, beyond=beyond + wider)
 

@@ -13,7 +13,7 @@ from airtouch.gap.loop.closed_loop import COMMAND_ONLY
 from airtouch.gap.naming.judging import FIRST_GAIN, LEAST_GAIN, Trial, at_bound, covariance_among_all, crossed, price_of
 from airtouch.gap.naming.screen import first_order, random_look
 from airtouch.gap.naming.selection import Hypothesis, Judged
-from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, Term, names_alike, random_of, telling
+from airtouch.gap.signatures.candidates import COMPANIONS, MEAN, Term, names_alike, random_of, strength_term
 from airtouch.gap.signatures.nominal_scatter import Scatter
 
 HOPELESS = 0.5  #: gain below which an effect is not looked at any closer in this view
@@ -139,7 +139,7 @@ def _with_random_parts(on: Trial, residuals: Sequence[np.ndarray], extra_power: 
         if not (promising or thorough):
             if name not in mean:  # else the look at its mean part says what there is
                 out.append(Judged(name, (*held, *terms), before + min(gain, 0.0), full=False, choice=choice,
-                                  strength=telling(terms).among_all(strength)))
+                                  strength=strength_term(terms).among_all(strength)))
             continue
         longer = [(t, c) for n, t, c in hypotheses if n == name and len(t) > len(terms) and _same(t[0], terms[0])]
         out += [crossed(on, name, t, chosen, c) for t, c in ((terms, choice), *longer)]
@@ -167,7 +167,7 @@ def _with_evidence(scatter: Scatter | None, best: Mapping[str, Judged], before: 
     out = {}
     for n, j in best.items():
         mine = [t for t in j.terms if t.name == n]
-        own = telling(mine[-2:]) if mine[-1].companion else mine[-1]
+        own = strength_term(mine[-2:]) if mine[-1].companion else mine[-1]
         stretched = own.kind == MEAN and at_bound(own, j.strength).any()
         news = scatter.evidence(n, j.strength, j.covariance, j.apart) if scatter else np.inf
         out[n] = replace(j, evidence=min(j.gain - before, 0.0 if stretched else news))

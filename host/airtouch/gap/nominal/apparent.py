@@ -12,7 +12,7 @@ from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.select import nameless, seconds
 from airtouch.gap.naming.selection import Judged
-from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, every, telling
+from airtouch.gap.signatures.candidates import CLOCK, GATED, SPECTRUM, all_candidates, strength_term
 from airtouch.gap.signatures.nominal_scatter import Apparent, size_of
 
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
@@ -22,7 +22,7 @@ NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the dat
 def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
     """How strong every effect but those of `without` seems to be in flights that have none."""
     on = trial_of(data)
-    singles = round_of(on, every(without), None, thorough=True)
+    singles = round_of(on, all_candidates(without), None, thorough=True)
     passing = gated(data, without)
     known = {n: j for n, j in singles.items() if len(j.strength)}
     return Apparent({n: j.strength for n, j in known.items()}, {n: _error(data, j) for n, j in known.items()},
@@ -33,7 +33,7 @@ def apparent(data: Data, without: Sequence[str] = ()) -> Apparent:
 
 def _error(data: Data, judged: Judged) -> np.ndarray:
     """Standard deviation (k,) by chance of a candidate's strength."""
-    term = telling(judged.terms)
+    term = strength_term(judged.terms)
     if term.kind == CLOCK:
         return np.zeros(len(judged.strength))
     if term.kind != SPECTRUM:

@@ -21,7 +21,7 @@ from airtouch.gap.relations.hypotheses import FlightFeatures, LearnedModel
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, drawn_flights, fly, scaled
 from airtouch.gap.relations.library import STORED, Library, packed, read, save
 from airtouch.gap.relations.space import Standard
-from airtouch.gap.signatures.candidates import alike
+from airtouch.gap.signatures.candidates import interchangeable
 from airtouch.simulation.effects import EFFECTS, NAMES, Active
 from airtouch.vehicle import load
 
@@ -143,7 +143,7 @@ def _interaction(scene: Scene, library: Library, paired: Sequence[Paired]) -> np
         rng = np.random.default_rng([SEED, 97, i])
         while True:
             a, b = (int(j) for j in rng.choice(len(paired), 2, replace=False))
-            if not alike(paired[a].drawing.kind.effect, paired[b].drawing.kind.effect):
+            if not interchangeable(paired[a].drawing.kind.effect, paired[b].drawing.kind.effect):
                 break
         f = fly(scene, i, [_drawn(paired[j], rng) for j in (a, b)])
         if f is None:

@@ -12,7 +12,7 @@ from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, fly, scaled
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
-from airtouch.gap.signatures.candidates import alike
+from airtouch.gap.signatures.candidates import interchangeable
 from airtouch.simulation.effects import EFFECTS, NAMES
 
 CHECKS, A_CLASS, CALIBRATION = 300, 12, 80  #: nominal flights; flights of each class to check it, and to calibrate it
@@ -55,7 +55,7 @@ def _shares(scene: Scene, library: Library, place: int, drawing: Drawing) -> tup
         y = library.coordinates(f[None])[0]
         flight, found = FlightFeatures(y, library.model), fit(own, y, unchanged(len(y)))
         here = flight.at_fits((found,))
-        two = flight.with_one_more(here, lambda c, _: not alike(c.effect, own.effect))[0]
+        two = flight.with_one_more(here, lambda c, _: not interchangeable(c.effect, own.effect))[0]
         excess = library.excess(flight.squared_distance(here))
         for shares, gain in ((nameless, flight.nameless_evidence(here) - here.evidence - LEAST_GAIN),
                              (second, two.evidence - here.evidence - LEAST_GAIN),

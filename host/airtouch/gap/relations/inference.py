@@ -10,7 +10,7 @@ from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightFeatures, Hypothesis, LearnedModel
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Reading, read_out
-from airtouch.gap.signatures.candidates import alike
+from airtouch.gap.signatures.candidates import interchangeable
 from airtouch.simulation.effects import get
 
 #: nats that an effect must gain over none, and a second one over the first: one of 150 nominal flights gained more, and
@@ -140,7 +140,7 @@ def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
     It may not be another name of an effect in it; it may be another parameter of one, if each parameter has a class.
     """
     another = other.of_one_parameter and other.name not in hypothesis.names
-    return all(not alike(other.effect, e) or (another and other.effect == e) for e in hypothesis.effects)
+    return all(not interchangeable(other.effect, e) or (another and other.effect == e) for e in hypothesis.effects)
 
 
 def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:

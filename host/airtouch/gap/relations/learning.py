@@ -10,7 +10,7 @@ from airtouch.gap.flights.flight import ready
 from airtouch.gap.relations import exposure
 from airtouch.gap.relations.features import features
 from airtouch.gap.relations.readout import amount_of
-from airtouch.gap.signatures.candidates import every, free_of
+from airtouch.gap.signatures.candidates import all_candidates, free_of
 from airtouch.gap.signatures.drawn import SHAPED, Kind, kinds_of
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
@@ -68,7 +68,7 @@ def drawings(effect: str) -> list[Drawing]:
     out = []
     for name, kind in kinds_of(get(effect)).items():
         parameter = SHAPED.get(name)
-        own = [t for v in every()[effect] for t in v if t.name == effect and not t.companion]
+        own = [t for v in all_candidates()[effect] for t in v if t.name == effect and not t.companion]
         shapes = sorted({t.values[parameter] for t in own}) if parameter else [None]
         out += [Drawing(name, kind, s) for s in shapes]
     return out

@@ -21,7 +21,7 @@ from airtouch.gap import measure
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_severity import log_ratio, severities, weakest
-from airtouch.gap.signatures.candidates import alike
+from airtouch.gap.signatures.candidates import interchangeable
 from airtouch.gap.signatures.drawn import KINDS, Kind
 from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
@@ -167,7 +167,7 @@ def draw(count: int, levels: Mapping[str, Sequence[float]], rng: np.random.Gener
     for _ in range(count - singles - none):
         while True:
             a, b = (names[i] for i in rng.choice(len(names), 2, replace=False))
-            if KINDS[a].effect != KINDS[b].effect and not alike(KINDS[a].effect, KINDS[b].effect):
+            if KINDS[a].effect != KINDS[b].effect and not interchangeable(KINDS[a].effect, KINDS[b].effect):
                 break
         cases.append([(n, int(rng.choice(PAIR_LEVELS))) for n in (a, b)])
     cases += [[] for _ in range(none)]
@@ -187,4 +187,5 @@ def _flight(vehicle: Vehicle, drawn: Sequence[tuple[str, int]], levels: Mapping[
     raise AirTouchError(f"{', '.join(k for k, _ in drawn)}: {TRIES} flights crashed; lower its highest strength")
 
 
-__all__ = ["Kind", "alike", "draw", "key_of", "make", "open_key", "score", "strengths", "stripped", "study_of"]
+__all__ = ["Kind", "draw", "interchangeable", "key_of", "make", "open_key", "score", "strengths", "stripped",
+           "study_of"]

@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.judging import FIRST_GAIN
 from airtouch.gap.sealed.blind_severity import SEEN
-from airtouch.gap.signatures.candidates import alike, terms
+from airtouch.gap.signatures.candidates import interchangeable, terms
 
 Case = Mapping[str, Any]
 LEVELS = ("weakest", "2x", "4x")
@@ -68,7 +68,7 @@ def figures(key: Mapping[str, Any], cases: Sequence[Case]) -> dict[str, Any]:
                       if (group := [n for n, e in single.items() if e["kind"] == k])},
         "false_alarms": share(alarms), "false_unknown": share(_verdict(plain.get(n)) == "unknown" for n in none),
         "pairs_exact": share(_same(sets[n], e) for n, e in pairs.items()),
-        "pairs_one_right": share(any(alike(a, b) for a in sets[n] for b in e) for n, e in pairs.items()),
+        "pairs_one_right": share(any(interchangeable(a, b) for a in sets[n] for b in e) for n, e in pairs.items()),
         "unknown": unknown(single, plain, cases),
         "shrink": shrink(single, plain, first), "parameters": parameters(single, plain, first),
         "confusion": confusion(truth, plain), "reliability": reliability(truth, plain),
@@ -101,7 +101,7 @@ def wilson(hits: int, n: int, z: float = 1.959964) -> dict[str, float | None]:
 
 def top(case: Case | None, name: str, first: int) -> bool:
     """Whether an effect, or another name of it, is among the first of a ranking."""
-    return case is not None and any(alike(name, r["name"]) for r in case["ranking"][:first])
+    return case is not None and any(interchangeable(name, r["name"]) for r in case["ranking"][:first])
 
 
 def unknown(single: Mapping[str, Any], plain: Mapping[str, Case], cases: Sequence[Case]) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def reliability(truth: Mapping[str, Sequence[Any]], plain: Mapping[str, Case], b
     for n, e in truth.items():
         if n in plain and len(e) < 2:
             best = plain[n]["ranking"][0]
-            rows.append((best["probability"], alike(e[0]["name"] if e else "none", best["name"])))
+            rows.append((best["probability"], interchangeable(e[0]["name"] if e else "none", best["name"])))
     place = [min(int(p * bins), bins - 1) for p, _ in rows]
     return [{"probability": float(np.mean([r[0] for r in group])), **share(r[1] for r in group)}
             for b in range(bins) if (group := [r for r, k in zip(rows, place, strict=True) if k == b])]
@@ -231,7 +231,7 @@ def _same(named: Sequence[str], true: Sequence[str]) -> bool:
     """Whether two lists of effects hold the same, names of one thing counted as one."""
     left = list(true)
     for n in named:
-        match = next((t for t in left if alike(n, t)), None)
+        match = next((t for t in left if interchangeable(n, t)), None)
         if match is None:
             return False
         left.remove(match)

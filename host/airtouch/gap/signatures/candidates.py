@@ -15,7 +15,11 @@ from airtouch.gap.result import Found, Quantity
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import EFFECTS, Active, Effect, Parameter, get
 
+#: how an effect shows: in the mean of the gap, in its spectrum, in the logged times alone
 MEAN, SPECTRUM, CLOCK = "mean", "spectrum", "clock"
+WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
+RANGE_STEP = 0.05  #: natural step, as a fraction of its range, of a parameter whose default is neutral
+#: parameters that a fit frees, by effect; the others have the same effect in most logs
 _FREE = {
     "ground_effect": ("strength",), "rotor_drag": ("horizontal", "vertical"), "wind": ("x", "y", "z"),
     "gust": ("rms",), "blade_flapping": ("tilt",), "motor_lag": ("factor",), "motor_noise": ("rms",),
@@ -27,8 +31,10 @@ _FREE = {
     "flow_scale": ("share", "transient"), "downwash": ("strength",),
     "controller_gain": ("rate", "attitude", "position", "height"),
 }
+#: effects that do not show in the mean
 _KIND = {"gust": SPECTRUM, "motor_noise": SPECTRUM, "imu_noise": SPECTRUM, "vibration": SPECTRUM,
          "time_jitter": CLOCK, "packet_loss": CLOCK}
+#: values of parameters that are tried one by one, in their units (m, s, fractions, number of the rotor)
 _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
     "ground_effect": tuple({"fade": x} for x in (0.0, 0.06, 0.0875, 0.129)),
     "weak_motor": tuple({"rotor": i} for i in (1, 2, 3, 4)),
@@ -40,9 +46,10 @@ _VARIANTS: dict[str, tuple[dict[str, float], ...]] = {
 }
 #: parameters that are freed once a fit of the others is close
 _LATER = {"battery_sag": ("charge", "capacity"), "slung_load": ("length",)}
-#: a shape that half of the data can hardly tell: its values, of which all the data choose in the end
+#: a shape that half of the data can hardly tell: its parameter and the values, of which all the data choose in the end
 _SHAPES = {"ground_effect": ("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22))}
 _ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are also tried alone
+#: values of parameters of a mean part, whose random part is a term of its own (`random_part_of`)
 _FIXED = {"ground_effect": {"turbulence": 0.0}, "downwash": {"turbulence": 0.0, "width": 0.0}}
 GATED = ("wind", "gust", "downwash")  #: effects that may come and go within a flight
 SHAKES = frozenset({"downwash"})  #: effects that are only tried with their random part: the mean alone has other names
@@ -53,6 +60,7 @@ UNSTEADY = ("ground_effect", "downwash")  #: effects with a random part, where a
 OWN_SCATTER = {"vibration": 0.52, "ground_effect": 0.07}
 #: share of the samples, and how many of them go in a row: bursts are Poisson's, their lengths geometric
 COUNTED = {"packet_loss": ("share", "burst")}
+#: effects with a variant that has another effect beside it: air moves the vehicle through its rotors' drag
 COMPANIONS = {"wind": "rotor_drag", "gust": "rotor_drag"}
 #: names for one thing in the logs at hand, with what would tell them apart
 ALIKE = (
@@ -79,6 +87,7 @@ class Term:
 
     @property
     def name(self) -> str:
+        """Name of the effect in the registry."""
         return self.effect.name
 
     def active(self, x: np.ndarray | None = None) -> Active:
@@ -86,6 +95,7 @@ class Term:
         return Active(self.effect, dict(self.values) if x is None else self.at(x), self.gate)
 
     def at(self, x: np.ndarray) -> dict[str, float]:
+        """Values of all parameters, in their units, at scaled parameters x, clipped to their bounds."""
         values = dict(self.values)
         for name, amount in zip(self.free, x, strict=True):
             p = self._parameter(name)
@@ -93,15 +103,16 @@ class Term:
         return values
 
     def fitted(self, x: np.ndarray) -> "Term":
+        """The term with the values that scaled parameters x stand for."""
         return replace(self, values=self.at(x))
 
     def refined(self) -> "Term":
-        """The same with those parameters free too that are fitted last."""
-        more = tuple(p for p in _LATER.get(self.name, ()) if p not in self.free)
-        return replace(self, free=self.free + more) if more else self
+        """The term with those parameters free too that are fitted last."""
+        later = tuple(p for p in _LATER.get(self.name, ()) if p not in self.free)
+        return replace(self, free=self.free + later) if later else self
 
     def shaped(self) -> "list[Term]":
-        """The same in every shape that all the data may choose among; none where its effect has no such."""
+        """The term in each shape that all the data may choose among; none where its effect has no shapes."""
         name, values = _SHAPES.get(self.name, ("", ())) if self.kind == MEAN else ("", ())
         return [replace(self, values={**self.values, name: v}) for v in values]
 
@@ -112,7 +123,7 @@ class Term:
             and self.effect.settings is not None
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest scaled parameters."""
+        """Lowest and highest scaled values (k,) of the free parameters."""
         low, high = [], []
         for name in self.free:
             p = self._parameter(name)
@@ -121,7 +132,7 @@ class Term:
         return np.array(low), np.array(high)
 
     def scaled(self, values: Mapping[str, float]) -> np.ndarray:
-        """The scaled parameters of given values."""
+        """Scaled values (k,) of the free parameters, from values in their units."""
         return np.array([(values[n] - _neutral(self._parameter(n))) / self.step(n) for n in self.free])
 
     def among_all(self, x: np.ndarray, other: float = 0.0) -> np.ndarray:
@@ -150,7 +161,7 @@ class Term:
                 out[p.name] = Quantity(values[p.name], unit=p.unit)
                 continue
             i = self.free.index(p.name)
-            half = 0.0 if covariance is None else 1.645 * float(np.sqrt(max(covariance[i, i], 0.0))) * unit(p)
+            half = 0.0 if covariance is None else WITHIN_90 * float(np.sqrt(max(covariance[i, i], 0.0))) * unit(p)
             out[p.name] = Quantity(values[p.name], max(values[p.name] - half, p.low),
                                    min(values[p.name] + half, p.high), p.unit)
         return out
@@ -165,17 +176,18 @@ def parameter_of(effect: Effect, name: str) -> Parameter:
 
 
 def unit(p) -> float:
-    """A natural step of a parameter: from neutral to default, else a twentieth of its range."""
+    """The natural step of a parameter, in its unit: from neutral to default, else RANGE_STEP of its range."""
     step = abs(p.default - _neutral(p))
-    return step if step > 0.0 else 0.05 * (p.high - p.low)
+    return step if step > 0.0 else RANGE_STEP * (p.high - p.low)
 
 
 def _neutral(p) -> float:
+    """The value at which a parameter does nothing, 0 where it has none."""
     return 0.0 if p.neutral is None else p.neutral
 
 
 def terms(name: str) -> list[Term]:
-    """The hypotheses of one effect: one for each variant, all free parameters at neutral."""
+    """The hypotheses of one effect, one for each variant, with all free parameters at neutral."""
     effect = get(name)
     free = free_of(effect)
     kind = _KIND.get(name) or (MEAN if name in _FREE or not _random(effect) else SPECTRUM)
@@ -189,8 +201,8 @@ def free_of(effect: Effect) -> tuple[str, ...]:
     return _FREE.get(effect.name) or tuple(p.name for p in effect.parameters if p.neutral is not None)
 
 
-def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
-    """All effects of the registry as hypotheses, in its order: for each its variants.
+def all_candidates(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
+    """The variants of every effect of the registry but those of `without`, by name and in its order.
 
     Moving air acts through the rotors' drag, and drag that acts on the air's velocity acts
     on the vehicle's own: a variant of `wind` and `gust` has drag of its own beside it.
@@ -210,7 +222,7 @@ def every(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
 
 
 def gated(without: Iterable[str] = ()) -> dict[str, list[tuple[Term, ...]]]:
-    """Effects that may come and go, with their variants; the gate is set by who looks for it."""
+    """The variants of effects that may come and go, by name; `evidence.gates` sets their gates."""
     without = set(without)
     out: dict[str, list[tuple[Term, ...]]] = {name: [(t,) for t in terms(name)] for name in GATED
                                               if name in EFFECTS and name not in without}
@@ -224,8 +236,8 @@ def random_part_of(name: str) -> Term:
     return Term(effect, SPECTRUM, ("turbulence",), effect.values({"strength": 1.0, **neutral}), True)
 
 
-def telling(terms: Sequence[Term]) -> Term:
-    """The term of an effect whose strength says how much of it there is: its random part where it shakes."""
+def strength_term(terms: Sequence[Term]) -> Term:
+    """The term whose strength is that of the effect: the random part of an effect that SHAKES, else the first."""
     return terms[-1] if terms[0].name in SHAKES else terms[0]
 
 
@@ -240,26 +252,26 @@ def is_random(name: str) -> bool:
 
 
 def term_of(effect: Found) -> Term:
-    """An effect as a diagnosis names it, as a term with its values."""
-    given = {k: q.value for k, q in effect.parameters.items()}
-    right = min(terms(effect.name), key=lambda t: sum(abs(given.get(k, v) - v) for k, v in t.values.items()
-                                                      if k not in t.free))
-    return replace(right, values={**right.values, **given}, gate=effect.seconds)
+    """The term of an effect that a diagnosis named, with its values."""
+    values = {k: q.value for k, q in effect.parameters.items()}
+    nearest = min(terms(effect.name), key=lambda t: sum(abs(values.get(k, v) - v) for k, v in t.values.items()
+                                                       if k not in t.free))
+    return replace(nearest, values={**nearest.values, **values}, gate=effect.seconds)
 
 
 def names_alike(name: str) -> tuple[frozenset[str], str] | None:
-    """The set that an effect cannot be told from in these logs, and what would separate it."""
+    """The set of effects that these logs do not separate from this one, and what would; None without one."""
     return next(((group, advice) for group, advice in ALIKE if name in group), None)
 
 
-def alike(one: str, other: str) -> bool:
+def interchangeable(one: str, other: str) -> bool:
     """Whether two names stand for one thing in these logs."""
     group = names_alike(one)
     return one == other or (group is not None and other in group[0])
 
 
 def _random(effect: Effect) -> bool:
-    """Whether two seeds give two forces on the same signals."""
+    """Whether two seeds give two forces on the same signals, of a small drone that flies 0.1 m high at 0.5 m/s."""
     if effect.wrench is None:
         return False
     from airtouch.simulation import replay
@@ -271,5 +283,5 @@ def _random(effect: Effect) -> bool:
     signals[:, at.VELOCITY] = 0.5
     signals[:, at.LOWER_HEIGHT:at.UPPER_HEIGHT + 4], signals[:, at.HEIGHT] = 0.1, 0.1
     active = Active(effect, effect.values())
-    one, two = (replay.wrench_of(active, signals, seed) for seed in (1, 2))
-    return not np.allclose(one, two)
+    first, second = (replay.wrench_of(active, signals, seed) for seed in (1, 2))
+    return not np.allclose(first, second)

@@ -12,6 +12,7 @@ from airtouch.gap.signatures.candidates import free_of, unit
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active, Effect
 
+#: values of an effect's parameters, in their units, by name
 Values = dict[str, float]
 
 
@@ -28,31 +29,36 @@ class Kind:
     make: Callable[[float, np.random.Generator], Values]
 
     def active(self, strength: float, rng: np.random.Generator) -> Active:
+        """The effect at a strength, with a random direction, rotor or length."""
         effect = effects.get(self.effect)
         neutral = effect.scaled(effect.values(), 0.0)
         return Active(effect, effect.values(neutral | self.make(strength, rng)))
 
 
 def _one(parameter: str, signed: bool = False) -> Callable[[float, np.random.Generator], Values]:
+    """A parameter equal to the strength, with a random sign where it is signed."""
     return lambda s, rng: {parameter: s * (rng.choice([-1.0, 1.0]) if signed else 1.0)}
 
 
 def _times(parameter: str, signed: bool = True) -> Callable[[float, np.random.Generator], Values]:
-    """A factor 1 + s or 1 / (1 + s)."""
+    """A parameter that is a factor: 1 + s, or, where it is signed, that or 1 / (1 + s) by chance."""
     return lambda s, rng: {parameter: (1.0 + s) ** (rng.choice([-1.0, 1.0]) if signed else 1.0)}
 
 
 def _around(s: float, rng: np.random.Generator) -> Values:
+    """A horizontal vector of length s and random direction."""
     angle = rng.uniform(0.0, 2.0 * np.pi)
     return {"x": s * float(np.cos(angle)), "y": s * float(np.sin(angle))}
 
 
 def _bias(s: float, rng: np.random.Generator) -> Values:
+    """Biases of accelerometer (0.25 m/s^2 for s = 1) and gyro (0.03 rad/s) in random directions."""
     acc, gyro = (x / np.linalg.norm(x) for x in rng.normal(size=(2, 3)))
     return {f"{k}_{a}": float(v * s * size) for k, part, size in (("acc", acc, 0.25), ("gyro", gyro, 0.03))
             for a, v in zip("xyz", part, strict=True)}
 
 
+#: each effect as it is drawn; the number is its highest plausible strength, in the unit of the parameter that it scales
 KINDS: dict[str, Kind] = {
     "ground_effect": Kind("ground_effect", 2.0, lambda s, rng: {"strength": s, "turbulence": 0.3}),
     "rotor_drag": Kind("rotor_drag", 0.06, _one("horizontal")),
@@ -103,10 +109,10 @@ def _any(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
     free = [p for p in effect.parameters if p.name in free_of(effect)]
 
     def make(s: float, rng: np.random.Generator) -> Values:
-        way = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
-        way /= np.linalg.norm(way)
+        direction = rng.normal(size=len(free)) if len(free) > 1 else np.ones(1)
+        direction /= np.linalg.norm(direction)
         out = {}
-        for p, x in zip(free, way, strict=True):
+        for p, x in zip(free, direction, strict=True):
             signed = -abs(x) if p.high <= (p.neutral or 0.0) else abs(x) if p.low >= (p.neutral or 0.0) else \
                 x * rng.choice([-1.0, 1.0])
             out[p.name] = float(np.clip((p.neutral or 0.0) + s * signed * unit(p), p.low, p.high))

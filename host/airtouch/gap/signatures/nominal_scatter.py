@@ -1,4 +1,4 @@
-"""How strong every effect seems to be in flights that have none: the yardstick of the diagnosis.
+"""The scatter of nominal flights: how strong an effect seems to be in flights that have none.
 
 Two nominal flights of one vehicle differ in trim, battery, air and wear. Fitted to such a
 flight, an effect gets some apparent strength, and may gain many nats of likelihood. It is
@@ -7,7 +7,7 @@ news only as far as its strength exceeds what nominal flights show of the same e
 The variance of a parameter's apparent strength has a scaled inverse chi-square prior
 (Gelman et al., Bayesian Data Analysis, 3rd ed., section 2.6) from the table
 `nominal_scatter.toml`, of one class of vehicles, and is updated by the baseline flights;
-which class it is they tell by themselves. `tools/nominal_scatter.py` makes the table.
+the class is the one that these fit best. `tools/nominal_scatter.py` makes the table.
 """
 
 import math
@@ -18,26 +18,22 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
-from scipy.special import logsumexp
 from scipy.stats import t as student
 
 from airtouch.gap.signatures.candidates import ALIKE, is_random
+from airtouch.gap.signatures.posterior import LEAST, MOST_DEVIATIONS, moments, standard_deviation, updated
 
-MOST_SURE = 4.0  #: standard deviations of the rate that are no news, at most
-LEAST_RECORDED = 0.02  #: the same of a class of recorded flights, which chance at times explains to the last digit
-LEAST = 1e-3  #: scatter of a scaled parameter at least; effects of a thousandth of their natural strength are none
-WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own
-CERTAIN = 1e-9  #: variance of a strength, in nominal scatter, that counts as exact
-STEPS = 12  #: of the compromise between nominal scatter and chance
+LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
+RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own
+EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is added to that of every strength
+STEPS = 12  #: iterations of the compromise between nominal scatter and chance
 POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them
-NEVER_BELOW = 0.05  #: scatter of strengths by which classes are told apart, and of sizes, at least: none is that exact
-RATE_NEVER_BELOW = 0.3  #: the same of the square root of a rate
-CUT = 0.9  #: quantile of the square roots of rates to which those above it are cut (winsorised)
-ODD = 0.01  #: share of nominal flights in which one of the effects that come and go may be named
-RATE_FREEDOM = 4.0  #: of Student's density of it: a flight or two may be odd
+LEAST_SPREAD = 0.05  #: natural steps: scatter of strengths and sizes at least, where classes are compared
+LEAST_RATE_SPREAD = 0.3  #: the same for the square root of a rate, nats a second
+WINSOR = 0.9  #: quantile of the square roots of rates to which those above it are cut (winsorised)
+FALSE_SHARE = 0.01  #: share of nominal flights in which one of the effects that come and go may be named
+RATE_FREEDOM = 4.0  #: degrees of freedom of Student's density of that square root: a flight or two may be odd
 SIMULATED = "simulated"  #: the class of flights of this project's simulator
-SAYS = 1.0  #: sure estimates that must be there, of a scatter of a natural step, for any scatter to be told from them
-GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations among which the posterior's median is taken
 
 
 @dataclass(frozen=True)
@@ -97,15 +93,15 @@ class Scatter:
         if rms is None or not len(strength):
             return math.inf
         rms = np.append(rms, np.full(max(len(strength) - len(rms), 0), rms.max()))[:len(strength)]
-        if name in self.middle:  # a random effect weaker than usual is no news
+        if name in self.middle:  # a random effect weaker than in nominal flights is no news
             strength = np.maximum(strength - self.middle[name], 0.0)
         if covariance is None or not covariance.any():
             return self._rare(strength / rms, max(int(np.count_nonzero(strength)) - 1, 0))
-        known = np.flatnonzero(np.isfinite(np.diag(covariance)))
-        own, further = strength[known] / rms[known], max(len(known) - 1, 0)
-        chance = covariance[np.ix_(known, known)] / np.outer(rms[known], rms[known]) + CERTAIN * np.eye(len(known))
-        apart = np.broadcast_to(apart, strength.shape)[known] / rms[known]
-        toward = np.linalg.solve(chance + np.eye(len(known)), apart)
+        finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
+        own, further = strength[finite] / rms[finite], max(len(finite) - 1, 0)
+        chance = covariance[np.ix_(finite, finite)] / np.outer(rms[finite], rms[finite]) + EXACT * np.eye(len(finite))
+        apart = np.broadcast_to(apart, strength.shape)[finite] / rms[finite]
+        toward = np.linalg.solve(chance + np.eye(len(finite)), apart)
         if toward @ apart > 0.0:
             own = own - np.clip(toward @ own / (toward @ apart), -1.0, 1.0) * apart
         precision = np.linalg.inv(chance)
@@ -116,16 +112,16 @@ class Scatter:
         over = max(float(far @ far) - further, 0.0)
         return 0.5 * (self.freedom + 1.0) * math.log1p(over / self.freedom)
 
-    def _compromise(self, found: np.ndarray, precision: np.ndarray, further: int, usual: np.ndarray) -> float:
+    def _compromise(self, fitted: np.ndarray, precision: np.ndarray, further: int, nominal: np.ndarray) -> float:
         """Least sum of how rare a strength is in nominal flights and how far off by chance the fitted one is.
 
-        found: the fitted strength; usual: the one from which the search begins, by weighted least squares (of Student's
-        density, Lange et al. 1989).
+        fitted: the fitted strength; nominal: the strength in nominal flights from which the search begins, by weighted
+        least squares (of Student's density, Lange et al. 1989).
         """
         for _ in range(STEPS):
-            weight = (self.freedom + 1.0) / (self.freedom + float(usual @ usual))
-            usual = np.linalg.solve(precision + weight * np.eye(len(found)), precision @ found)
-        return self._rare(usual, further) + 0.5 * float((found - usual) @ precision @ (found - usual))
+            weight = (self.freedom + 1.0) / (self.freedom + float(nominal @ nominal))
+            nominal = np.linalg.solve(precision + weight * np.eye(len(fitted)), precision @ fitted)
+        return self._rare(nominal, further) + 0.5 * float((fitted - nominal) @ precision @ (fitted - nominal))
 
     def allowed(self, seconds: float, least: float) -> float:
         """Log likelihood that a model without names may gain in a nominal flight of so many seconds.
@@ -133,22 +129,23 @@ class Scatter:
         least: what would be news in a flight of rate 0, nats; square roots of rates scatter as Student's.
         """
         middle, spread = self.rate
-        sure = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
-        return least + seconds * (middle + min(sure, MOST_SURE) * spread) ** 2
+        deviations = math.sqrt(self.freedom * math.expm1(2.0 * least / (self.freedom + 1.0)))
+        return least + seconds * (middle + min(deviations, MOST_DEVIATIONS) * spread) ** 2
 
     def unusual(self, name: str, size: float) -> float:
-        """Log likelihood (Student) by which the size of an effect that comes and goes lies beyond the one that a share
-        ODD of nominal flights exceeds; negative where it does not.
+        """Log likelihood (Student) by which the size of an effect that comes and goes exceeds that of nominal flights.
+
+        It is 0 at the size that a share FALSE_SHARE of nominal flights exceeds, and negative below.
         """
         middle, spread = self.passing.get(name, (0.0, 0.0))
-        far, limit = max(size - middle, 0.0) / max(spread, NEVER_BELOW), float(student.ppf(1.0 - ODD, self.freedom))
-        said, allowed = (math.log1p(x ** 2 / self.freedom) for x in (far, limit))
-        return 0.5 * (self.freedom + 1.0) * (said - allowed)
+        far = max(size - middle, 0.0) / max(spread, LEAST_SPREAD)
+        limit = float(student.ppf(1.0 - FALSE_SHARE, self.freedom))
+        rarity, limit_rarity = (math.log1p(x ** 2 / self.freedom) for x in (far, limit))
+        return 0.5 * (self.freedom + 1.0) * (rarity - limit_rarity)
 
 
 def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: str = "") -> Scatter:
-    """What the table knows of the vehicle's class, or else of the one that the baseline flights fit best, updated by
-    them.
+    """The scatter of the vehicle's class, or else of the one that the baseline flights fit best, updated by them.
 
     baseline: flights held against a vehicle that was calibrated on all of them. Their scatter is widened
     by (n + 1) / (n - 1): each was among those that it is held against, another flight will not be.
@@ -166,7 +163,7 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
     own = classes[name_of] if n > 1 else _widest(list(classes.values()))
     simulated = name_of == SIMULATED and n > 1  # whose flights are all drawn alike
     least = LEAST if simulated else LEAST_RECORDED
-    worth = own.freedom if simulated else min(own.freedom, WORTH)
+    worth = own.freedom if simulated else min(own.freedom, RECORDED_WORTH)
     rms, middle = {}, {}
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
@@ -175,8 +172,8 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
         if name in own.middle:
             sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
             middle[name] = centre = sums / (worth + len(rows))
-        own_rms = [_median(scale * (_column(rows, name, "strengths", k) - centre[k]),
-                           scale * _column(rows, name, "errors", k), p, (worth, min(worth, WORTH)))
+        own_rms = [standard_deviation(scale * (_column(rows, name, "strengths", k) - centre[k]),
+                           scale * _column(rows, name, "errors", k), p, (worth, min(worth, RECORDED_WORTH)))
                    for k, p in enumerate(prior)] if rows else prior
         exact = rows and not any(f.errors[name].any() for f in rows)  # of the log's times, which differ from day to day
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
@@ -184,47 +181,14 @@ def scatter_of(baseline: Sequence[Apparent], recorded: bool = False, vehicle: st
         same = [rms[n] for n in group if n in rms]
         if len({len(x) for x in same}) == 1:
             rms |= {n: np.max(same, axis=0) for n in group if n in rms}
-    passing = {n: _updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
-    rate = _updated(own.rate, np.sqrt([f.rate for f in known]), worth)
+    passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
+    rate = updated(own.rate, np.sqrt([f.rate for f in known]), worth)
     return Scatter(rms, worth + len(known), rate, passing, middle=middle, exact=simulated)
 
 
 def _column(flights: Sequence[Apparent], name: str, what: str, k: int) -> np.ndarray:
     """Parameter k of an effect, strength or error, in every flight (n,)."""
     return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
-
-
-def _median(x: np.ndarray, error: np.ndarray, prior: float, worths: Sequence[float] = ()) -> float:
-    """Posterior median of the standard deviation of values (n,) that chance alone scatters by `error` (n,).
-
-    The variance's prior is scaled inverse chi-square about `prior`^2, of any of the degrees of freedom `worths` alike:
-    flights that do not scatter as a well-known class does are not of it. Without worths every order of magnitude of
-    GRID is as likely, and the least is told where the values say nothing. The likeliest value would be none at all
-    wherever chance can explain the values.
-    """
-    if not worths and float(((1.0 + error ** 2) ** -2.0).sum()) < SAYS:  # Fisher information, of sure ones 1 each
-        return LEAST
-    variance = GRID[:, None] ** 2 + error ** 2
-    level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
-    if worths:
-        priors = [-0.5 * n * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) for n in worths]
-        level += logsumexp([p - logsumexp(p) for p in priors], axis=0)
-    below = np.cumsum(np.exp(level - level.max()))
-    return float(GRID[int(np.searchsorted(below, 0.5 * below[-1]))])
-
-
-def _updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, worth: float, least: float = 0.0,
-             ) -> tuple[float, float]:
-    """Mean and standard deviation, from those of a class and from the values (n,) of the baseline.
-
-    least: standard deviation at least; a few flights without a gust do not make gusts rarer.
-    """
-    middle, spread = own
-    values = np.minimum(values, middle + MOST_SURE * spread)
-    total = worth + len(values)
-    mean = (worth * middle + values.sum()) / total
-    spread = float(np.sqrt((worth * spread ** 2 + ((values - mean) ** 2).sum()) / total))
-    return float(max(mean, middle)), max(spread, least)
 
 
 def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
@@ -234,15 +198,15 @@ def _fit(own: Scatter, baseline: Sequence[Apparent], wide: float) -> float:
         for name, rms in own.rms.items():
             if name in flight.strengths:
                 n = min(len(rms), len(flight.strengths[name]))
-                variance = np.maximum(rms[:n], NEVER_BELOW) ** 2 + wide * flight.errors[name][:n] ** 2
+                variance = np.maximum(rms[:n], LEAST_SPREAD) ** 2 + wide * flight.errors[name][:n] ** 2
                 strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
                 far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
         middle, spread = own.rate
-        total += float(student.logpdf(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, RATE_NEVER_BELOW)))
+        total += float(student.logpdf(np.sqrt(flight.rate), RATE_FREEDOM, middle, max(spread, LEAST_RATE_SPREAD)))
         for name, (middle, spread) in own.passing.items():
             size = flight.passing.get(name, 0.0)
-            total += float(student.logpdf(size, RATE_FREEDOM, middle, max(spread, NEVER_BELOW)))
+            total += float(student.logpdf(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
     return total
 
 
@@ -287,15 +251,12 @@ def measured(flights: Sequence[Apparent], alike: Sequence[Apparent] | None = Non
             middle[name] = np.array([strengths.mean() for strengths, _ in columns])
             columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
         each, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
-        pooled = _median(each, errors, 0.0)
-        rms[name] = np.array([_median(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1 else [pooled])
+        pooled = standard_deviation(each, errors, 0.0)
+        rms[name] = np.array([standard_deviation(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1
+                             else [pooled])
     # of what comes and goes the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
-    passing = {n: _moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
+    passing = {n: moments([f.passing.get(n, 0.0) for f in alike]) for n in names}
     roots = np.sqrt([f.rate for f in alike])
-    return Scatter(rms, float(len(alike)), _moments(np.minimum(roots, np.quantile(roots, CUT))), passing, middle=middle)
-
-
-def _moments(values: Sequence[float] | np.ndarray) -> tuple[float, float]:
-    """Mean and standard deviation."""
-    return float(np.mean(values)), float(np.std(values, ddof=1))
+    rate = moments(np.minimum(roots, np.quantile(roots, WINSOR)))
+    return Scatter(rms, float(len(alike)), rate, passing, middle=middle)

@@ -1,0 +1,52 @@
+"""Scatter of a few values: what a class of vehicles says beforehand, updated by the values of the baseline."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import logsumexp
+
+LEAST = 1e-3  #: natural steps that the scatter of a parameter is at least; no effect is a thousandth of its step
+MOST_DEVIATIONS = 4.0  #: standard deviations above the mean to which values are cut, and up to which a rate is no news
+LEAST_INFORMATION = 1.0  #: exactly known values, of a scatter of a natural step, of which a scatter can be estimated
+GRID = np.geomspace(LEAST, 30.0, 200)  #: standard deviations, in natural steps, among which the posterior's median is
+
+
+def standard_deviation(x: np.ndarray, error: np.ndarray, prior: float, worths: Sequence[float] = ()) -> float:
+    """Posterior median of the standard deviation of values (n,) that chance alone scatters by `error` (n,).
+
+    The variance's prior is scaled inverse chi-square about `prior`^2 (Gelman et al., Bayesian Data Analysis, 3rd ed.,
+    section 2.6). Each of the degrees of freedom `worths` is as likely as the others, since flights that do not scatter
+    as a well-known class does are not of it. Without worths every order of magnitude of GRID is as likely, and LEAST is
+    the answer where the values have too little information. The median is taken because the likeliest value is 0
+    wherever chance can explain the values.
+    """
+    information = float(((1.0 + error ** 2) ** -2.0).sum())  # Fisher's, of each value 1 at most
+    if not worths and information < LEAST_INFORMATION:
+        return LEAST
+    variance = GRID[:, None] ** 2 + error ** 2
+    level = -0.5 * (np.log(variance) + x ** 2 / variance).sum(axis=1)
+    if worths:
+        priors = [-0.5 * n * (np.log(GRID ** 2) + prior ** 2 / GRID ** 2) for n in worths]
+        level += logsumexp([p - logsumexp(p) for p in priors], axis=0)
+    below = np.cumsum(np.exp(level - level.max()))
+    return float(GRID[int(np.searchsorted(below, 0.5 * below[-1]))])
+
+
+def updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, worth: float, least: float = 0.0,
+             ) -> tuple[float, float]:
+    """Mean and standard deviation, from those of a class and from the values (n,) of the baseline.
+
+    own: those of the class; worth: number of flights that they count as; least: standard deviation at least, as a few
+    flights without a gust do not make gusts rarer.
+    """
+    class_mean, spread = own
+    values = np.minimum(values, class_mean + MOST_DEVIATIONS * spread)
+    total = worth + len(values)
+    mean = (worth * class_mean + values.sum()) / total
+    spread = float(np.sqrt((worth * spread ** 2 + ((values - mean) ** 2).sum()) / total))
+    return float(max(mean, class_mean)), max(spread, least)
+
+
+def moments(values: Sequence[float] | np.ndarray) -> tuple[float, float]:
+    """Mean and standard deviation (unbiased) of values."""
+    return float(np.mean(values)), float(np.std(values, ddof=1))
