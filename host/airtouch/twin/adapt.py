@@ -33,13 +33,13 @@ from airtouch.twin import edge_strength, overlay
 from airtouch.vehicle import Vehicle
 
 SIMULATED = 450  #: flights of the twin to train on
-STEPS = {"shipped": 400, "scratch": 2500}  #: of a training from given or random weights
+STEPS = {"shipped": 400, "scratch": 2500}  #: optimiser steps of a training from given and from random weights
 #: Augmentation of recorded and simulated flights together from random weights: twice the recipe's, as few flights are
 #: seen for long. Given weights forget more by it (host/docs/twin-findings.md).
 STRONG: dict[str, Any] = {"gain": 0.3, "warp": 0.15, "noise": 0.1, "offset": 0.2, "yaw_deg": 40.0}
-ROUNDS = 2  #: in which flights without labels are labelled, each by the detector of the one before
-FOLDS = 4
-STAGES = 6  #: changes with what the stages do, so that stored ones of another version are not taken
+ROUNDS = 2  #: rounds in which flights without labels are labelled, each by the detector of the round before
+FOLDS = 4  #: folds of the cross-validation over labelled flights
+STAGES = 6  #: version of what the stages do; stored results of another version are not used
 FEWEST = 4  #: least number of labelled flights for a hold-out
 #: Decoder of a detector that has been trained on simulated edges: its entry logit hardly rises over high platforms, so
 #: that the "over" logit has a large share, smoothed over 0.1 s. Chosen on folds 0 to 2 out of 220, for the least cost
@@ -98,7 +98,7 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     absent = lacking(flights)
     start = start.serving(absent) if start else None
     key = _key(flights, scene, vehicle, start, seed)
-    flown, what = simulated_flights(flights, scene, vehicle, seed, progress)
+    flown, origin = simulated_flights(flights, scene, vehicle, seed, progress)
     flown = replace(flown, logs=[sensors.without(log, absent) for log in flown.logs])
     labelled = [f for f in flights if f.labelled]
     twin = kept_model(work / f"twin_{key}.npz", lambda: best.fit(
@@ -114,8 +114,8 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     model = kept_model(work / f"{name}_{key}.npz",
                    lambda: together(start, twin, last, flown, seed, _named(progress, "all flights"), command))
     own = sum(f.labelled for f in last)
-    known = {"twin": what, "labelled": own, "pseudo_labelled": len(flights) - own}
-    return Adapted(replace(model, metadata={**model.metadata, "adapted": known}), held, half, twin_only)
+    counts = {"twin": origin, "labelled": own, "pseudo_labelled": len(flights) - own}
+    return Adapted(replace(model, metadata={**model.metadata, "adapted": counts}), held, half, twin_only)
 
 
 def lacking(flights: Sequence[Flight]) -> tuple[str, ...]:
@@ -168,21 +168,21 @@ def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence
                 if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
         if not sure:
             break
-        taught, seen = zip(*sure, strict=True)
-        teacher = _mixed(start, labelled, taught, seen, flown, seed, progress, command)
+        pupils, pseudo_edges = zip(*sure, strict=True)
+        teacher = _mixed(start, labelled, pupils, pseudo_edges, flown, seed, progress, command)
     return teacher
 
 
-def _mixed(start: BestModel | None, labelled: Sequence[Flight], taught: Sequence[Flight],
-           seen: Sequence[list[Edge] | None], flown: Flown, seed: int, progress: Progress | None,
+def _mixed(start: BestModel | None, labelled: Sequence[Flight], pupils: Sequence[Flight],
+           pseudo_edges: Sequence[list[Edge] | None], flown: Flown, seed: int, progress: Progress | None,
            command: str) -> BestModel:
-    """One training on labelled flights, flights `taught` with the edges `seen`, and simulated ones, alike in weight.
+    """One training on labelled flights, flights `pupils` with pseudo-labels, and simulated ones, of the same weight.
 
     The lag is that of the recorded ones: recorded edges are detected later than simulated ones.
     """
     count = len(flown.logs)
-    recorded, labels = [f.log for f in (*labelled, *taught)], [*[None] * len(labelled), *seen]
-    weights = [count / len(some) for some in (labelled, taught) for _ in some] + [1.0] * count
+    recorded, labels = [f.log for f in (*labelled, *pupils)], [*[None] * len(labelled), *pseudo_edges]
+    weights = [count / len(group) for group in (labelled, pupils) for _ in group] + [1.0] * count
     return best.fit([*recorded, *flown.logs], seed, start=start, pseudo_labels=[*labels, *flown.edges],
                     emphasis=weights, decoder=None if start else DECODER, progress=progress, command=command,
                     steps=STEPS["shipped" if start else "scratch"], lag_of=(recorded, labels),
@@ -205,10 +205,10 @@ def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown
         test = [labelled[i] for i in order[k::folds]]
         train = [labelled[i] for j, i in enumerate(order) if j % folds != k]
         for share, into in ((1, held), (2, half)):
-            some = train[:max(len(train) // share, 1)]
+            subset = train[:max(len(train) // share, 1)]
             path = work / f"fold{k}_{share}_{key}"
             name = f"hold-out {k + 1}/{folds}" + (" (half)" if share == 2 else "")
-            learn = partial(together, start, twin, [*some, *others], flown, seed, _named(progress, name), command)
+            learn = partial(together, start, twin, [*subset, *others], flown, seed, _named(progress, name), command)
             model = kept_model(path.with_suffix(".npz"), learn)
             into += kept_scores(path.with_suffix(".json"), test, model)
     return held, half
@@ -255,6 +255,7 @@ def kept_scores(path: Path, flights: Sequence[Flight], model: BestModel) -> list
 
 
 def _named(progress: Progress | None, name: str) -> Progress | None:
+    """The progress with a name before each stage."""
     if progress is None:
         return None
     return lambda stage, done, total, note: progress(f"{name}: {stage}", done, total, note)

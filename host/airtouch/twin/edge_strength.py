@@ -1,4 +1,4 @@
-"""How strong recorded edges are beside simulated ones, by height, and simulated edges made as strong.
+"""Ratio of recorded to simulated edges by height, and simulated edges scaled by it.
 
 Simulated edges of high flights are too weak: 6.5 cm and more over the platform, the median of vertical acceleration and
 motor mean around an edge is about half of the recorded one (host/docs/twin-findings.md). A detector that has learnt
@@ -18,14 +18,15 @@ from airtouch.twin.overlay import RATE_HZ, Response
 from airtouch.twin.recorded.course import course
 from airtouch.twin.recorded.features import BASELINE_S, height_class
 
+#: kinds of edge, in the order of a response's edges
 KINDS = ("entry", "exit")
-BEHIND_S = 1.2  #: after an edge: what is compared
-UNITS = np.array([0.5, 1500.0])  #: of vertical acceleration, m/s^2, and motor mean, PWM: their usual swings
-FEWEST = 3  #: recorded flights and responses of a class of height
-LEAST, MOST = 1.0, 3.0  #: bounds of a strength
-APART_S = 0.2  #: from an edge to where the strength of one begins to turn into that of the other
+BEHIND_S = 1.2  #: s after an edge that are compared
+UNITS = np.array([0.5, 1500.0])  #: typical size at an edge of vertical acceleration, m/s^2, and motor mean, PWM
+FEWEST = 3  #: recorded flights, and responses, that a class of height needs
+LEAST, MOST = 1.0, 3.0  #: bounds of the factor by which simulated edges are scaled
+APART_S = 0.2  #: s from an edge to where its factor begins to pass into that of the other edge
 
-#: (class of height, "entry" or "exit") -> how much stronger than simulated
+#: (class of height, "entry" or "exit") -> ratio of recorded to simulated edges
 Strengths = dict[tuple[str, str], float]
 
 
@@ -40,14 +41,15 @@ def strengths(flights: Sequence[FlightLog], laid: Sequence[Response],
     simulated: dict[tuple[str, str], list[np.ndarray]] = {}
     for log in flights:
         try:
-            flown, values = course(log, 0.3), overlay.values_of(log)
+            recorded_course, values = course(log, 0.3), overlay.values_of(log)
         except AirTouchError:
             continue
-        name = height_class(flown.clearance_m)
-        first, last = (flown.entry + round(s * RATE_HZ) for s in BASELINE_S)
+        name = height_class(recorded_course.clearance_m)
+        first, last = (recorded_course.entry + round(s * RATE_HZ) for s in BASELINE_S)
         if name and first >= 0:
             level = values[first:last].mean(axis=0)
-            for kind, at, end in (("entry", flown.entry, flown.exit), ("exit", flown.exit, len(values))):
+            for kind, at, end in (("entry", recorded_course.entry, recorded_course.exit),
+                                  ("exit", recorded_course.exit, len(values))):
                 recorded.setdefault((name, kind), []).append(_around(values - level, at, end))
     for response in laid:
         name = height_class(response.edges[0].height_after_m)
@@ -73,25 +75,26 @@ def as_strong(response: Response, factors: Strengths) -> Response:
 
 
 def every_height(laid: Sequence[Response]) -> list[Response]:
-    """As many responses, each class of height as often as any other; of a class with few some come again.
+    """The same number of responses, the same from each class of height; those of a class with few are repeated.
 
     Most recorded heights are low, where an edge is easily learnt.
     """
     classes: dict[str | None, list[Response]] = {}
     for response in laid:
         classes.setdefault(height_class(response.edges[0].height_after_m), []).append(response)
-    turns = (some[i % len(some)] for i in range(len(laid)) for some in classes.values())
+    turns = (group[i % len(group)] for i in range(len(laid)) for group in classes.values())
     return list(islice(turns, len(laid)))
 
 
 def _slope(recorded: Sequence[np.ndarray], simulated: Sequence[np.ndarray]) -> float:
-    real, fake = (np.nan_to_num(_median(some)) for some in (recorded, simulated))
+    """Least-squares factor from the median of simulated courses to that of recorded ones."""
+    real, fake = (np.nan_to_num(_median(courses)) for courses in (recorded, simulated))
     return (real * fake).sum() / max((fake * fake).sum(), 1e-12)
 
 
-def _median(some: Sequence[np.ndarray]) -> np.ndarray:
-    """Median of courses of which few or none reach the last rows."""
-    stacked = np.array(some)
+def _median(courses: Sequence[np.ndarray]) -> np.ndarray:
+    """Median of courses, NaN in rows that none of them reaches."""
+    stacked = np.array(courses)
     rows = np.isfinite(stacked[:, :, 0]).any(axis=0)
     out = np.full(stacked.shape[1:], np.nan)
     out[rows] = np.nanmedian(stacked[:, rows], axis=0)
@@ -99,7 +102,7 @@ def _median(some: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _around(values: np.ndarray, edge: int, end: int) -> np.ndarray:
-    """(BEHIND_S, 2) vertical acceleration and motor mean in their usual swings from the edge to `end`, NaN after it."""
+    """Vertical acceleration and motor mean (rows, 2) in UNITS, over BEHIND_S from the edge on, NaN from `end` on."""
     out = np.full((round(BEHIND_S * RATE_HZ), len(UNITS)), np.nan)
     part = values[edge:min(end, edge + len(out))]
     vertical = len(overlay.ACC_WORLD) - 1

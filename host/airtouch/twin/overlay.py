@@ -23,16 +23,17 @@ from airtouch.simulation.scenario import Scenario
 from airtouch.twin.recorded.course import course
 from airtouch.vehicle import Vehicle
 
+#: columns of a response and of an added flight
 COLUMNS = (*ACC_WORLD, *GYRO, *PWM)
-RATE_HZ = 100
+RATE_HZ = 100  #: Hz, of the flights that go in and come out
 SPARE = 3  #: most flights simulated for each one returned; the rest diverged
 BEFORE_S, BEHIND_S, FADE_S = 0.4, 2.5, 0.5  #: s of a response: before the entry, after the exit, fade-out at its end
 FREE_S, AWAY_S, AFTER_S = 1.5, 0.6, 1.5  #: s: shortest hover; recorded samples left out before an entry, after an exit
 SETTLED_S = 1.0  #: s after the climb, and after a velocity step: start of level flight
 QUIET_S = 0.6  #: s, shortest part of level flight that others are lengthened by
-SPREAD = 0.15  #: of the time from a velocity step to the entry, by which an added edge may come earlier or later
+SPREAD = 0.15  #: fraction of the time from a velocity step to the entry, by which an added edge may be early or late
 BEYOND_S = (0.5, 2.0)  #: s, shortest and longest level flight behind an added exit
-BARE = 0.5  #: flights without a platform, for each one with
+BARE = 0.5  #: number of flights without a platform for each one with
 JOIN_S = 0.3  #: s over which two parts are blended
 
 
@@ -80,6 +81,7 @@ def responses(scene: Scenario, vehicle: Vehicle, count: int, seed: int = 0,
 
 
 def _response(scene: Scenario, vehicle: Vehicle, seed: int, number: int) -> Response | None:
+    """The response of one flight; None if a flight diverges or does not cross just one platform."""
     plan = scenario.draw_flight(scene, seed, number)
     active = flight.choose(plan)
     ground = plan.world
@@ -108,61 +110,62 @@ def free_air(flights: Sequence[FlightLog]) -> list[FreeAir]:
     for log in flights:
         try:
             log.require(*GYRO, *PWM)
-            flown, values = course(log, 0.3), values_of(log)
+            of_log, values = course(log, 0.3), values_of(log)
         except AirTouchError:
             continue
-        settled, before = round(SETTLED_S * RATE_HZ), flown.entry - round(AWAY_S * RATE_HZ)
-        first = max(flown.start - RATE_HZ, 0)
-        if before - flown.level - settled >= FREE_S * RATE_HZ:
-            hover = values[flown.level + settled:min(flown.step, before)]
-            quiet = [values[flown.step + settled:before], *([] if flown.pulse_s else [hover])]
-            out.append(FreeAir(values[first:before], flown.step - first, flown.entry - flown.step,
+        settled, before = round(SETTLED_S * RATE_HZ), of_log.entry - round(AWAY_S * RATE_HZ)
+        first = max(of_log.start - RATE_HZ, 0)
+        if before - of_log.level - settled >= FREE_S * RATE_HZ:
+            hover = values[of_log.level + settled:min(of_log.step, before)]
+            quiet = [values[of_log.step + settled:before], *([] if of_log.pulse_s else [hover])]
+            out.append(FreeAir(values[first:before], of_log.step - first, of_log.entry - of_log.step,
                                tuple(x for x in quiet if len(x) >= QUIET_S * RATE_HZ),
-                               values[flown.exit + round(AFTER_S * RATE_HZ):]))
+                               values[of_log.exit + round(AFTER_S * RATE_HZ):]))
     return out
 
 
 def flights(air: Sequence[FreeAir], laid: Sequence[Response],
             seed: int = 0) -> tuple[list[FlightLog], list[list[Edge]]]:
-    """A flight, with its edges, for each response that fits, and BARE as many without. The same arguments give the
-    same flights.
+    """Flights with their edges: one for each response that fits, and BARE as many without a platform.
+
+    The same arguments give the same flights.
 
     An edge comes as long after the velocity step as in one of the recorded flights, so that what a step does is learnt
     beside what a platform does; a flight without platform is made alike. Each has the free air of one recorded flight,
     lengthened by level flight of others that is shifted to its mean.
     """
     rng = np.random.default_rng([seed, 77])
-    quiet = [part for one in air for part in one.quiet]
+    quiet = [part for flight_air in air for part in flight_air.quiet]
     bare = [laid[i] for i in rng.integers(len(laid), size=round(BARE * len(laid)))] if quiet else []
     out: list[FlightLog] = []
     labels: list[list[Edge]] = []
-    for number, (response, there) in enumerate([*((r, True) for r in laid), *((r, False) for r in bare)]):
-        chosen, other = (air[int(i)] for i in rng.integers(len(air), size=2))
+    for number, (response, has_platform) in enumerate([*((r, True) for r in laid), *((r, False) for r in bare)]):
+        base, other = (air[int(i)] for i in rng.integers(len(air), size=2))
         entry, leave = (e.sample for e in response.edges)
-        at = chosen.step + round(other.wait * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD))
-        values = _lengthened(chosen, quiet, at + leave - entry + round(RATE_HZ * rng.uniform(*BEYOND_S)), rng)
+        at = base.step + round(other.wait * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD))
+        values = _lengthened(base, quiet, at + leave - entry + round(RATE_HZ * rng.uniform(*BEYOND_S)), rng)
         if at < entry or at + leave - entry + round(SETTLED_S * RATE_HZ) > len(values):
             continue
-        if there:
+        if has_platform:
             rows = slice(at - entry, min(at - entry + len(response.values), len(values)))
             values[rows] += response.values[:rows.stop - rows.start]
         values[:, -len(PWM):] = np.clip(values[:, -len(PWM):], 0.0, PWM_MAX)
         columns = dict(zip(COLUMNS, values.T, strict=True)) | {"time_s": np.arange(len(values)) / RATE_HZ}
         out.append(FlightLog(columns, {"source": f"overlay_{seed}_{number:06d}", "sample_period_s": 1.0 / RATE_HZ}))
-        labels.append([replace(e, sample=at - entry + e.sample) for e in response.edges] if there else [])
+        labels.append([replace(e, sample=at - entry + e.sample) for e in response.edges] if has_platform else [])
     return out, labels
 
 
-def _lengthened(chosen: FreeAir, quiet: Sequence[np.ndarray], rows: int, rng: np.random.Generator) -> np.ndarray:
+def _lengthened(base: FreeAir, quiet: Sequence[np.ndarray], rows: int, rng: np.random.Generator) -> np.ndarray:
     """A flight's start, level flight to as many rows, and its end, (n, 10)."""
-    behind = chosen.start[chosen.step + round(SETTLED_S * RATE_HZ):]
-    middle = np.median(behind if len(behind) >= QUIET_S * RATE_HZ else chosen.start[-RATE_HZ:], axis=0)
-    parts, length = [chosen.start], len(chosen.start)
+    behind = base.start[base.step + round(SETTLED_S * RATE_HZ):]
+    middle = np.median(behind if len(behind) >= QUIET_S * RATE_HZ else base.start[-RATE_HZ:], axis=0)
+    parts, length = [base.start], len(base.start)
     while quiet and length < rows:
         part = quiet[int(rng.integers(len(quiet)))]
         parts.append(part - np.median(part, axis=0) + middle)
         length += len(part) - round(JOIN_S * RATE_HZ)
-    return _joined([_joined(parts)[:rows], chosen.end])
+    return _joined([_joined(parts)[:rows], base.end])
 
 
 def values_of(log: FlightLog) -> np.ndarray:

@@ -55,7 +55,7 @@ class Comparison:
 def flown(chosen: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, seed: int,
           fixed: Mapping[str, Any] | None = None, repeats: int = REPEATS,
           progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flown], int]:
-    """Fly each course `repeats` times with the levers' values. Returns the flights, and the number that diverged."""
+    """Simulated flights of each course, `repeats` times with the levers' values, and the number that diverged."""
     out, lost, total = [], 0, repeats * len(chosen)
     for k in range(total):
         course = chosen[k % len(chosen)]
@@ -74,20 +74,21 @@ def flown(chosen: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], v
 def compare(recorded: Recorded, aim: fit.Target, simulated: Sequence[Flown], lost: int, seed: int = 0,
             progress: Callable[[str], None] = lambda _: None) -> Comparison:
     """The comparison that the report shows. Features are compared course by course."""
-    apart = np.array([f.features - recorded.features[f.number] for f in simulated])
+    difference = np.array([f.features - recorded.features[f.number] for f in simulated])
     with np.errstate(invalid="ignore"):
-        standard = np.clip(apart / aim.scatter, -fit.CLIP, fit.CLIP)
+        standard = np.clip(difference / aim.scatter, -fit.CLIP, fit.CLIP)
     mean = _nanmean(standard)
     gaps = []
     for k in np.argsort(-np.abs(np.nan_to_num(mean))):
         if np.isfinite(mean[k]):
-            flights = len({f.number for f, row in zip(simulated, apart, strict=True) if np.isfinite(row[k])})
-            gaps.append(Gap(names()[k], float(np.nanmean(apart[:, k])), float(mean[k]), flights))
+            flights = len({f.number for f, row in zip(simulated, difference, strict=True) if np.isfinite(row[k])})
+            gaps.append(Gap(names()[k], float(np.nanmean(difference[:, k])), float(mean[k]), flights))
     real = windows([(x, c, i) for i, (x, c) in enumerate(zip(recorded.channels, recorded.courses, strict=True))])
     fake = windows([(f.channels, f.course, f.number) for f in simulated])
     return Comparison(fit.misfit(mean), gaps, two_sample(real, fake, seed, progress), lost, list(simulated))
 
 
 def _nanmean(values: np.ndarray) -> np.ndarray:
+    """Mean over the rows, NaN without a warning where all are."""
     count = np.isfinite(values).sum(axis=0)
     return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)

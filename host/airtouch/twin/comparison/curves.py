@@ -14,7 +14,7 @@ from airtouch.twin.recorded.flights import Recorded
 
 BEFORE, BEHIND = 50, 100  #: samples before and after an edge
 MARGIN = 200  #: samples before the entry and after the exit
-QUARTILES = (25, 50, 75)
+QUARTILES = (25, 50, 75)  #: percentiles of the bands in the figures
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Curves:
 def curves(recorded: Recorded, simulated: Sequence[Flown]) -> Curves:
     """The curves of the report. The overlaid flight is that with the median duration over the platform."""
     length = [f.course.exit - f.course.entry for f in simulated]
-    one = simulated[int(np.argsort(length)[len(length) // 2])]
+    median_flight = simulated[int(np.argsort(length)[len(length) // 2])]
     edges = {}
     for name in CLASSES:
         real = [(x, c) for x, c in zip(recorded.channels, recorded.courses, strict=True)
@@ -59,19 +59,21 @@ def curves(recorded: Recorded, simulated: Sequence[Flown]) -> Curves:
             edges[name] = {kind: (_around(real, kind), _around(fake, kind)) for kind in ("entry", "exit")}
     at = [k for k, f in enumerate(names()) if f.group == "spectrum"]
     powers = recorded.features[:, at], np.array([f.features[at] for f in simulated])
-    return Curves((_signals(recorded.channels[one.number], recorded.courses[one.number]),
-                   _signals(one.channels, one.course)), edges,
+    return Curves((_signals(recorded.channels[median_flight.number], recorded.courses[median_flight.number]),
+                   _signals(median_flight.channels, median_flight.course)), edges,
                   (_spectra(powers[0]), _spectra(powers[1])))
 
 
-def _signals(data: np.ndarray, of: Course) -> Signals:
-    span = slice(max(of.entry - MARGIN, 0), min(of.exit + MARGIN, len(data)))
-    level = np.median(data[of.free], axis=0)
+def _signals(data: np.ndarray, course: Course) -> Signals:
+    """The channels of a flight from MARGIN before its entry to MARGIN after its exit."""
+    span = slice(max(course.entry - MARGIN, 0), min(course.exit + MARGIN, len(data)))
+    level = np.median(data[course.free], axis=0)
     level[ch.DOWN] = 0.0
-    return Signals((np.arange(span.start, span.stop) - of.entry) / RATE_HZ, data[span] - level)
+    return Signals((np.arange(span.start, span.stop) - course.entry) / RATE_HZ, data[span] - level)
 
 
 def _around(flights: Sequence[tuple[np.ndarray, Course]], kind: str) -> AroundEdges:
+    """Quartiles of the channels around the edges of one kind."""
     locked = np.array([edge_locked(x, c, getattr(c, kind), BEFORE, BEHIND) for x, c in flights])
     rows = np.isfinite(locked[:, :, 0]).any(axis=0)
     out = np.full((3, *locked.shape[1:]), np.nan)
@@ -80,4 +82,5 @@ def _around(flights: Sequence[tuple[np.ndarray, Course]], kind: str) -> AroundEd
 
 
 def _spectra(powers: np.ndarray) -> np.ndarray:
+    """Quartiles (3, channels, bands) of band powers of flights, dB."""
     return np.nanpercentile(powers.reshape(-1, ch.DOWN, len(BANDS_HZ)), QUARTILES, axis=0)

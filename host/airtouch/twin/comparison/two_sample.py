@@ -16,13 +16,14 @@ from airtouch.twin.recorded.channels import NAMES, RATE_HZ
 from airtouch.twin.recorded.course import PHASES, Course
 from airtouch.twin.recorded.features import PAIRS
 
-WINDOW, HOP = 100, 50  #: samples
+WINDOW, HOP = 100, 50  #: samples of a window, and from one to the next
+#: bands of a window's powers, Hz
 BANDS_HZ = ((0.5, 2.5), (2.5, 5), (5, 9), (9, 15), (15, 25), (25, 50))
 USED = ch.DOWN  #: number of channels that the classifier gets: all except the down range, which no detector gets
-FOLDS = 5
+FOLDS = 5  #: folds of the cross-validation over flights
 STEPS = 255  #: bins of each feature, scikit-learn's maximum
 REPLICATES = 500  #: draws of the bootstrap
-LEVEL = 0.95  #: of the intervals, by bootstrap over flights
+LEVEL = 0.95  #: probability of the intervals, by bootstrap over flights
 FEWEST = 4  #: least number of flights of each kind in a phase
 
 
@@ -42,9 +43,9 @@ class Auroc:
 
 @dataclass(frozen=True)
 class Windows:
-    """values (windows, numbers) with phase, flight (an index) of each; the same flight number in a real and a
+    """Features of windows: values (windows, features), with phase (windows,) and flight (windows,), both numbers.
 
-    simulated set means the same course: both are held out together.
+    The same flight number in a real and a simulated set means the same course: both are held out together.
     """
 
     values: np.ndarray
@@ -78,15 +79,16 @@ def windows(flights: Sequence[tuple[np.ndarray, Course, int]]) -> Windows:
 
 
 def _numbers(x: np.ndarray) -> np.ndarray:
+    """The features (features,) of one window (WINDOW, USED), in the order of `number_names`."""
     t = np.linspace(-1.0, 1.0, len(x))
     level = x.mean(axis=0)
     slope = t @ x / (t @ t)
-    rest = x - level - t[:, None] * slope
-    power = np.abs(np.fft.rfft(rest * np.hanning(len(x))[:, None], axis=0)) ** 2
+    residual = x - level - t[:, None] * slope
+    power = np.abs(np.fft.rfft(residual * np.hanning(len(x))[:, None], axis=0)) ** 2
     f = np.fft.rfftfreq(len(x), 1.0 / RATE_HZ)
     bands = [np.log(power[(f >= a) & (f < b)].mean(axis=0) + 1e-9) for a, b in BANDS_HZ]
-    size = np.sqrt((rest * rest).sum(axis=0)) + 1e-9
-    pairs = [(rest[:, i] @ rest[:, k]) / (size[i] * size[k]) for i, k in PAIRS]
+    size = np.sqrt((residual * residual).sum(axis=0)) + 1e-9
+    pairs = [(residual[:, i] @ residual[:, k]) / (size[i] * size[k]) for i, k in PAIRS]
     return np.r_[np.column_stack([level, slope, *bands]).ravel(), pairs]
 
 
@@ -132,6 +134,7 @@ def area_within(score: np.ndarray, kind: np.ndarray, fold: np.ndarray) -> float:
 
 
 def _boosting(seed: int) -> Any:
+    """The classifier, not fitted yet. Raises AirTouchError without scikit-learn."""
     try:
         from sklearn.ensemble import HistGradientBoostingClassifier
     except ImportError:
@@ -141,12 +144,12 @@ def _boosting(seed: int) -> Any:
                                           class_weight="balanced", early_stopping=False, random_state=seed)
 
 
-def _steps(known: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """x (rows, features) in STEPS bins of each feature's distribution in `known`; trees need the order only.
+def _binned(train: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """x (rows, features) in STEPS bins of each feature's distribution in `train`; trees need the order only.
 
     Scikit-learn's own binning takes a hundred times as long for weighted rows.
     """
-    edges = np.quantile(known, np.arange(1, STEPS) / STEPS, axis=0)
+    edges = np.quantile(train, np.arange(1, STEPS) / STEPS, axis=0)
     binned = [np.searchsorted(edge, column) for edge, column in zip(edges.T, x.T, strict=True)]
     return np.column_stack(binned).astype(float)
 
@@ -159,24 +162,24 @@ def _out_of_fold(x: np.ndarray, kind: np.ndarray, flight: np.ndarray, seed: int,
     ordered = sorted(numbers, key=lambda number: kinds[number])  # each fold gets flights of both kinds
     fold_of = {number: i % FOLDS for i, number in enumerate(ordered)}
     fold = np.array([fold_of[number] for number in flight])
-    score, drop = np.zeros(len(x)), np.zeros(x.shape[1])
+    score, separation = np.zeros(len(x)), np.zeros(x.shape[1])
     for k in range(FOLDS):
         test, train = fold == k, fold != k
         if not test.any() or len(np.unique(kind[train])) < 2:
             continue
-        steps = _steps(x[train], x)
+        steps = _binned(x[train], x)
         model = _boosting(seed).fit(steps[train], kind[train])
         score[test] = model.predict_proba(steps[test])[:, 1]
     for i in range(x.shape[1]):  # how well each feature separates alone
-        single = area(x[:, i], kind)
-        drop[i] = abs(single - 0.5)
+        separation[i] = abs(area(x[:, i], kind) - 0.5)
     listed = number_names()
-    best = np.argsort(-drop)[:3]
-    return score, fold, tuple(f"{listed[i]} ({0.5 + drop[i]:.2f} alone)" for i in best)
+    best = np.argsort(-separation)[:3]
+    return score, fold, tuple(f"{listed[i]} ({0.5 + separation[i]:.2f} alone)" for i in best)
 
 
 def _interval(score: np.ndarray, kind: np.ndarray, flight: np.ndarray, fold: np.ndarray,
               seed: int) -> tuple[float, float]:
+    """Interval of `area_within` by bootstrap over flights."""
     rng = np.random.default_rng([seed, 1])
     rows = {number: np.flatnonzero(flight == number) for number in np.unique(flight)}
     numbers = list(rows)

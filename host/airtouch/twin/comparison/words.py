@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from airtouch.twin.comparison.compare import Gap
 from airtouch.twin.comparison.two_sample import Auroc
 
-CLOSED = 0.6  #: AUROC below which twin and flights count as hard to tell apart
+CLOSED = 0.6  #: AUROC of the worst phase below which twin and flights count as hard to tell apart
 
 
 def answer(auroc: Sequence[Auroc]) -> str:
-    """The result in a sentence."""
+    """The AUROC of all phases in a sentence."""
     if not auroc:
         return "Too few flights of any phase for a classifier to be scored."
     worst = max(auroc, key=lambda a: a.value)

@@ -22,7 +22,7 @@ from airtouch.twin.recorded import flights as recordings
 from airtouch.twin.recorded.flights import Recorded
 from airtouch.vehicle import Vehicle
 
-FIT = "fit.json"
+FIT = "fit.json"  #: file with the state of a fit
 ROUNDS, BATCH = 8, 160  #: rounds, and flights per round, of a twin that is fitted for a detector
 BARE = "paper-mixed"  #: scenario to train in if no twin can be fitted
 #: bar(stage) is a context manager; its value is called with (done, total, note)
@@ -63,9 +63,9 @@ def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps
     if len(paths) < recordings.FEWEST:
         return Twin(scenario.load(BARE), vehicle, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
                     f"acceleration, gyro, motors and down range, here are {len(paths)}; simulator as it is")
-    with bar("reading again") as told:
+    with bar("reading again") as report:
         recorded = recordings.recorded(paths, speed_mps=speed_mps,
-                                       progress=lambda done, total: told(done, total, ""))
+                                       progress=lambda done, total: report(done, total, ""))
     out = work / f"twin_{key(recorded, vehicle, flights=BATCH, seed=seed)}"
     calibrate(recorded, vehicle, out, rounds=ROUNDS, flights=BATCH, seed=seed, bar=bar)
     return Twin(scenario.load(out / files.SCENARIO), vehicles.load(str(out / files.VEHICLE)),
@@ -81,7 +81,7 @@ def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, f
     """
     make_folder(out)
     workers = workers or available_cores()
-    aim, levers, asked = _asked(recorded, vehicle, flights, seed)
+    aim, levers, fit_key = _request(recorded, vehicle, flights, seed)
     with bar("fitting") as report:
         state = fit.fit(aim, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
                         fixed=lever_set.FIXED, kept=out / FIT,
@@ -91,22 +91,23 @@ def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, f
             state.refined = edge_fit.refine(
                 aim, vehicle, levers, fit.best(state), flights=edge_fit.share(flights), seed=seed, workers=workers,
                 fixed=lever_set.FIXED, progress=lambda done, total: report(done, total, "")).values
-        fit.save(out / FIT, state, asked)
+        fit.save(out / FIT, state, fit_key)
     files.write(out, vehicle, levers, state.refined, recorded.courses, lever_set.FIXED, force=True)
     return Calibrated(aim, levers, state.refined, state.history)
 
 
 def key(recorded: Recorded, vehicle: Vehicle, *, flights: int, seed: int) -> str:
     """Hash, of twelve digits, of the flights, the vehicle and the settings of a fit."""
-    return _asked(recorded, vehicle, flights, seed)[2]
+    return _request(recorded, vehicle, flights, seed)[2]
 
 
-def _asked(recorded: Recorded, vehicle: Vehicle, flights: int, seed: int) -> tuple[Target, tuple[Lever, ...], str]:
+def _request(recorded: Recorded, vehicle: Vehicle, flights: int, seed: int) -> tuple[Target, tuple[Lever, ...], str]:
+    """Target, levers and key of the fit that these arguments ask for."""
     aim = fit.target(recorded.courses, recorded.features)
     levers = lever_set.default(vehicle, recorded.near)
     return aim, levers, fit.key(aim, vehicle, levers, flights=flights, seed=seed, fixed=lever_set.FIXED)
 
 
 def in_words(misfit: dict[str, float]) -> str:
-    """Each group with its misfit in scatters, as text."""
+    """The misfit of each group, in scatters, as text."""
     return ", ".join(f"{name} {value:.2f}" for name, value in misfit.items())

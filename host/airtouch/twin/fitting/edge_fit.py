@@ -20,7 +20,7 @@ from airtouch.twin.recorded.course import Course
 from airtouch.twin.recorded.features import CLASSES, height_class
 from airtouch.vehicle import Vehicle
 
-#: effects whose levers are moved; motors and their delay are felt in each answer to an edge
+#: effects whose levers are fitted here; motors and their delay enter each response to an edge
 EFFECTS = ("ground_effect", "flow_scale", "flow_latency", "range_bias", "range_step", "motor_lag", "actuator_delay")
 FLIGHTS = 60  #: simulated flights of each comparison
 STEPS = 4  #: Gauss-Newton steps
@@ -44,36 +44,38 @@ def refine(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np.nd
     values: (levers,) to start from. The cost is that of `fit.best`, on `flights` flights that all comparisons share.
     """
     moved = [k for k, lever in enumerate(levers) if lever.of in EFFECTS]
-    some = [levers[k] for k in moved]
-    steps = np.array([lever.step for lever in some])
+    edge_levers = [levers[k] for k in moved]
+    steps = np.array([lever.step for lever in edge_levers])
     of = balanced(aim.courses, flights, np.random.default_rng([seed, 17]))
     total = 1 + len(moved) + STEPS
     done = 0
 
-    def apart(now: np.ndarray) -> np.ndarray:
+    def difference(trial: np.ndarray) -> np.ndarray:
+        """Simulated minus recorded features (flights, features), in scatters."""
         nonlocal done
-        flown = fly.flown_features([aim.courses[i] for i in of], vehicle, levers, np.tile(now, (len(of), 1)), seed,
+        flown = fly.flown_features([aim.courses[i] for i in of], vehicle, levers, np.tile(trial, (len(of), 1)), seed,
                                    FIRST, fixed, workers)
         progress(done := done + 1, total)
         return np.clip((flown - aim.features[of]) / aim.scatter, -fit.CLIP, fit.CLIP)
 
     values = lever_set.clipped(levers, values)
-    here = apart(values)
-    jacobian = np.column_stack([_mean(apart(_moved(values, k, levers[k])) - here) / _sign(values[k], levers[k])
+    present = difference(values)
+    jacobian = np.column_stack([_mean(difference(_moved(values, k, levers[k])) - present) / _sign(values[k], levers[k])
                                 for k in moved])
     recorded = np.maximum(np.isfinite(aim.features).sum(axis=0), 1)
-    history = [_cost(_mean(here))]
+    history = [_cost(_mean(present))]
     share = 1.0
     for _ in range(STEPS):
-        step = share * fit.least_squares_step(np.nan_to_num(jacobian), _mean(here), _variance(here) + 1.0 / recorded,
-                                              some, values[moved], steps)
-        tried = values.copy()
-        tried[moved] += steps * step
-        tried = lever_set.clipped(levers, tried)
-        there = apart(tried)
-        history.append(_cost(_mean(there)))
+        variance = _variance(present) + 1.0 / recorded
+        step = share * fit.least_squares_step(np.nan_to_num(jacobian), _mean(present), variance, edge_levers,
+                                              values[moved], steps)
+        trial = values.copy()
+        trial[moved] += steps * step
+        trial = lever_set.clipped(levers, trial)
+        trial_difference = difference(trial)
+        history.append(_cost(_mean(trial_difference)))
         if history[-1] < min(history[:-1]):
-            values, here = tried, there
+            values, present = trial, trial_difference
         else:
             share *= SHRINK
     return EdgeFit(values, history)
@@ -90,7 +92,7 @@ def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) ->
     classes = [rng.permutation([i for i, h in enumerate(height) if h == name]) for name in CLASSES if name in height]
     classes = classes or [np.arange(len(courses))]
     chosen = [(classes[n % len(classes)], n // len(classes)) for n in range(count)]
-    return np.array([some[n % len(some)] for some, n in chosen])
+    return np.array([group[n % len(group)] for group, n in chosen])
 
 
 def _sign(value: float, lever: Lever) -> float:
@@ -99,21 +101,25 @@ def _sign(value: float, lever: Lever) -> float:
 
 
 def _moved(values: np.ndarray, k: int, lever: Lever) -> np.ndarray:
+    """The values (levers,) with lever k moved by one step."""
     out = values.copy()
     out[k] += _sign(values[k], lever) * lever.step
     return out
 
 
 def _mean(values: np.ndarray) -> np.ndarray:
+    """Mean (features,) over flights, NaN where fewer than `fit.FEWEST` have the feature."""
     count = np.isfinite(values).sum(axis=0)
     return np.where(count >= fit.FEWEST, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
 
 
 def _variance(values: np.ndarray) -> np.ndarray:
+    """Variance (features,) of `_mean`."""
     count = np.isfinite(values).sum(axis=0)
     off = values - _mean(values)
     return np.where(count >= fit.FEWEST, np.nansum(off * off, axis=0) / np.maximum(count, 1) ** 2, np.nan)
 
 
 def _cost(gap: np.ndarray) -> float:
+    """Weighted sum of squared misfits of mean differences (features,)."""
     return fit.total(fit.misfit(gap)) ** 2

@@ -26,7 +26,7 @@ from airtouch.twin.recorded.course import Course
 from airtouch.twin.recorded.features import GROUPS, Feature, names
 from airtouch.vehicle import Vehicle
 
-ROUNDS, FLIGHTS = 12, 240
+ROUNDS, FLIGHTS = 12, 240  #: rounds of a fit, and simulated flights of each
 MEMORY_ROUNDS = 4  #: rounds whose flights enter a regression
 RIDGE = 1.0  #: weight of a step of one `Lever.step` against a misfit of one scatter in each group
 MOST_STEP = 2.0  #: largest step of a round, in `Lever.step`
@@ -34,6 +34,7 @@ MODEL = 0.25  #: scatters, standard deviation of the model's error in a mean fea
 FREEDOM = 40.0  #: independent features that each group counts as, whatever their number
 CLIP = 5.0  #: scatters, to which the difference of one flight is clipped
 FEWEST = 4  #: least number of recorded flights that must have a feature
+#: weight of each group's misfit
 GROUP_WEIGHT = {"trim": 1.0, "spectrum": 1.0, "coherency": 1.0, "over": 0.7, "entry": 1.0, "exit": 1.0}
 #: progress(round, rounds, misfit by group)
 Progress = Callable[[int, int, Mapping[str, float]], None]
@@ -117,6 +118,7 @@ def total(misfit: Mapping[str, float]) -> float:
 
 def _round(state: State, aim: Target, vehicle: Vehicle, levers: Sequence[Lever], number: int, rounds: int,
            flights: int, seed: int, fixed: Mapping[str, Any] | None, workers: int) -> None:
+    """One round: simulate flights with levers drawn around the present ones, regress, and step. Changes the state."""
     began = time.process_time()
     rng = np.random.default_rng([seed, number, 13])
     steps = np.array([lever.step for lever in levers])
@@ -188,17 +190,17 @@ def least_squares_step(jacobian: np.ndarray, gap: np.ndarray, variance: np.ndarr
           values: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """The steps of the levers, (levers,) in `Lever.step`, with the least weighted sum of squared gaps."""
     listed: tuple[Feature, ...] = names()
-    good = np.isfinite(gap)
+    known = np.isfinite(gap)
     group = np.array([f.group for f in listed])
     weight = np.zeros(len(listed))
     for name in GROUPS:
-        here = good & (group == name)
+        here = known & (group == name)
         if here.any():
             weight[here] = GROUP_WEIGHT[name] * np.sqrt(FREEDOM / here.sum() / (variance[here] + MODEL**2))
     low = np.maximum((np.array([v.low for v in levers]) - values) / steps, -MOST_STEP) - 1e-9
     high = np.minimum((np.array([v.high for v in levers]) - values) / steps, MOST_STEP) + 1e-9
-    a = np.vstack([jacobian[good] * weight[good, None], np.sqrt(RIDGE) * np.eye(len(steps))])
-    b = np.r_[-gap[good] * weight[good], np.zeros(len(steps))]
+    a = np.vstack([jacobian[known] * weight[known, None], np.sqrt(RIDGE) * np.eye(len(steps))])
+    b = np.r_[-gap[known] * weight[known], np.zeros(len(steps))]
     return lsq_linear(a, b, bounds=(low, high)).x
 
 

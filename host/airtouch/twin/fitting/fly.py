@@ -20,7 +20,7 @@ from airtouch.vehicle import Vehicle
 
 def fly(chosen: Course, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, seed: int, number: int,
         fixed: Mapping[str, Any] | None = None) -> FlightLog | Diverged:
-    """Fly a recorded course in the simulator with these levers, values (levers,)."""
+    """The log of a recorded course, flown in the simulator with levers at values (levers,)."""
     effects = lever_set.table(levers, values, fixed)
     scene = missions.one(chosen, effects, missions.NAME, **lever_set.mission(levers, values))
     return flight.fly(scene, lever_set.craft(vehicle, levers, values), seed, number)
@@ -37,7 +37,7 @@ def flown_features(courses: Sequence[Course], vehicle: Vehicle, levers: Sequence
 
     The row of a flight that diverges is NaN.
     """
-    def one(i: int) -> np.ndarray:
+    def features_of(i: int) -> np.ndarray:
         log = fly(courses[i], vehicle, levers, values[i], seed, first + i, fixed)
         if isinstance(log, Diverged):
             return np.full(len(names()), np.nan)
@@ -47,6 +47,6 @@ def flown_features(courses: Sequence[Course], vehicle: Vehicle, levers: Sequence
             return np.full(len(names()), np.nan)
 
     if workers == 1:
-        return np.array([one(i) for i in range(len(courses))])
+        return np.array([features_of(i) for i in range(len(courses))])
     with ThreadPoolExecutor(workers) as pool:
-        return np.array(list(pool.map(one, range(len(courses)))))
+        return np.array(list(pool.map(features_of, range(len(courses)))))

@@ -11,12 +11,15 @@ from airtouch.simulation import effects as registry
 from airtouch.twin.recorded.near_range import NearRange
 from airtouch.vehicle import Vehicle
 
+#: `Lever.of` of a vehicle's field, and of an argument of `missions.drawn`
 VEHICLE, MISSION = "vehicle", "mission"
+#: signs of rotors 1 to 4 in each direction of trim
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
-TRIM_UNIT = "thrust loss"
+TRIM_UNIT = "thrust loss"  #: unit of a trim: fraction of a rotor's thrust
 #: kg m², of a Crazyflie's rotor and propeller: `tools/rotor_inertia.py` on imrclab's brushed_jana04
 ROTOR_INERTIA = 4e-8
-ACC_LOWPASS_HZ = 30.0  #: of the Crazyflie's firmware, through which the logged acceleration passes
+#: corner frequency of the low-pass in the Crazyflie's firmware through which the logged acceleration passes
+ACC_LOWPASS_HZ = 30.0
 #: effects that every twin has: a log's rows are at any phase of the controllers' cycle, another one in each flight
 FIXED: dict[str, Any] = {"time_jitter": {"rms": 0.0, "behind": {"low": 0.0, "high": 0.01}}}
 
@@ -191,10 +194,10 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
         elif lever.of not in (VEHICLE, MISSION):
             out.setdefault(lever.of, {})[lever.key] = _node(lever, float(value), spread)
     for name, settings in out.items():
-        known = {p.name for p in registry.get(name).parameters} | {"preset"}
-        for one in settings if isinstance(settings, list) else [settings]:
-            if set(one) - known:
-                raise AirTouchError(f"levers: {name} has no parameter {', '.join(sorted(set(one) - known))}")
+        valid = {p.name for p in registry.get(name).parameters} | {"preset"}
+        for setting in settings if isinstance(settings, list) else [settings]:
+            if set(setting) - valid:
+                raise AirTouchError(f"levers: {name} has no parameter {', '.join(sorted(set(setting) - valid))}")
     if any(lever.of == "trim" for lever in levers):
         out["weak_motor"] = [{"rotor": i + 1, "thrust_loss": _range(-trims[i], width if spread else 0.0)}
                              for i in range(4)]
@@ -202,10 +205,12 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
 
 
 def _node(lever: Lever, value: float, spread: bool) -> Any:
+    """A lever's value, or its range where it has a spread, as a scenario file has it."""
     return _range(value, lever.spread if spread and lever.spread else 0.0, lever.low, lever.high)
 
 
 def _range(middle: float, half: float, least: float = -1.0, most: float = 1.0) -> Any:
+    """A range of half width `half` within bounds, or the number alone where it has no width."""
     middle = round(float(middle), 6)
     if half <= 0.0:
         return middle

@@ -12,13 +12,14 @@ from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.reference.finite import hold_finite
 from airtouch.vehicle import Vehicle
 
+#: names of the channels, and their units
 NAMES = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "motor roll", "motor pitch", "motor yaw",
          "motor mean", "unexplained az", "down range")
 UNITS = ("m/s²",) * 3 + ("°/s",) * 3 + ("PWM",) * 4 + ("m/s²", "cm")
 (AX, AY, AZ, GYRO_X, GYRO_Y, GYRO_Z, ROLL, PITCH, YAW, MEAN, UNEXPLAINED, DOWN) = range(12)
-GRAVITY = 9.81
+GRAVITY = 9.81  #: m/s²
 LAG_S, DELAY = 0.06, 2  #: first-order lag (s) and delay (samples) of thrust, as in `reference.motion_channels`
-RATE_HZ = 100.0
+RATE_HZ = 100.0  #: Hz, of the logs that a twin is fitted to
 #: motors 1 to 4 to roll, pitch, yaw and mean
 MIX = np.array([[-1, -1, 1, 1], [1, -1, -1, 1], [1, -1, 1, -1], [0.25, 0.25, 0.25, 0.25]])
 

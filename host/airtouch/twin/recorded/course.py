@@ -19,12 +19,13 @@ from airtouch.logs.in_flight import airborne
 from airtouch.logs.segments import LEVEL_PART, PLATFORM_STEP_M
 from airtouch.twin.recorded import pulses
 
-RATE_HZ = 100.0
+RATE_HZ = 100.0  #: Hz, of the logs that a twin is fitted to
 LEAST_FREE_S = 3.0  #: s, least free air before the platform; spectra need it
 LEAST_FREE_M = 0.25  #: m, down range above which there is no ground effect
 SETTLED_S = 1.0  #: s after the climb until level flight counts as free air
 STEP_S = 1.5  #: s, longest duration of a velocity step
 RISE_S = 0.35  #: s from a velocity step to half of its speed, Crazyflie with the firmware's gains
+#: phases of a course, in order
 PHASES = ("hover", "cruise", "entry", "over", "exit", "after")
 AROUND_S = (0.5, 1.0)  #: s before and after an edge that belong to the edge's phase
 
@@ -96,7 +97,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     """
     check(log)
     edges = platform_edges(log)
-    down = median_filter(_held(log["zrange_m"]), 5)
+    down = median_filter(_interpolated(log["zrange_m"]), 5)
     flying = airborne(log)
     entry = next((e for e in edges if e.kind == "entry"), None)
     leave = next((e for e in edges if entry and e.kind == "exit" and e.sample > entry.sample), None)
@@ -113,7 +114,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
                             f"platform; hover {LEAST_FREE_S + 2:g} s at {LEAST_FREE_M:g} m or higher first")
     behind = down[leave.sample + 10:last] < LEVEL_PART * cruise
     landing = leave.sample + 10 + (int(np.argmax(behind)) if behind.any() else len(behind))
-    step, measured, how = _velocity_step(log, level, entry.sample)
+    step, measured, source = _velocity_step(log, level, entry.sample)
     stop = _stop(log, step, leave.sample, landing)
     speed = speed_mps if speed_mps is not None else measured
     over = (leave.sample - entry.sample) / RATE_HZ
@@ -122,7 +123,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ,
                   (step - level) / RATE_HZ, (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
                   (landing - leave.sample) / RATE_HZ, speed,
-                  "stated" if speed_mps is not None else how, angle_deg or 0.0, start, level, step,
+                  "stated" if speed_mps is not None else source, angle_deg or 0.0, start, level, step,
                   entry.sample, leave.sample, landing, pulses.period(log, level, step))
 
 
@@ -146,19 +147,21 @@ def one_vehicle(logs: Sequence[FlightLog]) -> str:
     """The vehicle of all the logs; "" if none names one. Raises AirTouchError for two different ones."""
     names = {str(log.meta["vehicle"]): log.source for log in logs if log.meta.get("vehicle")}
     if len(names) > 1:
-        (first, one), (second, other) = list(names.items())[:2]
-        raise AirTouchError(f"two vehicles: {first} flew {one}, {second} flew {other}; fit one twin for each")
+        flown = [f"{name} flew {source}" for name, source in list(names.items())[:2]]
+        raise AirTouchError(f"two vehicles: {', '.join(flown)}; fit one twin for each")
     return next(iter(names), "")
 
 
 def _last_start(flying: np.ndarray, entry: int) -> int:
+    """Sample of the last take-off before an entry."""
     grounded = np.flatnonzero(~flying[:entry])
     return int(grounded[-1]) + 1 if len(grounded) else 0
 
 
-def _held(values: np.ndarray) -> np.ndarray:
-    good = np.isfinite(values)
-    return np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+def _interpolated(values: np.ndarray) -> np.ndarray:
+    """Values (n,) with straight lines over the gaps."""
+    finite = np.isfinite(values)
+    return np.interp(np.arange(len(values)), np.flatnonzero(finite), values[finite])
 
 
 def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, str]:
@@ -174,12 +177,12 @@ def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, 
         slow = np.flatnonzero(speed[settled:entry] < 0.5 * final)
         half = settled + (int(slow[-1]) if len(slow) else 0)
         return max(half - int(RISE_S * RATE_HZ), settled), final, "velocity"
-    gained = _gain(_horizontal(log, settled, entry))
-    first = int(np.argmax(np.hypot(*gained.T)))
-    reached = float(np.hypot(*gained[first]))
+    gain = _gain(_horizontal(log, settled, entry))
+    first = int(np.argmax(np.hypot(*gain.T)))
+    final = float(np.hypot(*gain[first]))
     total = np.hypot(*np.cumsum(_horizontal(log, settled, entry)[first:], axis=0).T) / RATE_HZ
-    half = first + int(np.argmax(total > 0.5 * reached))
-    return max(settled + half - int(RISE_S * RATE_HZ), settled), reached, "acceleration"
+    half = first + int(np.argmax(total > 0.5 * final))
+    return max(settled + half - int(RISE_S * RATE_HZ), settled), final, "acceleration"
 
 
 def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:
@@ -192,12 +195,13 @@ def _stop(log: FlightLog, step: int, leave: int, landing: int) -> int:
         half = leave + (int(fast[-1]) if len(fast) else 0)
     else:
         forward = _gain(_horizontal(log, step, leave))[0]
-        lost = _gain(_horizontal(log, leave, landing)) @ (forward / max(np.hypot(*forward), 1e-9))
-        half = leave + int(np.argmin(lost)) + int(RISE_S * RATE_HZ)
+        along = _gain(_horizontal(log, leave, landing)) @ (forward / max(np.hypot(*forward), 1e-9))
+        half = leave + int(np.argmin(along)) + int(RISE_S * RATE_HZ)
     return min(max(half - int(RISE_S * RATE_HZ), leave), landing)
 
 
 def _speed(log: FlightLog) -> np.ndarray:
+    """Horizontal speed (n,), m/s, from the logged velocity."""
     return np.hypot(*(np.nan_to_num(log[c]) for c in VELOCITY[:2]))
 
 
@@ -211,5 +215,5 @@ def _gain(acc: np.ndarray) -> np.ndarray:
 def _horizontal(log: FlightLog, start: int, stop: int) -> np.ndarray:
     """Horizontal specific force of samples start to stop - 1 less its median, (n, 2) m/s^2, with gaps filled."""
     acc = level_acceleration(log)[start:stop, :2]
-    acc = np.column_stack([_held(a) for a in acc.T])
+    acc = np.column_stack([_interpolated(a) for a in acc.T])
     return acc - np.median(acc, axis=0)

@@ -14,6 +14,7 @@ from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, RATE_HZ, channels
 from airtouch.twin.recorded.course import Course
 
+#: bands of spectra in free air, and over the platform, where blocks are short, Hz
 BANDS_HZ = ((0.3, 1), (1, 2), (2, 4), (4, 6), (6, 9), (9, 13), (13, 22), (22, 35), (35, 50))
 OVER_BANDS_HZ = ((1.5, 4), (4, 9), (9, 20), (20, 45))
 #: channels whose coherency shows the loops
@@ -22,8 +23,9 @@ PAIRS = ((ch.GYRO_X, ch.ROLL), (ch.GYRO_Y, ch.PITCH), (ch.GYRO_Z, ch.YAW), (ch.A
 CLASSES = {"low": (0.0, 0.045), "mid": (0.045, 0.065), "high": (0.065, 0.20)}  #: down range over the platform, m
 #: bins around an edge, s
 BINS_S = ((-0.4, -0.2), (-0.2, 0.0), (0.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.7), (0.7, 1.0))
-BASELINE_S = (-1.0, -0.4)  #: before the entry: the level that edge-locked means are taken against
-LENGTH, OVER_LENGTH = 256, 64  #: samples of a spectrum's blocks
+BASELINE_S = (-1.0, -0.4)  #: s, relative to the entry, of the level that edge-locked means are taken against
+LENGTH, OVER_LENGTH = 256, 64  #: samples of a block of a spectrum, in free air and over the platform
+#: groups of features, each with its own misfit
 GROUPS = ("trim", "spectrum", "coherency", "over", "entry", "exit")
 
 
@@ -85,6 +87,7 @@ def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = 50, behi
 
 
 def _trims(log: FlightLog, free: np.ndarray, course: Course) -> np.ndarray:
+    """The features of group "trim"."""
     pwm = log.stack(PWM)[course.free]
     mean = np.nanmean(pwm, axis=1)
     slope = np.polyfit(np.arange(len(mean)) / RATE_HZ, np.nan_to_num(mean, nan=float(np.nanmean(mean))), 1)[0]
@@ -104,11 +107,13 @@ def _blocks(x: np.ndarray, length: int, step: int) -> np.ndarray | None:
 
 
 def _bins(length: int, bands: tuple) -> list[np.ndarray]:
+    """Indices of the frequencies in each band."""
     f = np.fft.rfftfreq(length, 1.0 / RATE_HZ)
     return [np.flatnonzero((f >= a) & (f < b)) for a, b in bands]
 
 
 def _free_spectra(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The features of groups "spectrum" and "coherency", NaN if the free air is too short."""
     blocks = _blocks(free[:, :ch.DOWN], LENGTH, LENGTH // 2)
     if blocks is None:
         return (np.full(ch.DOWN * len(BANDS_HZ), np.nan), np.full(2 * len(PAIRS) * len(BANDS_HZ), np.nan))
@@ -130,11 +135,12 @@ def _calm(blocks: np.ndarray) -> np.ndarray:
 
     A hover of the authors is steered by hand, in steps and pulses that no twin repeats.
     """
-    steered = (np.abs(blocks[:, :, [ch.GYRO_X, ch.GYRO_Y]]) ** 2).sum(axis=(1, 2))
-    return blocks[np.argsort(steered)[:(len(blocks) + 1) // 2]]
+    activity = (np.abs(blocks[:, :, [ch.GYRO_X, ch.GYRO_Y]]) ** 2).sum(axis=(1, 2))
+    return blocks[np.argsort(activity)[:(len(blocks) + 1) // 2]]
 
 
 def _over(x: np.ndarray, course: Course) -> np.ndarray:
+    """The features of group "over", NaN in all height classes but the flight's."""
     out = np.full((len(CLASSES), ch.DOWN, len(OVER_BANDS_HZ)), np.nan)
     name = height_class(course.clearance_m)
     blocks = _blocks(x[course.entry + 20:course.exit - 10, :ch.DOWN], OVER_LENGTH, OVER_LENGTH // 2)
@@ -146,17 +152,19 @@ def _over(x: np.ndarray, course: Course) -> np.ndarray:
 
 
 def _edge(x: np.ndarray, course: Course, edge: int) -> np.ndarray:
+    """The features of one edge, NaN in all height classes but the flight's."""
     out = np.full((len(CLASSES), 12, len(BINS_S)), np.nan)
     name = height_class(course.clearance_m)
     if name:
         locked = edge_locked(x, course, edge)
-        middle = 50
+        centre = 50  # samples before the edge in `edge_locked`
         for i, (a, b) in enumerate(BINS_S):
-            part = locked[middle + round(a * RATE_HZ):middle + round(b * RATE_HZ)]
+            part = locked[centre + round(a * RATE_HZ):centre + round(b * RATE_HZ)]
             if np.isfinite(part[:, 0]).mean() > 0.6:
                 out[list(CLASSES).index(name), :, i] = np.nanmean(part, axis=0)
     return out.ravel()
 
 
 def _decibel(power: np.ndarray) -> np.ndarray:
+    """Power in dB."""
     return 10.0 * np.log10(np.maximum(power, 1e-12))

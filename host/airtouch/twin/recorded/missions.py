@@ -12,11 +12,11 @@ from airtouch.simulation import effects as registry
 from airtouch.simulation.scenario import Scenario
 from airtouch.twin.recorded.course import RISE_S, Course
 
-NAME = "twin"
+NAME = "twin"  #: name of a twin's vehicle and scenario
 WIDTH_M = 4.0  #: m, width of the platform across the path
 LEAST_BEFORE_M = 0.05  #: m, least distance from the velocity step to the edge
 LEAST_STOP_M = 0.35  #: m, least distance flown after the platform, so that no flight stops over it by drift
-WAIT_S = 0.5
+WAIT_S = 0.5  #: s on the ground before take-off
 LEAST_CLEARANCE_M = 0.012  #: m, least true distance at an entry; the legs end 6 mm below the sensor
 SETTLED_S = 0.15  #: s after an entry at which the reading behind it is taken
 LAND_MPS = 0.2  #: m/s, speed of the firmware's landing
@@ -59,8 +59,8 @@ def true_distance(reading_m: float, bias: Mapping[str, Any]) -> float:
         return reading_m
     reading = reading_m - values["dip"] * math.exp(-SETTLED_S / values["time"])
     distances = np.linspace(0.0, 0.5, 2001)
-    shown = distances + values["near"] * np.exp(-distances / values["fade"])
-    return float(np.interp(reading, np.maximum.accumulate(shown), distances))
+    readings = distances + values["near"] * np.exp(-distances / values["fade"])
+    return float(np.interp(reading, np.maximum.accumulate(readings), distances))
 
 
 def table(courses: Sequence[Course], effects: Mapping[str, Any], name: str = NAME,

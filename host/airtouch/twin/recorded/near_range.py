@@ -29,9 +29,9 @@ FEWEST = 4  #: least number of flights
 
 @dataclass(frozen=True)
 class NearRange:
-    """top_m: height of the platform over the floor.
+    """The height of the platform over the floor (top_m) and the error of the down range near it.
 
-    A reading at the distance d is d + near exp(-d / fade), delay s late.
+    A reading at the distance d, m, is d + near exp(-d / fade), delay seconds late; near and fade in m.
     """
 
     top_m: float
@@ -57,8 +57,8 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
 
     def residual(p: np.ndarray) -> np.ndarray:
         true = np.maximum(height - p[3] * climb - p[0], 0.0)
-        shown = np.maximum(true + p[1] * np.exp(-true / p[2]), 0.0)
-        return np.r_[(shown - reading) / std, FIRM * (p[1:] - PRIOR[:, 0]) / PRIOR[:, 1]]
+        modelled = np.maximum(true + p[1] * np.exp(-true / p[2]), 0.0)
+        return np.r_[(modelled - reading) / std, FIRM * (p[1:] - PRIOR[:, 0]) / PRIOR[:, 1]]
 
     top = float(np.median(steps))
     solved = least_squares(residual, [top, *PRIOR[:, 0]], loss="soft_l1", x_scale=[0.01, 0.01, 0.01, 0.01],
@@ -67,11 +67,12 @@ def measure(courses: Sequence[Course], channels: Sequence[np.ndarray]) -> NearRa
 
 
 def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, float]]:
-    """For each edge: height over the floor (m,), m; its slope (m,), m/s; down range (m,), m; and the scatter of their
-    difference, with each edge as one measurement.
+    """Height over the floor (m,), m, its slope (m,), m/s, and the down range (m,), m, of each edge.
+
+    The fourth value is the standard deviation of height less down range, m, with each edge as one measurement.
     """
     down, dt = 0.01 * x[:, ch.DOWN], 1.0 / RATE_HZ
-    gained = np.cumsum(np.cumsum(x[:, ch.AZ] - np.median(x[course.free, ch.AZ]))) * dt * dt
+    change = np.cumsum(np.cumsum(x[:, ch.AZ] - np.median(x[course.free, ch.AZ]))) * dt * dt
     t = np.arange(len(x)) * dt
     anchor, carried, apart = (int(s * RATE_HZ) for s in (ANCHOR_S, CARRIED_S, 0.08))
     spans = ((slice(course.entry - anchor, course.entry - apart // 2), course.entry,
@@ -80,11 +81,11 @@ def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, 
               slice(max(course.exit - carried + apart, course.entry + 2), course.exit - 3)))
     out = []
     for floor, tied, over in spans:
-        good = down[floor] > 0.5 * course.before_m
-        if good.sum() < anchor // 3 or over.stop - over.start < apart:
+        valid = down[floor] > 0.5 * course.before_m
+        if valid.sum() < anchor // 3 or over.stop - over.start < apart:
             continue
-        drift = np.polyfit(t[floor][good] - t[tied], (down - gained)[floor][good], 1)
-        height = gained + np.polyval(drift, t - t[tied])
+        drift = np.polyfit(t[floor][valid] - t[tied], (down - change)[floor][valid], 1)
+        height = change + np.polyval(drift, t - t[tied])
         std = (READING_STD_M + DRIFT_M * (t[over] - t[tied]) ** 2) * np.sqrt(over.stop - over.start)
         out.append((height[over], np.gradient(height, dt)[over], down[over], std))
     return out

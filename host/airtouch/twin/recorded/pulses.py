@@ -9,14 +9,14 @@ import numpy as np
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.reference.finite import hold_finite
 
-PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: motors 1 to 4
-PERIODS_S = np.arange(0.30, 1.0, 0.002)
-LEAST_PULSES = 4
+PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: sign of motors 1 to 4 in the pitch command
+PERIODS_S = np.arange(0.30, 1.0, 0.002)  #: s, periods that are tried; the authors' is 0.52 s
+LEAST_PULSES = 4  #: periods that a hover must hold
 #: standard errors of the mean jump; of the authors' flights (folds 0 to 2) those with pulses have 7.5 or more, all at
 #: 0.52 s, the others 6.5 or less
 CLEAR = 7.0
 CLIP = 10.0  #: robust standard deviations, to which larger jumps (set-point steps) are clipped
-RATE_HZ = 100.0
+RATE_HZ = 100.0  #: Hz, of the log
 
 
 def period(log: FlightLog, start: int, stop: int) -> float:
@@ -34,8 +34,8 @@ def period(log: FlightLog, start: int, stop: int) -> float:
         samples = seconds * RATE_HZ
         if len(jumps) < LEAST_PULSES * samples:
             break
-        place = (sample % samples).astype(int)
-        mean = np.bincount(place, jumps)[:int(samples)] / np.bincount(place)[:int(samples)]
+        phase = (sample % samples).astype(int)
+        mean = np.bincount(phase, jumps)[:int(samples)] / np.bincount(phase)[:int(samples)]
         score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / spread
         if score > best:
             best, best_s = score, float(seconds)
