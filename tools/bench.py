@@ -27,7 +27,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 from airtouch.reference.networks.int8_network import quantise
 
-PAIRS = 7
+PAIRS = 7  #: alternating timings of both, of which the median ratio is reported
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -78,6 +78,7 @@ def bench_band_power(table: Table, some: list[FlightLog]) -> None:
 
 
 def _each(act: Callable[..., object], inputs: Iterable, *further: object) -> None:
+    """Call `act` with each of the inputs and the further arguments."""
     for x in inputs:
         act(x, *further)
 

@@ -12,7 +12,7 @@ import json
 import statistics
 import time
 
-WORLDS, HZ = 64, 500
+WORLDS, HZ = 64, 500  #: drones that are simulated at once, and steps a simulated second
 
 
 def rates(integrator: str, seconds: float, rounds: int) -> list[tuple[float, float]]:
@@ -27,15 +27,15 @@ def rates(integrator: str, seconds: float, rounds: int) -> list[tuple[float, flo
     sim.reset()
     command = np.zeros((WORLDS, 1, 16))
     command[..., 2] = 0.8
-    found = []
+    out = []
     for _ in range(rounds + 1):
         started, busy = time.perf_counter(), time.process_time()
         sim.state_control(command)
         sim.step(int(seconds * HZ))
         jax.block_until_ready(sim.data)
-        found.append((WORLDS * seconds / (time.perf_counter() - started),
+        out.append((WORLDS * seconds / (time.perf_counter() - started),
                       WORLDS * seconds / (time.process_time() - busy)))
-    return found[1:]
+    return out[1:]
 
 
 if __name__ == "__main__":

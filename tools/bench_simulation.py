@@ -25,8 +25,8 @@ from airtouch import vehicle as vehicles
 from airtouch.simulation import batch, effects, scenario
 from airtouch.simulation.flight import Diverged
 
-STRENGTH = 0.2
-ROUNDS = 3
+STRENGTH = 0.2  #: of every effect, as a fraction of its default
+ROUNDS = 3  #: rounds of timings
 PEER_S = 4.0  #: simulated by the peer each time
 
 

@@ -153,6 +153,7 @@ def show(title: str, flights: list[Flight], outcomes_of: list[tuple[np.ndarray, 
 
 
 def _text(f: dict[str, float]) -> str:
+    """The figures of a decoder as a line."""
     return (f"error {1000 * f['error_m']:.1f} mm ({f['rms_s']:.2f} s rms), missed {f['missed']:.1%}, "
             f"false {f['false_per_minute']:.2f} a minute")
 

@@ -44,8 +44,8 @@ def read(folders: Sequence[Path]) -> dict[str, list[Read]]:
 
 def line(title: str, one: Sequence[Read], other: Sequence[Read]) -> str:
     """A row of the table."""
-    found = {a.phase: f"{a.value:.2f} ({a.low:.2f} to {a.high:.2f})" for a in two_sample(windows(one), windows(other))}
-    return f"| {title} | {len(one)} / {len(other)} | {' | '.join(found.get(p, '-') for p in PHASES)} |"
+    aurocs = {a.phase: f"{a.value:.2f} ({a.low:.2f} to {a.high:.2f})" for a in two_sample(windows(one), windows(other))}
+    return f"| {title} | {len(one)} / {len(other)} | {' | '.join(aurocs.get(p, '-') for p in PHASES)} |"
 
 
 def main() -> None:
@@ -60,10 +60,10 @@ def main() -> None:
         raise SystemExit(f"two days with {options.fewest} flights or more are needed, here: " +
                          (", ".join(f"{day} {len(flights)}" for day, flights in sorted(days.items())) or "none"))
     print(f"| | flights | {' | '.join(PHASES)} |\n|---|---|{'---|' * len(PHASES)}", flush=True)
-    every = [flight for flights in days.values() for flight in flights]
-    order = np.random.default_rng(0).permutation(len(every))
-    half = len(every) // 2
-    print(line("two random halves", [every[i] for i in order[:half]], [every[i] for i in order[half:]]), flush=True)
+    pooled = [flight for flights in days.values() for flight in flights]
+    order = np.random.default_rng(0).permutation(len(pooled))
+    half = len(pooled) // 2
+    print(line("two random halves", [pooled[i] for i in order[:half]], [pooled[i] for i in order[half:]]), flush=True)
     for a, b in combinations(large, 2):
         print(line(f"{a} against {b}", large[a], large[b]), flush=True)
 

@@ -27,10 +27,12 @@ from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded import flights, near_range
 from airtouch.twin.recorded.course import Course
 
-FIRMWARE = "authors-2024-01"
+FIRMWARE = "authors-2024-01"  #: name of the simulated firmware
+#: limits of the bins of the histogram of shares
 SHARES = np.array([-0.05, 0.05, 0.5, 0.6, 0.9, 1.05, 1.6])
+#: limits of the bins of readings, cm
 READINGS_CM = (0.0, 0.5, 1.5, 2.5, 3.5, 6.5, 8.0, 9.0, 13.0)
-HIGH_M = 0.065
+HIGH_M = 0.065  #: m over the platform from which on a flight is high, as in `features.CLASSES`
 ROWS = 10  #: of a bin: 0.1 s
 PWM_OF_COMMAND = 0.7  #: battery compensation around hover at 3.5 V: 65535 / 3.5 (0.088 - 2 6.239e-4 38 g) 60 / 65536
 

@@ -43,9 +43,9 @@ def parse(output: str) -> Sizes:
 def row(what: str, sizes: Sizes, stock: Sizes | None = None, deepest: int | None = None) -> str:
     """One line of the table; stock and deepest stack of the app are left out for a stock image."""
     used = " / ".join(f"{bytes_ / 1000:.1f}" for bytes_ in sizes.used)
-    left = " / ".join(f"{(room - bytes_) / 1000:.1f}" for bytes_, room in zip(sizes.used, sizes.room, strict=True))
+    free = " / ".join(f"{(room - bytes_) / 1000:.1f}" for bytes_, room in zip(sizes.used, sizes.room, strict=True))
     added = " / ".join(f"{(a - b) / 1000:+.1f}" for a, b in zip(sizes.used, stock.used, strict=True)) if stock else ""
-    return f"| {what} | {used} | {added} | {left} | {'' if deepest is None else deepest} |"
+    return f"| {what} | {used} | {added} | {free} | {'' if deepest is None else deepest} |"
 
 
 def made(*command: object) -> str:

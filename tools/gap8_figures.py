@@ -153,6 +153,7 @@ def line(row: Row, costs: dict[str, Any], figures: dict[str, Any] | None) -> str
 
 
 def _pair(figures: dict[str, Any], key: str, factor: float) -> str:
+    """A figure of the float and of the int8 network, with the interval of the latter."""
     low, high = figures["int8"]["intervals"][key]
     values = [f"{factor * figures[kind][key]:.1f}" for kind in ("float", "int8")]
     return f"{' / '.join(values)} [{factor * low:.0f}, {factor * high:.0f}]"

@@ -12,7 +12,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-VEHICLE = "crazyflie-2.1-flow"
+VEHICLE = "crazyflie-2.1-flow"  #: the authors' vehicle
 
 
 def questions(folder: Path) -> dict[str, tuple[list[str], list[str]]]:
@@ -29,6 +29,7 @@ def questions(folder: Path) -> dict[str, tuple[list[str], list[str]]]:
 
 
 def main(folder: Path, out: Path) -> None:
+    """Diagnose each of the questions and write JSON and report of each."""
     out.mkdir(parents=True, exist_ok=True)
     for name, (flights, baseline) in questions(folder).items():
         print(f"## {name}: {len(flights)} flights, {len(baseline)} nominal", flush=True)

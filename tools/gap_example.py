@@ -12,7 +12,9 @@ from airtouch import logs
 from airtouch.gap import example
 from airtouch.simulation import batch
 
+#: scenario of the example, seeds of its nominal flights and of the flight with the effect
 SCENARIO, NOMINAL_SEED, REAL_SEED = "diagnosis", 41, 42
+#: the withheld effect
 EFFECT = {"weak_motor": {"rotor": 2, "thrust_loss": 0.12}}
 DROPPED = ("rpm_", "range_", "acc_world")  #: columns that the diagnosis can do without
 

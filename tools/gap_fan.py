@@ -23,10 +23,11 @@ from airtouch.logs import read
 from airtouch.simulation.body import rigid_body
 from gap_authors import VEHICLE, questions
 
-BAND_HZ, FAR = (0.6, 12.0), 5.0
+BAND_HZ, FAR = (0.6, 12.0), 5.0  #: Hz; power over the floor from which a block is far above it
 
 
 def main(folder: Path) -> None:
+    """Print the torques that each flight beside a fan shows, as a table."""
     vehicle = vehicles.load(VEHICLE)
     fan, calm = (list(measure.usable([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])
@@ -42,9 +43,9 @@ def main(folder: Path) -> None:
         over = np.nanmean(power, axis=1)
         far = (over[:, [0, 2]] > FAR).any(axis=1)
         seconds = data.first[0][AIR][far] * PERIOD_S
-        told = vehicle.thrust(flight.pwm[flight.phase != GROUND]).mean(axis=0)
-        roll = arm * (told[2] + told[3] - told[0] - told[1]) / vehicle.inertia_kg_m2[0]
-        yaw = -vehicle.yaw_torque_over_thrust_m * (told @ np.array(rigid_body.SPIN))
+        thrust = vehicle.thrust(flight.pwm[flight.phase != GROUND]).mean(axis=0)
+        roll = arm * (thrust[2] + thrust[3] - thrust[0] - thrust[1]) / vehicle.inertia_kg_m2[0]
+        yaw = -vehicle.yaw_torque_over_thrust_m * (thrust @ np.array(rigid_body.SPIN))
         yaw /= vehicle.inertia_kg_m2[2]
         when = ", ".join(f"{s:.0f}" for s in seconds)
         print(f"| {Path(flight.name).name} | {roll:.1f}, {yaw:.1f} | {far.sum()} of {len(far)} | {when} | "

@@ -40,26 +40,26 @@ def lift(vehicle: Path, name: str, parameters: dict[str, float]) -> np.ndarray:
     """Share (2,) of the weight that `ground_effect` carries in hover at HEIGHTS_M: g / (1 + g) of a thrust gain g."""
     flown = vehicles.load(vehicle)
     row = prepare(flown, ())[0][0]
-    seen = np.zeros((len(HEIGHTS_M), at.COUNT))
-    seen[:, at.STEP], seen[:, at.MASS], seen[:, at.GRAVITY] = 0.01, flown.mass_kg, flown.gravity_mps2
-    seen[:, at.ROTATION], seen[:, at.ROTATION + 4], seen[:, at.ROTATION + 8] = 1.0, 1.0, 1.0
-    seen[:, at.ROTOR_X:at.ROTOR_X + 4], seen[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_x"], row["rotor_y"]
-    seen[:, at.ROTOR_RADIUS], seen[:, at.ROTOR_SPACING] = row["rotor_radius"], row["rotor_spacing"]
-    seen[:, at.THRUST:at.THRUST + 4] = 0.25 * flown.mass_kg * flown.gravity_mps2
-    seen[:, at.LOWER_FACTOR:at.LOWER_FACTOR + 4] = 1.0
-    seen[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = (np.array(HEIGHTS_M) + STANDING_M[name])[:, None]
+    signals = np.zeros((len(HEIGHTS_M), at.COUNT))
+    signals[:, at.STEP], signals[:, at.MASS], signals[:, at.GRAVITY] = 0.01, flown.mass_kg, flown.gravity_mps2
+    signals[:, at.ROTATION], signals[:, at.ROTATION + 4], signals[:, at.ROTATION + 8] = 1.0, 1.0, 1.0
+    signals[:, at.ROTOR_X:at.ROTOR_X + 4], signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_x"], row["rotor_y"]
+    signals[:, at.ROTOR_RADIUS], signals[:, at.ROTOR_SPACING] = row["rotor_radius"], row["rotor_spacing"]
+    signals[:, at.THRUST:at.THRUST + 4] = 0.25 * flown.mass_kg * flown.gravity_mps2
+    signals[:, at.LOWER_FACTOR:at.LOWER_FACTOR + 4] = 1.0
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = (np.array(HEIGHTS_M) + STANDING_M[name])[:, None]
     steady = Active(effects.get("ground_effect"), {**parameters, "turbulence": 0.0})
-    gain = replay.wrench_of(steady, seen)[:, 2] / (flown.mass_kg * flown.gravity_mps2)
+    gain = replay.wrench_of(steady, signals)[:, 2] / (flown.mass_kg * flown.gravity_mps2)
     return gain / (1.0 + gain)
 
 
 def close(case: dict, folder: Path) -> bool:
     """Whether a diagnosed flight's ground effect is within CLOSE of the measured lift at both heights."""
-    found = next((e for e in case["effects"] if e["name"] == "ground_effect"), None)
-    if found is None:
+    effect = next((e for e in case["effects"] if e["name"] == "ground_effect"), None)
+    if effect is None:
         return False
     name = case["condition"]
-    carried = lift(folder / f"{name}.toml", name, {k: q["value"] for k, q in found["parameters"].items()})
+    carried = lift(folder / f"{name}.toml", name, {k: q["value"] for k, q in effect["parameters"].items()})
     return bool((np.abs(carried / MEASURED[name] - 1.0) < CLOSE).all())
 
 
@@ -71,26 +71,27 @@ def regressed_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float,
     keep = 1.0 - PERIOD_S / LAG_S
     followed = lfilter([1.0 - keep], [1.0, -keep], thrust, zi=[keep * thrust[0]])[0]
     weight = vehicle.mass_kg * vehicle.gravity_mps2
-    left = flight.acceleration[:, 2] * vehicle.mass_kg / weight - followed / weight
+    excess = flight.acceleration[:, 2] * vehicle.mass_kg / weight - followed / weight
     height = flight.log["z_m"] - standing_m
     here = flight.usable & np.isfinite(height) & (flight.phase != GROUND) & (height > -0.005)
     table = np.column_stack([np.ones(here.sum()), np.interp(height[here], CURVE_M, curve)])
-    return float(np.linalg.lstsq(table, left[here], rcond=None)[0][1])
+    return float(np.linalg.lstsq(table, excess[here], rcond=None)[0][1])
 
 
 def main() -> None:
+    """Print the ratio of fitted to published lift of the ground in recorded flights, by day and vehicle."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", nargs="?", type=Path,
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
     folder = parser.parse_args().flights / "neuralswarm"
-    found: dict[str, list[float]] = {}
+    ratios: dict[str, list[float]] = {}
     for row in csv.DictReader((folder / "manifest.csv").open()):
         if row["truth"] == "ground_effect":
             vehicle = vehicles.load(folder / f"{row['vehicle']}.toml")
             flight = ready(read(folder / "flights" / row["file"]), vehicle)
-            found.setdefault(f"day {row['day']}, {row['vehicle']}", []).append(
+            ratios.setdefault(f"day {row['day']}, {row['vehicle']}", []).append(
                 regressed_lift(flight, vehicle, STANDING_Z_M[row["cf"]], CURVE[row["vehicle"]]))
-    for name, each in sorted(found.items()):
+    for name, each in sorted(ratios.items()):
         print(f"{name}: within {CLOSE:.0%} in {sum(abs(x - 1.0) < CLOSE for x in each)} of {len(each)}, "
               f"median {np.median(each):.2f}, standard deviation {np.std(each, ddof=1):.2f}")
 

@@ -10,6 +10,7 @@ from airtouch import logs
 from airtouch.detector.shared import channels
 from airtouch.logs.flight_log import FlightLog
 
+#: limits of the bands of a spectrum, Hz
 BANDS_HZ = (0.7, 2.0, 6.0, 12.0, 25.0, 50.1)
 WINDOW = 128  #: samples of a spectrum
 BEFORE, AFTER = 500, 100  #: samples around the platform that belong to the pass
@@ -49,7 +50,7 @@ def spectra(log: FlightLog) -> np.ndarray:
     return out
 
 
-def apart_db(made: Sequence[FlightLog], real: Sequence[FlightLog]) -> np.ndarray:
+def apart_db(simulated: Sequence[FlightLog], real: Sequence[FlightLog]) -> np.ndarray:
     """Mean absolute difference (2,) of two sets' median spectra, dB: before and over the platform."""
-    one, two = (np.nanmedian([spectra(log) for log in some], axis=0) for some in (made, real))
+    one, two = (np.nanmedian([spectra(log) for log in some], axis=0) for some in (simulated, real))
     return np.nanmean(np.abs(one - two), axis=(1, 2))

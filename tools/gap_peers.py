@@ -29,6 +29,7 @@ def interval(hits: int, n: int) -> str:
 
 
 def main(folder: Path) -> None:
+    """Diagnose every labelled flight of the set and print a table with the counts of right answers."""
     rows = [r for r in csv.DictReader((folder / "manifest.csv").open()) if not r["file"].startswith("cal")]
     first = third = 0
     shrinks, wrong = [], []
@@ -37,20 +38,20 @@ def main(folder: Path) -> None:
     for row in rows:
         v = row["vehicle"]
         began = time.process_time()
-        found = diagnose([read(folder / row["file"])], vehicles.load(folder / f"vehicle_{v.lower()}.toml"),
-                         [read(folder / f"cal_{v}_{i}.csv.gz") for i in (0, 1)])
+        answer = diagnose([read(folder / row["file"])], vehicles.load(folder / f"vehicle_{v.lower()}.toml"),
+                          [read(folder / f"cal_{v}_{i}.csv.gz") for i in (0, 1)])
         true = NAMES.get(row["effect"], row["effect"])
-        ranked = [r.name for r in found.ranking[:3]]
+        ranked = [r.name for r in answer.ranking[:3]]
         first += interchangeable(ranked[0], true)
         third += any(interchangeable(r, true) for r in ranked)
         named = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
-                                                   if q.low is not None) for e in found.effects)
-        control = found.control.get("shrink", {}).get("value")
-        if found.shrink is not None and interchangeable(ranked[0], true):
-            shrinks.append(found.shrink.value)
+                                                   if q.low is not None) for e in answer.effects)
+        control = answer.control.get("shrink", {}).get("value")
+        if answer.shrink is not None and interchangeable(ranked[0], true):
+            shrinks.append(answer.shrink.value)
             wrong += [control] if control is not None else []
-        print(f"| {true} | {float(row['strength']):.3g} {row['unit'].split(',')[0][:24]} | {found.verdict} | {named} | "
-              f"{'' if found.shrink is None else f'{found.shrink.value:.2f}'} | "
+        print(f"| {true} | {float(row['strength']):.3g} {row['unit'].split(',')[0][:24]} | {answer.verdict} | "
+              f"{named} | {'' if answer.shrink is None else f'{answer.shrink.value:.2f}'} | "
               f"{'' if control is None else f'{control:.2f}'} | {time.process_time() - began:.0f} |", flush=True)
     print(f"\ntop-1 {interval(first, len(rows))}; top-3 {interval(third, len(rows))}")
     if shrinks:

@@ -62,15 +62,16 @@ def found_in(flights: Flights, kept: Path) -> dict[str, Any]:
     if not kept.is_file():
         calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
-        over, before = zip(*filter(None, map(pieces, _some(close, MOST_PASSES))), strict=True)
+        over, before = zip(*filter(None, map(pieces, _evenly_spaced(close, MOST_PASSES))), strict=True)
         craft = vehicle.load(VEHICLE)
-        every, near = diagnose(_some(list(calm.values()), MOST), craft), diagnose(over, craft, before)
+        every, near = diagnose(_evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
         write_bytes(json.dumps({"all": every.plain(), "close": near.plain(), "calibration": [
             [a.effect.name, dict(a.values)] for a in near.held[1].active]}, indent=1).encode(), kept, force=True)
     return json.loads(kept.read_text())
 
 
-def _some(flights: list[FlightLog], most: int) -> list[FlightLog]:
+def _evenly_spaced(flights: list[FlightLog], most: int) -> list[FlightLog]:
+    """At most `most` of the flights, evenly spaced."""
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, most).astype(int))]
 
 

@@ -37,13 +37,14 @@ from airtouch.twin.recorded.course import Course, course
 from airtouch.twin.recorded.features import CLASSES, height_class
 
 CHANNELS = NAMES[:-1]  #: without the empty one
-SPLIT_HZ = 3.0
+SPLIT_HZ = 3.0  #: corner of the high-pass whose output is compared
 SETTLED, BEFORE = slice(30, -10), slice(-300, -40)  #: samples: over a platform from the entry on; before the entry
 AHEAD = 40  #: samples before the entry in which the platform acts already
 HOVER_S = 2.0  #: shortest hover of a flight in tables 2 and 3
+#: parts of a flight that are replaced by a hover
 REPLACED = ("as flown", "before: hover", "platform: hover", "both: hover")
 COLUMNS = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "m1", "m2", "m3", "m4")
-RESPONSES = 60
+RESPONSES = 60  #: simulated responses to a platform
 Groups = dict[str, list[tuple[FlightLog, Course]]]  #: class of height -> its flights
 
 

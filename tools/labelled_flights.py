@@ -73,6 +73,7 @@ def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
 
 
 def _merged(name: str, some: Sequence[FlightScore]) -> FlightScore:
+    """The scores of several flights as one, under a new name."""
     a, b, c, d = (sum(s.windows[i] for s in some) for i in range(4))
     return FlightScore(name, some[0].condition, tuple(e for s in some for e in s.edges),
                        tuple(e for s in some for e in s.false or ()), sum(s.detections for s in some),

@@ -81,10 +81,10 @@ def run_mutmut(place: Path, *mutants: str) -> None:
 
 def results(place: Path) -> dict[str, int | None]:
     """Exit code of each mutant, None where it was not run."""
-    found: dict[str, int | None] = {}
+    exit_codes: dict[str, int | None] = {}
     for path in sorted((place / "mutants").rglob("*.py.meta")):
-        found |= json.loads(path.read_text())["exit_code_by_key"]
-    return found
+        exit_codes |= json.loads(path.read_text())["exit_code_by_key"]
+    return exit_codes
 
 
 def table(codes: dict[str, int | None]) -> float:
@@ -120,6 +120,7 @@ def show(place: Path, codes: dict[str, int | None]) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """Run or show the mutants of the groups; the exit code is 1 if a group's share noticed is below LEAST."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("groups", nargs="*", help=f"of {', '.join(GROUPS)}; all by default")
     parser.add_argument("--sample", type=int, help="mutants of each group")

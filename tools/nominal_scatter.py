@@ -76,6 +76,7 @@ def nothing_done(log: FlightLog) -> FlightLog:
 
 
 def _read(path: Path) -> Log:
+    """A log's name, and a function that reads it."""
     return path.name, lambda: read(path)
 
 
@@ -107,10 +108,12 @@ def _rest(every: list[Group], i: int) -> list[Log]:
 
 
 def _name(name: str, others: bool) -> str:
+    """The name of a comparison, with a note if it is between groups."""
     return name + (", other groups" if others else "")
 
 
 def _ready(logs: list[Log], flown: Vehicle) -> list[tuple[str, Flight]]:
+    """The flights of logs that can be used, with their names."""
     return list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], flown, []), strict=True))
 
 
@@ -137,6 +140,7 @@ def text_of(classes: dict[str, Scatter], counts: dict[str, str]) -> str:
 
 
 def main() -> None:
+    """Measure the nominal scatter of every class and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", nargs="?", type=Path,
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))

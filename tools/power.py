@@ -40,10 +40,10 @@ def measure(logs: tuple[str, ...]) -> None:
             raise AirTouchError(f"{path}: cannot be read: {error.strerror}") from None
         notes += trace.notes
         known = tuple(PAPER_MW)
-        found = {canonical(name, known): power(trace)} if equals else by_stage(trace, known)
-        if not found:
+        of_trace = {canonical(name, known): power(trace)} if equals else by_stage(trace, known)
+        if not of_trace:
             raise AirTouchError(f"{path}: no column of stages; give STAGE=FILE for each stage")
-        stages |= found
+        stages |= of_trace
     click.echo(table(stages))
     click.echo("in brackets 95 % intervals, from means over blocks of 1 s; a step is 10 ms")
     for note in notes:

@@ -36,11 +36,13 @@ class Repeat:
         """Asked for by every test, with the number of the repetition."""
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        """Repeat every test `times` times."""
         metafunc.fixturenames.append("repeated")
         names = [f"again{i}" for i in range(self.times)]
         metafunc.parametrize("repeated", range(self.times), indirect=True, ids=names)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Count the failures of each test and keep their output."""
         name = re.sub(r"-?again\d+", "", report.nodeid).replace("[]", "")
         self.started.setdefault(name, time.monotonic() - report.duration)
         if report.failed:
@@ -65,6 +67,7 @@ def concurrent_tests() -> list[str]:
 
 
 def main() -> int:
+    """Run the tests many times and print how often each failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("tests", nargs="*", help="files or folders; by default those of threads, sockets, processes")
     parser.add_argument("--times", type=int, default=50, help="repetitions of each test (50)")

@@ -26,9 +26,9 @@ from airtouch.vehicle import Vehicle
 
 RPM = tuple(f"rpm_{i}" for i in range(1, 5))
 BAND_HZ = (1.0, 12.0)  #: below it the yaw controller hardly commands, above it the gyro's low-pass begins
-BLOCK_S = 4.0
+BLOCK_S = 4.0  #: s of a block of a spectrum
 EDGE_S = 1.0  #: left out after take-off and before landing
-DRAWS = 200
+DRAWS = 200  #: bootstrap samples over blocks
 
 
 def spectra(log: FlightLog, arm_pwm: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -61,13 +61,13 @@ def fit(f: np.ndarray, blocks: np.ndarray, with_inertia: bool = True) -> tuple[n
     difference, yaw = blocks.mean(axis=0)
     scale = np.sqrt(np.mean(np.abs(blocks[:, 1]) ** 2, axis=0))  # each frequency counts alike
 
-    def left(x: np.ndarray) -> np.ndarray:
+    def residual(x: np.ndarray) -> np.ndarray:
         modelled = (x[0] + 2j * np.pi * f * x[1] * with_inertia) * np.exp(-2j * np.pi * f * x[2]) * difference
         rest = (yaw - modelled) / scale
         return np.concatenate([rest.real, rest.imag])
 
-    found = least_squares(left, [1e-2, 1e-3, 0.005], x_scale=[1e-2, 1e-3, 5e-3])
-    return found.x, 1.0 - float((left(found.x) ** 2).sum() / (np.abs(yaw / scale) ** 2).sum())
+    solution = least_squares(residual, [1e-2, 1e-3, 0.005], x_scale=[1e-2, 1e-3, 5e-3])
+    return solution.x, 1.0 - float((residual(solution.x) ** 2).sum() / (np.abs(yaw / scale) ** 2).sum())
 
 
 def report(log: FlightLog, craft: Vehicle) -> str:

@@ -61,10 +61,10 @@ def row(detector: str, without: str, options: argparse.Namespace,
     scores, left_out = evaluate.evaluate(files, module, model)
     if left_out:
         raise SystemExit(f"not scored: {left_out[0][1]}")
-    found = {**summarise(scores), "trained": what, "lag_s": module.lag_s(model), "options": own,
+    figures = {**summarise(scores), "trained": what, "lag_s": module.lag_s(model), "options": own,
              "seconds": round(time.monotonic() - started)}
-    write_bytes(json.dumps(found, indent=1).encode(), path, force=True)
-    return found
+    write_bytes(json.dumps(figures, indent=1).encode(), path, force=True)
+    return figures
 
 
 def line(detector: str, without: str, result: dict[str, Any]) -> str:
@@ -103,15 +103,15 @@ def main() -> None:
     started = False
     for detector in options.detector or ("best", "paper"):
         for without in options.without or (ALL, *effects_of(options.scenario)):
-            found = row(detector, without, options, files)
+            figures = row(detector, without, options, files)
             if not started:
                 print(f"{options.flights} flights of {options.scenario}, seed {options.seed}; tested on "
-                      f"{found['flights']} recorded flights, {found['edges']} edges\n\n"
+                      f"{figures['flights']} recorded flights, {figures['edges']} edges\n\n"
                       "| trained with | mean absolute error | missed | false a minute | balanced accuracy "
                       "| lag |\n"
                       "|---|---|---|---|---|---|")
                 started = True
-            print(line(detector, without, found), flush=True)
+            print(line(detector, without, figures), flush=True)
 
 
 if __name__ == "__main__":

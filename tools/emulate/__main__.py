@@ -70,6 +70,7 @@ def show(what: str, seconds: float, result: Replay) -> None:
 def number(least: int) -> Callable[[str], int]:
     """A whole number from `least` on, for argparse."""
     def read_number(text: str) -> int:
+        """The text as a whole number of at least `least`, for argparse."""
         try:
             if (value := int(text)) >= least:
                 return value

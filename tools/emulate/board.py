@@ -40,6 +40,7 @@ class Board:
         self._handlers: dict[str, Callable[[bytes], None]] = {}
 
     def __enter__(self) -> Self:
+        """Start QEMU and open the two pipes to the board."""
         self._folder = tempfile.TemporaryDirectory(prefix="airtouch-board-")
         folder = Path(self._folder.name)
         for pipe in ("to_board", "from_board"):
@@ -56,6 +57,7 @@ class Board:
         return self
 
     def __exit__(self, *_: object) -> None:
+        """End QEMU and remove its folder."""
         self._qemu.kill()
         self._qemu.wait()
         for file in (self._to, self._from):
@@ -124,10 +126,12 @@ class Board:
                 self._handlers[kind](content)
 
     def _frame(self) -> tuple[str, bytes]:
+        """The next frame from the board: its kind and its content."""
         head = self._bytes(3)
         return chr(head[0]), self._bytes(struct.unpack("<H", head[1:])[0])
 
     def _bytes(self, length: int) -> bytes:
+        """The next `length` bytes from the board. Raises AirTouchError if it stops or is silent for PATIENCE_S."""
         got = b""
         while len(got) < length:
             ready, _, _ = select.select([self._from], [], [], PATIENCE_S)
@@ -139,26 +143,29 @@ class Board:
         return got
 
     def _last(self) -> str:
+        """The last line of the board's console, in words."""
         lines = self.console.strip().splitlines()
         return f"it said last: {lines[-1]}" if lines else "it had not said anything"
 
     def _where(self, address: int) -> str:
+        """Function and offset of an address in the program."""
         return Elf(self.elf).where(address & ~1)
 
     def _ended(self) -> str:
+        """The exit code of the board and the end of its output, in words."""
         said = self._qemu.communicate()[0].decode(errors="replace")
         return f"has stopped with code {self._qemu.returncode}. {said[-1000:]}"
 
     def values(self, report: bytes) -> dict[str, float]:
         """A report: `ms` of its clock, `latency` of the stabilizer's worst step since the last one, and the names'."""
         words = np.frombuffer(report, "<u4")
-        found: dict[str, float] = {"ms": int(words[0]), "latency_us": int(words[1])}
+        values: dict[str, float] = {"ms": int(words[0]), "latency_us": int(words[1])}
         for name, type_, word in zip(self.names, self.types, words[2:], strict=True):
             if type_ == FLOAT:
-                found[name] = word.view(np.float32)
+                values[name] = word.view(np.float32)
             else:
-                found[name] = int(word.view(np.int32) if type_ in SIGNED else word)
-        return found
+                values[name] = int(word.view(np.int32) if type_ in SIGNED else word)
+        return values
 
     def end(self) -> dict[str, int]:
         """Stop it where it listens: unused words of each task's stack."""

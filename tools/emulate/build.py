@@ -104,6 +104,7 @@ def _objects() -> list[Path]:
     where = BUILT / "firmware/app/build"
 
     def parts(path: Path) -> list[Path]:
+        """The object files that were linked into one, from the build's command files."""
         if path.name not in ("built-in.o", "firmware"):
             return [path]
         text = (path.parent / f".{path.name}.cmd").read_text().splitlines()[0].split(":=", 1)[1]
@@ -154,6 +155,7 @@ def _own_number(elf: Path) -> None:
 
 
 def _run(*command: object) -> None:
+    """Run a command. Raises AirTouchError with its errors if it fails."""
     run = subprocess.run([str(c) for c in command], capture_output=True, text=True)
     if run.returncode:
         raise AirTouchError(f"{command[0]}: {run.stderr[-3000:]}")

@@ -11,8 +11,9 @@ from tools.emulate.board import Board
 START, CLEAR = 0xFF, b"\xff\x00"  #: a frame's first byte; "clear to send"
 STM32, GAP8, APP = 1, 4, 5  #: CPX's targets and function
 LAST = 1 << 6  #: bit of the route: the packet's last part
+#: head of a packet between STM32 and GAP8
 ROUTE = struct.pack("<BB", STM32 | GAP8 << 3 | LAST, APP)
-HEARTBEAT_STEPS = 50
+HEARTBEAT_STEPS = 50  #: steps of 10 ms from one heartbeat of the GAP8 to the next
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,12 @@ class Deck:
         return now
 
     def _alive(self) -> bool:
+        """Whether the GAP8 answers in this step."""
         first, last = self.faults.dead
         return not first <= self._step < last
 
     def _take(self, content: bytes) -> None:
+        """Take bytes from the board and handle each whole CPX packet."""
         self._bytes += content
         while (whole := self._whole()) is not None:
             if whole == CLEAR:
@@ -105,6 +108,7 @@ class Deck:
         return whole
 
     def _packet(self, packet: bytes) -> None:
+        """Pass a packet to the GAP8, with the faults of the link, and send its reply."""
         self.sent.append(packet)
         came = self._on_the_way(packet)
         reply = self._gap8.take(came) if came and self._alive() else b""
@@ -112,11 +116,13 @@ class Deck:
             self._answer(reply)
 
     def _answer(self, packet: bytes) -> None:
+        """Send a reply to the board after the delay of the link, with its faults."""
         came = self._on_the_way(packet)
         if came:
             self._due.append((self._step + self.faults.late, came))
 
     def _on_the_way(self, packet: bytes) -> bytes:
+        """A packet after the link: as it was, with one bit flipped, or empty if it is lost."""
         if self._rng.random() < self.faults.lost:
             return b""
         if self._rng.random() < self.faults.damaged:

@@ -59,7 +59,7 @@ class _Step:
 
 def replay(elf: Path, log: FlightLog, steps: int, faults: Faults) -> Linked:
     """Fly a recorded flight through the emulated firmware with the network on the GAP8."""
-    table, made, found = rows(log)[:steps], [], Linked()
+    table, made, result = rows(log)[:steps], [], Linked()
     board = Board(elf, REPLAY, [f"airtouch.{name}" for name in LOGS], ai_deck=True)
     deck = Deck(board, faults)
     with board:
@@ -74,17 +74,17 @@ def replay(elf: Path, log: FlightLog, steps: int, faults: Faults) -> Linked:
             values = board.values(board.hear("S"))
             made.append(_Step(row, values, deck.taken()))
         board.hear("A")
-        left = board.end()
-    _follow(found, made, deck.sent)
-    found.late, found.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
-    found.console, (found.stack_bytes, found.least_left) = board.console, stack(left)
-    found.link = LINK[int(values["airtouch.link"])]
-    found.health = tuple(name for name, bit in HEALTH.items() if int(values["airtouch.health"]) & bit)
-    found.counters = {name: int(values[f"airtouch.{name}"]) for name in COUNTERS}
-    return found
+        free_words = board.end()
+    _follow(result, made, deck.sent)
+    result.late, result.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
+    result.console, (result.stack_bytes, result.least_left) = board.console, stack(free_words)
+    result.link = LINK[int(values["airtouch.link"])]
+    result.health = tuple(name for name, bit in HEALTH.items() if int(values["airtouch.health"]) & bit)
+    result.counters = {name: int(values[f"airtouch.{name}"]) for name in COUNTERS}
+    return result
 
 
-def _follow(found: Linked, made: list[_Step], sent: list[bytes]) -> None:
+def _follow(result: Linked, made: list[_Step], sent: list[bytes]) -> None:
     """Make the same steps on the desktop, and compare them and the packets.
 
     The board's nonce is in its first packet; that CPX's queue took no packet shows in the next step's `dropped`.
@@ -98,13 +98,13 @@ def _follow(found: Linked, made: list[_Step], sent: list[bytes]) -> None:
         acc, gyro, pwm, volts, attitude = sample(step.row)
         kind = core.step(acc, gyro, pwm, vbat_v=volts, attitude=attitude)
         if kind != EDGES[0]:
-            found.edges.append((i, kind))
-        compare(found, i, step.values, desktop_values(core))
+            result.edges.append((i, kind))
+        compare(result, i, step.values, desktop_values(core))
         after = made[min(i + 1, len(made) - 1)].values
         wanted += core.packets(accepted=after["airtouch.dropped"] == step.values["airtouch.dropped"])
-    found.packets = len(sent)
-    found.other_packets = sum(one != other for one, other in zip(sent, wanted, strict=False))
-    found.kept_packets = len(wanted) - len(sent)
+    result.packets = len(sent)
+    result.other_packets = sum(one != other for one, other in zip(sent, wanted, strict=False))
+    result.kept_packets = len(wanted) - len(sent)
 
 
 def report(elf: Path, log: FlightLog, steps: int) -> bool:

@@ -65,11 +65,11 @@ CASES = (
 
 def cases(only: str = "") -> list[Case]:
     """Those whose names begin so. AirTouchError where none does."""
-    found = [case for case in CASES if case.name.startswith(only)]
-    if not found:
+    cases = [case for case in CASES if case.name.startswith(only)]
+    if not cases:
         raise AirTouchError(f"no case begins with {only!r}; --only is the beginning of one of: "
                             f"{'; '.join(case.name for case in CASES)}")
-    return found
+    return cases
 
 
 def mission(case: Case) -> Scenario:
@@ -115,14 +115,14 @@ class Leg:
 def summary(legs: Sequence[Leg]) -> str:
     """All flights of a case with one setting."""
     late = [delays(leg.crossed, leg.reported) for leg in legs]
-    every, crossed = np.concatenate(late), sum(len(leg.crossed) for leg in legs)
-    false = sum(len(leg.reported) for leg in legs) - len(every)
+    delays, crossed = np.concatenate(late), sum(len(leg.crossed) for leg in legs)
+    false = sum(len(leg.reported) for leg in legs) - len(delays)
     text = (f"{sum(leg.ending == 'ok' for leg in legs)} of {len(legs)} ended well, "
             f"{min(leg.low_m for leg in legs):.2f} to {max(leg.high_m for leg in legs):.2f} m; "
-            f"felt {len(every)} of {crossed}")
-    if len(every):
-        text += (f" ({np.sum(np.abs(every) <= TOLERANCE_S)} within {TOLERANCE_S} s), {every.min():.1f} to "
-                 f"{every.max():.1f} s late")
+            f"felt {len(delays)} of {crossed}")
+    if len(delays):
+        text += (f" ({np.sum(np.abs(delays) <= TOLERANCE_S)} within {TOLERANCE_S} s), {delays.min():.1f} to "
+                 f"{delays.max():.1f} s late")
     return f"{text}; {false} false"
 
 

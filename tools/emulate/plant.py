@@ -13,7 +13,7 @@ from airtouch.simulation.sensors import imu, ranging
 from airtouch.simulation.stepper import Stepper
 from airtouch.vehicle import Vehicle
 
-STEP_S = 0.002
+STEP_S = 0.002  #: s of a step of the simulator
 #: a step's readings: acceleration (m/s^2) and rates (rad/s) of two milliseconds, down range (m, NaN: none), flow counts
 #: forward and left, voltage
 ACC, GYRO, RANGE, FLOW, VOLTS, READINGS = 0, 6, 12, 13, 15, 16

@@ -77,11 +77,11 @@ def sample(row: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, 
 
 def desktop_values(core: AppCore) -> dict[str, float]:
     """Log variable -> value, of the core on the desktop."""
-    found = {}
+    values = {}
     for name, (_, at, element) in LOGS.items():
         value = getattr(core.log, at)
-        found[name] = value if element < 0 else value[element]
-    return found
+        values[name] = value if element < 0 else value[element]
+    return values
 
 
 def differs(name: str, board: float, desktop: float) -> bool:
@@ -102,7 +102,7 @@ def replay(elf: Path, log: FlightLog, steps: int | None = None,
     """
     table, changes = rows(log)[:steps], changes or {}
     names = [f"airtouch.{name}" for name in LOGS]
-    core, found = AppCore(vehicle=vehicles.load(vehicle)), Replay()
+    core, result = AppCore(vehicle=vehicles.load(vehicle)), Replay()
     with Board(elf, REPLAY, names) as board:
         board.ask("W", FED)
         board.go()
@@ -115,20 +115,20 @@ def replay(elf: Path, log: FlightLog, steps: int | None = None,
             acc, gyro, pwm, volts, attitude = sample(row)
             kind = core.step(acc, gyro, pwm, vbat_v=volts, attitude=attitude)
             values = board.values(board.hear("S"))
-            found.loads_us.append(int(values["airtouch.load"]))
+            result.loads_us.append(int(values["airtouch.load"]))
             if kind != EDGES[0]:
-                found.edges.append((step, kind))
-            compare(found, step, values, desktop_values(core))
-        found.late, found.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
-        left = board.end()
-        found.console = board.console
-    found.stack_bytes, found.least_left = stack(left)
-    return found
+                result.edges.append((step, kind))
+            compare(result, step, values, desktop_values(core))
+        result.late, result.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
+        free_words = board.end()
+        result.console = board.console
+    result.stack_bytes, result.least_left = stack(free_words)
+    return result
 
 
-def stack(left: Mapping[str, int]) -> tuple[int, tuple[str, int]]:
+def stack(free_words: Mapping[str, int]) -> tuple[int, tuple[str, int]]:
     """Bytes of the app's stack in use, and the task with the fewest unused words, of what a board's end gives."""
-    return 4 * (APP_STACK_WORDS - left["APP"]), min(left.items(), key=lambda item: item[1])
+    return 4 * (APP_STACK_WORDS - free_words["APP"]), min(free_words.items(), key=lambda item: item[1])
 
 
 def compare(result: Replay, step: int, board: Mapping[str, float], desktop: Mapping[str, float]) -> None:

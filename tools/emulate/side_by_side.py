@@ -90,15 +90,15 @@ def apart(pairs: Sequence[Pair], others: Sequence[np.ndarray] = ()) -> list[Apar
 
     others: more flights of the own loop under other noise, from the same second on. draws is NaN for one flight alone.
     """
-    found = []
+    out = []
     for name, (a, b) in COLUMNS.items():
         emulated, own = [table[:, a] for table, _ in pairs], [table[:, b] for _, table in pairs]
         drawn = own + [table[:, b] for table in others]
         draws = [x[:min(len(x), len(y))] - y[:min(len(x), len(y))] for x, y in combinations(drawn, 2)]
-        found.append(Apart(name, rms([x - y for x, y in zip(emulated, own, strict=True)]),
+        out.append(Apart(name, rms([x - y for x, y in zip(emulated, own, strict=True)]),
                            rms(draws) if draws else np.nan,
                            rms([x - x.mean() for x in emulated]), rms([x - x.mean() for x in own])))
-    return found
+    return out
 
 
 def write_traces(path: Path, one: Flown, own: np.ndarray, force: bool = False) -> None:

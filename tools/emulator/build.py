@@ -91,12 +91,14 @@ def _environment(cache: Path) -> dict[str, str]:
 
 
 def _core(name: str) -> Core:
+    """The core of that name. Raises AirTouchError for an unknown one."""
     if name not in CORES:
         raise AirTouchError(f"no core {name!r}: there are {', '.join(CORES)}")
     return CORES[name]
 
 
 def _compiler(core: str, asked: str | None) -> str:
+    """The compiler to use: the one that is asked for, else that of AIRTOUCH_CROSS, else the first available."""
     there = compilers(core)
     asked = asked or os.environ.get("AIRTOUCH_CROSS") or (there[0] if there else "zig")
     if asked not in there:
@@ -114,12 +116,14 @@ def _commands(core: Core, compiler: str) -> tuple[list[str], list[str]]:
 
 
 def _compiler_version(core: Core, compiler: str) -> str:
+    """The version of a compiler, as text."""
     if compiler == "zig":
         return version("ziglang")
     return subprocess.run([core.gcc, "--version"], capture_output=True, text=True, check=True).stdout
 
 
 def _digest(core: Core, compiler: str, flags: list[str], sources: list[Path], include: list[Path]) -> str:
+    """Hash of everything that a compiled program depends on."""
     headers = [path for folder in include for path in sorted(folder.glob("**/*.h"))]
     text = hashlib.sha256(repr((core, compiler, _compiler_version(core, compiler), flags)).encode())
     for path in [*sources, *headers, *sorted(LIBC.iterdir()), Path(__file__)]:
@@ -155,6 +159,7 @@ def _make(folder: Path, core: Core, compiler: str, flags: list[str], sources: li
 
 
 def _run(command: list, environment: dict[str, str]) -> None:
+    """Run the cross compiler. Raises AirTouchError with its message if it fails."""
     run = subprocess.run([str(c) for c in command], capture_output=True, text=True, env=environment)
     if run.returncode:
         words = (run.stderr or run.stdout).strip()

@@ -22,8 +22,9 @@ from tools.emulator.build import CACHE, build, compilers
 from tools.emulator.flight_code import FlightCode, compile_flight_code, made_flight
 from tools.emulator.machine import Machine
 
-VERSION = "1.10.3"
-CHANNELS, POINTS = 9, 256
+VERSION = "1.10.3"  #: of the package cmsisdsp
+CHANNELS, POINTS = 9, 256  #: transforms of a step, and their length
+#: files of CMSIS-DSP that a real FFT needs
 _TRANSFORM = ("arm_rfft_fast_f32", "arm_rfft_fast_init_f32", "arm_cfft_f32", "arm_cfft_init_f32",
               "arm_cfft_radix8_f32", "arm_bitreversal2")
 _SOURCES = (*(f"Source/TransformFunctions/{name}.c" for name in _TRANSFORM),
@@ -51,13 +52,14 @@ def unpack(sdist: Path | None, folder: Path = CACHE) -> Path:
 
 
 def _download(folder: Path) -> Path:
+    """The source archive of cmsisdsp, downloaded into a folder. Raises AirTouchError without a connection."""
     run = subprocess.run(
         [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--no-binary", "cmsisdsp",
          "--no-build-isolation", "--dest", folder, f"cmsisdsp=={VERSION}"], capture_output=True, text=True)
-    found = list(folder.glob("cmsisdsp-*.tar.gz"))
-    if run.returncode or not found:
+    archives = list(folder.glob("cmsisdsp-*.tar.gz"))
+    if run.returncode or not archives:
         raise AirTouchError(f"cmsisdsp {VERSION} cannot be downloaded: {run.stderr.strip()[-300:]}")
-    return found[0]
+    return archives[0]
 
 
 def fft_instructions(source: Path, compiler: str, optimise: str) -> int:
@@ -82,6 +84,7 @@ def fft_instructions(source: Path, compiler: str, optimise: str) -> int:
 
 
 def main() -> None:
+    """Print instructions of CMSIS-DSP's transforms beside those of one step of the pipeline."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sdist", type=Path, help="the archive, instead of a download")
     source = unpack(parser.parse_args().sdist)

@@ -24,8 +24,9 @@ from tools.emulator import budget
 from tools.emulator.build import compilers
 from tools.emulator.flight_code import KERNELS, Cost, FlightCode, compile_flight_code, made_flight, samples
 
+#: programs that are also counted over recorded flights
 WHOLE = ("edge_pipeline", "stream_detector")
-MARGIN = 1.03
+MARGIN = 1.03  #: a new budget over the measured cost
 
 
 def kernel_inputs(code: FlightCode, flight: np.ndarray) -> dict[str, np.ndarray]:
@@ -69,6 +70,7 @@ def clean_flights(folder: Path) -> list[Path]:
 
 
 def _table(costs: dict[str, Cost], limits: dict[str, Cost]) -> None:
+    """Print the costs of each kernel beside its budget."""
     print(f"{'kernel':20}{'mean':>9}{'worst':>9}{'flash B':>9}{'RAM B':>9}{'stack B':>9}   budget (mean, worst, ...)")
     for name, cost in costs.items():
         numbers = "".join(f"{value:9,.0f}" for value in asdict(cost).values())
@@ -77,6 +79,7 @@ def _table(costs: dict[str, Cost], limits: dict[str, Cost]) -> None:
 
 
 def _toml(core: str, costs: dict[str, Cost]) -> None:
+    """Print the costs with MARGIN as a new budget, rounded up to eight."""
     for name, cost in costs.items():
         print(f"\n[{core}.{name}]")
         for key, value in asdict(cost).items():
@@ -85,16 +88,18 @@ def _toml(core: str, costs: dict[str, Cost]) -> None:
 
 
 def _flights(code: FlightCode, folder: Path) -> None:
+    """Print the instructions of each step over recorded flights."""
     paths = clean_flights(folder)
     for name in WHOLE:
         steps = [code.fly(name, flight_samples(path)) for path in paths]
         ready = np.concatenate([s.instructions[s.ready] for s in steps])
-        every = np.concatenate([s.instructions for s in steps])
-        print(f"{name}: {len(paths)} flights, {every.size:,} steps: mean {ready.mean():,.0f} instructions a step with "
-              f"an output, {every.mean():,.0f} over all, worst {every.max():,}")
+        total = np.concatenate([s.instructions for s in steps])
+        print(f"{name}: {len(paths)} flights, {total.size:,} steps: mean {ready.mean():,.0f} instructions a step with "
+              f"an output, {total.mean():,.0f} over all, worst {total.max():,}")
 
 
 def main() -> None:
+    """Count the instructions and memory of every kernel on one core."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--core", default="cortex-m4", choices=["cortex-m4", "rv32imc"])
     parser.add_argument("--optimise", default="-O2")

@@ -55,6 +55,7 @@ class InstructionCounter:
 
 @cache
 def _hook() -> Any:
+    """The compiled callback that counts the instructions of each block."""
     stop = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)(("uc_emu_stop", binding.uclib))
 
     @cfunc(types.void(types.voidptr, types.uint64, types.uint32, types.voidptr))

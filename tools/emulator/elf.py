@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-ARM, RISCV = 40, 243
-_WRITE, _ALLOC, _EXECUTE = 1, 2, 4
-_NOBITS, _SYMTAB = 8, 2
-_FUNCTION = 2
+ARM, RISCV = 40, 243  #: e_machine
+_WRITE, _ALLOC, _EXECUTE = 1, 2, 4  #: sh_flags
+_NOBITS, _SYMTAB = 8, 2  #: sh_type
+_FUNCTION = 2  #: type of a symbol, low four bits of st_info
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,7 @@ class Elf:
 
 
 def _section_headers(data: bytes) -> list[dict]:
+    """The section headers of an ELF file, as dictionaries with their names."""
     offset, = struct.unpack_from("<I", data, 32)
     size, count, names = struct.unpack_from("<HHH", data, 46)
     fields = ("name", "type", "flags", "address", "offset", "size", "link", "info")
@@ -87,10 +88,12 @@ def _section_headers(data: bytes) -> list[dict]:
 
 
 def _text(data: bytes, start: int) -> str:
+    """The text at a place of a file, up to the next zero byte."""
     return data[start:data.index(b"\0", start)].decode()
 
 
 def _section(data: bytes, header: dict) -> Section:
+    """The section that a header describes."""
     content = b"" if header["type"] == _NOBITS else data[header["offset"]:header["offset"] + header["size"]]
     return Section(header["name"], header["address"], header["size"], content,
                    bool(header["flags"] & _WRITE), bool(header["flags"] & _EXECUTE))
@@ -107,6 +110,7 @@ def _symbol_table(data: bytes, headers: list[dict]) -> Iterator[tuple[str, int, 
 
 
 def _symbols(data: bytes, headers: list[dict], thumb: bool) -> list[Symbol]:
+    """The functions and objects of the symbol table; `thumb`: addresses of functions have a mode bit."""
     symbols = []
     for name, value, size, info, section in _symbol_table(data, headers):
         function = info & 15 == _FUNCTION

@@ -134,6 +134,7 @@ class FlightCode:
 
 
 def _rows(inputs: np.ndarray, takes: np.dtype) -> bytes:
+    """The inputs as the bytes that the C function reads."""
     if takes.names:
         return np.ascontiguousarray(inputs, dtype=takes).tobytes()
     return np.ascontiguousarray(inputs, dtype=takes.base).tobytes()

@@ -19,11 +19,11 @@ from airtouch.errors import AirTouchError
 from tools.emulator.counter import InstructionCounter
 from tools.emulator.elf import ARM, Elf
 
-PAGE = 4096
+PAGE = 4096                 #: bytes of a page of the emulator's memory
 STACK_TOP = 0x3000_0000     #: a region of its own, so that running over its end is a fault
 HEAP = 0x6000_0000          #: where `allocate` gives out memory
 RETURN = 0x1F00_0000        #: what a called function returns to; a Cortex-M runs no code above 0x2000_0000
-PAINT = 0xA5
+PAINT = 0xA5                #: byte that fills the stack, so that its deepest use can be read
 LIMIT = 50_000_000          #: instructions a call may take unless told otherwise
 
 
@@ -40,6 +40,7 @@ class Call(NamedTuple):
 
 @dataclass(frozen=True)
 class _Registers:
+    """Unicorn's numbers of the registers that a call uses."""
     arguments: tuple[int, ...]
     floats: tuple[int, ...]  #: empty: floats travel as integers
     stack: int
@@ -77,6 +78,7 @@ class Machine:
         self.reset()
 
     def _open(self) -> Uc:
+        """A new Unicorn of this core."""
         if not self._is_arm:
             return Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32)
         uc = Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
@@ -175,6 +177,7 @@ class Machine:
         self._uc.mem_write(self._at(where), bytes(data))
 
     def _at(self, where: int | str) -> int:
+        """The address of a symbol, or the address itself."""
         return self.address(where) if isinstance(where, str) else where
 
     def paint_stack(self) -> None:

@@ -25,9 +25,12 @@ from tools.emulator.machine import RETURN, STACK_TOP, EmulationError, Machine
 
 BARRIER = RETURN + 16    #: a function that does nothing; what a team is given as its barrier
 BARRIER_CYCLES = 20      #: two instructions and the event unit, rounded up
-_CORE_STACK = 4096
+_CORE_STACK = 4096       #: bytes of stack of each core
+#: registers x0 to x31
 _X = [riscv.UC_RISCV_REG_X0 + i for i in range(32)]
+#: major opcodes, bits 0 to 6 of an instruction
 _LOADS, _BRANCH, _JUMPS = (0x03,), 0x63, (0x6F, 0x67)
+#: opcodes of the groups of xpulp instructions
 _ALU, _POST_LOAD, _SIMD, _ROUND = 0x2B, 0x0B, 0x7B, 0x5B
 
 

@@ -18,6 +18,7 @@ def table(columns: dict[str, np.ndarray], comments: str = "") -> bytes:
 
 
 def _flying(n: int, **changed: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of a flight of n samples, some of them replaced."""
     return {**si_columns(motion(n, 0.01, 0)), **changed}
 
 

@@ -76,10 +76,12 @@ def rows(data: bytes, r: Random) -> bytes:
 
 
 def _cells(data: bytes) -> list[list[bytes]]:
+    """The cells of a CSV file, by line."""
     return [line.split(b",") for line in data.split(b"\n")]
 
 
 def _join(table: list[list[bytes]]) -> bytes:
+    """The CSV file of cells."""
     return b"\n".join(b",".join(row) for row in table)
 
 
@@ -119,6 +121,7 @@ def numbers(data: bytes, r: Random) -> bytes:
 
 
 def _scaled(cell: bytes, scale: float, shift: float) -> bytes:
+    """A cell's number times a scale plus a shift; any other cell as it is."""
     try:
         return b"%r" % (float(cell) * scale + shift)
     except ValueError:

@@ -59,6 +59,7 @@ def _column(values: list, r: Random) -> pa.Array:
 
 
 def _written(names: list[str], arrays: list[pa.Array], meta: bytes | None, r: Random) -> bytes:
+    """A Parquet file of these columns, with random settings of the writer."""
     table = pa.Table.from_arrays(arrays, names=names)
     if meta is not None:
         table = table.replace_schema_metadata({b"airtouch": meta})

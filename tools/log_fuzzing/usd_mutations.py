@@ -52,6 +52,7 @@ class Log:
 
 
 def _text(data: bytes, place: int) -> tuple[bytes, int]:
+    """The zero-terminated text at a place, and the place after it."""
     end = data.index(b"\0", place)
     return data[place:end], end + 1
 

@@ -23,8 +23,9 @@ from airtouch.logs.formats.thrust_stand import read_thrust_stand
 
 importlib.import_module("scipy.signal")  # its import counts for no input
 
+#: Hz to which a log is resampled
 RATES = (100.0, 100.0, 50.0, 7.3, 250.0, 1000.0, 10000.0)
-LONGEST_MESSAGE = 450
+LONGEST_MESSAGE = 450  #: characters of an error or warning, beside the file's name
 T = TypeVar("T")
 
 
@@ -75,6 +76,7 @@ def command(arguments: list[str], path: Path) -> None:
 
 
 def _or_refusal(act: Callable[[], T], source: str) -> T | None:
+    """The result of `act`, or None if it refuses with a well-formed AirTouchError."""
     try:
         return act()
     except AirTouchError as error:
