@@ -1,0 +1,197 @@
+"""What tests with more knowledge than the diagnosis reach on CrazyPAD: how far its goals can be reached at all.
+
+    python tools/gap_crazypad_ideal.py [FOLDER] [--part build|all]
+
+Every flight is described by 63 numbers relative to the mean of the drone's other normal flights: hover balance,
+unsteadiness, heave and corrections of `hover_balance`, the voltage, thrust told to each rotor, and spectra of
+commands and accelerations in seven bands. Four learners (a discriminant on the balance, one on all numbers, a forest,
+the nearest flight) are told the labels of (1) all other conditions of both drones, (2) all other flights, those of the same
+condition too, (3) the other drone. The diagnosis is told none. That several are tried and the best may be read favours
+these tests. Intervals resample conditions within families. What the balance alone can tell: `gap_crazypad_balance.py`.
+"""
+
+import argparse
+import csv
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np
+from scipy.signal import welch
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
+from sklearn.linear_model import Ridge
+from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+import gap_crazypad as pad
+from airtouch import vehicle as vehicles
+from airtouch.gap.balance import hover_balance
+from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
+from airtouch.logs import read
+
+BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
+BALANCE = slice(0, 4)  #: lift, roll, pitch, yaw, the first numbers of a flight
+TREES = 300
+RIDGE = 10.0  #: of standardised numbers
+
+
+@dataclass(frozen=True)
+class Table:
+    """Flights with their labels.
+
+    rows: the manifest's; numbers (flights, k): relative to the drone's other normal flights, the balance first.
+    """
+
+    rows: list[dict[str, str]]
+    numbers: np.ndarray
+
+    @property
+    def drone(self) -> np.ndarray:
+        return np.array([r["drone"] for r in self.rows])
+
+    @property
+    def family(self) -> np.ndarray:
+        return np.array([pad.family(r["condition"]) for r in self.rows])
+
+    @property
+    def pair(self) -> np.ndarray:
+        """Condition and drone."""
+        return np.array([f"{r['drone']} {r['condition']}" for r in self.rows])
+
+    @property
+    def rotors(self) -> np.ndarray:
+        """Damaged rotors as a text, empty for none."""
+        return np.array(["".join(map(str, pad.rotors(r["condition"]))) for r in self.rows])
+
+    @property
+    def cut_mm(self) -> np.ndarray:
+        return np.array([np.nan_to_num(pad.cut_mm(r["condition"])) for r in self.rows])
+
+
+def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
+    """Numbers (k,) of one flight: `hover_balance.pattern`, voltage, thrust of each rotor, log10 of band powers."""
+    weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
+    thrust, voltage = vehicle.thrust(flight.pwm) / weight, flight.log["vbat_V"]
+    levels, spectra = [], []
+    for first, last in hover_balance._hovers(flight):
+        mixed = thrust[first:last] @ hover_balance.MIX.T
+        told = np.nanmean(voltage[first:last])
+        slope = np.polyfit(np.arange(last - first) * PERIOD_S, np.nan_to_num(voltage[first:last], nan=told), 1)[0]
+        levels.append([told, slope, *np.log(thrust[first:last].mean(axis=0))])
+        signals = np.column_stack([mixed / mixed[:, :1].mean(), flight.acceleration[first:last]])
+        f, p = welch(signals, 1.0 / PERIOD_S, nperseg=256, axis=0)
+        spectra.append([np.log10(p[(f >= a) & (f < b)].mean(axis=0))
+                        for a, b in zip(BANDS_HZ[:-1], BANDS_HZ[1:], strict=True)])
+    return np.concatenate([hover_balance.pattern(flight, vehicle), np.mean(levels, axis=0),
+                           np.mean(spectra, axis=0).ravel()])
+
+
+def table_of(folder: Path, part: str) -> Table:
+    """All flights, or those on which numbers may be chosen."""
+    rows = list(csv.DictReader((folder / "manifest.csv").open()))
+    rows = [r for r, built in zip(rows, pad.building(rows), strict=True) if built or part == "all"]
+    vehicle = vehicles.load("crazyflie-2.1")
+    raw = np.array([described(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
+    drone = np.array([r["drone"] for r in rows])
+    normal = np.array([pad.family(r["condition"]) == "normal" for r in rows])
+    own = np.arange(len(rows))
+    base = [raw[normal & (drone == drone[i]) & (own != i)].mean(axis=0) for i in own]
+    return Table(rows, raw - np.array(base))
+
+
+LEARNERS: dict[str, Callable] = {
+    "discriminant on the balance": lambda labels: LinearDiscriminantAnalysis(
+        solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
+    "discriminant on all numbers": lambda labels: LinearDiscriminantAnalysis(
+        solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
+    "forest on all numbers": lambda labels: RandomForestClassifier(
+        TREES, class_weight="balanced_subsample", random_state=0),
+    "nearest flight, all numbers": lambda labels: KNeighborsClassifier(1)}
+MEASURES: dict[str, Callable] = {
+    "discriminant on the balance": lambda: Ridge(1.0), "discriminant on all numbers": lambda: Ridge(RIDGE),
+    "forest on all numbers": lambda: RandomForestRegressor(TREES, random_state=0),
+    "nearest flight, all numbers": lambda: KNeighborsRegressor(1)}
+
+
+def judged(table: Table, folds: list[np.ndarray], learner: str) -> list[dict]:
+    """Every flight with what a learner says that was told the labels of all flights outside its fold, as a case."""
+    x = table.numbers[:, BALANCE] if learner.endswith("the balance") else table.numbers
+    out: list[dict] = [{} for _ in table.rows]
+    for fold in folds:
+        told = ~fold
+        said = {}
+        for what, labels in (("family", table.family), ("rotors", table.rotors)):
+            use = told & (table.family == "rotor damage") if what == "rotors" else told
+            if len(set(labels[use])) == 1:
+                said[what] = np.full(fold.sum(), labels[use][0])
+                continue
+            model = make_pipeline(StandardScaler(), LEARNERS[learner](labels[use]))
+            said[what] = model.fit(x[use], labels[use]).predict(x[fold])
+        cut = make_pipeline(StandardScaler(), MEASURES[learner]()).fit(x[told], table.cut_mm[told]).predict(x[fold])
+        for i, family, rotors, mm in zip(np.flatnonzero(fold), said["family"], said["rotors"], cut, strict=True):
+            out[i] = {**table.rows[i], **_case(family, rotors, mm)}
+    return out
+
+
+def _case(family: str, rotors: str, mm: float) -> dict:
+    """What a learner says in the form of a diagnosis; millimetres stand for the loss of thrust."""
+    if family == "normal":
+        return {"verdict": "none", "effects": []}
+    if family != "rotor damage":
+        return {"verdict": "effect", "effects": [{"name": "mass" if family == "added weight" else "slung_load"}]}
+    return {"verdict": "effect", "effects": [
+        {"name": "weak_motor", "parameters": {"rotor": {"value": int(r)}, "thrust_loss": {"value": mm / len(rotors)}}}
+        for r in rotors]}
+
+
+def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
+    """One line for each learner: the figures of `gap_crazypad` with their 90 % intervals."""
+    print(f"\n{part}\n| test | family, balanced | of damage, right | exact rotors | severity, Spearman |\n"
+          "|---|---|---|---|---|")
+    for learner in LEARNERS:
+        cases = judged(table, folds, learner)
+        shown = []
+        for figure in (pad.balanced, _damage_right, pad.named, pad.severity):
+            low, high = pad.interval(cases, figure)
+            shown.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
+        print(f"| {learner} | " + " | ".join(shown) + " |", flush=True)
+
+
+def _damage_right(cases: list[dict]) -> float:
+    right = [pad.answer(c)[0] == "rotor damage" for c in cases if pad.family(c["condition"]) == "rotor damage"]
+    return float(np.mean(right)) if right else float("nan")
+
+
+def show_distinct(table: Table) -> None:
+    """How often the nearest other flight of a drone is of the same condition."""
+    x = StandardScaler().fit_transform(table.numbers)
+    for text, numbers in (("balance", x[:, BALANCE]), ("all numbers", x)):
+        hits = []
+        for i in range(len(x)):
+            others = np.flatnonzero((table.drone == table.drone[i]) & (np.arange(len(x)) != i))
+            nearest = others[np.argmin(((numbers[others] - numbers[i]) ** 2).sum(axis=1))]
+            hits.append(table.pair[nearest] == table.pair[i])
+        print(f"nearest other flight of the drone is of the same condition, {text}: {np.mean(hits):.2f} of {len(x)}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path,
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
+    parser.add_argument("--part", choices=("build", "all"), default="build")
+    options = parser.parse_args()
+    table = table_of(options.folder, options.part)
+    pairs, n = sorted(set(table.pair)), len(table.rows)
+    print(f"{n} flights, {len(pairs)} conditions of a drone, {table.numbers.shape[1]} numbers")
+    show_learners(table, "(1) told all other conditions", [table.pair == p for p in pairs])
+    show_learners(table, "(2) told all other flights", [np.arange(n) == i for i in range(n)])
+    show_distinct(table)
+    show_learners(table, "(3) told the other drone", [table.drone == d for d in sorted(set(table.drone))])
+
+
+if __name__ == "__main__":
+    main()
