@@ -14,7 +14,8 @@ scatter in the building conditions. Then
 import argparse
 import csv
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import permutations
 from pathlib import Path
 
@@ -118,31 +119,69 @@ def _rivals(cut: dict[int, float]) -> Iterator[dict[int, float]]:
         yield dict(zip(rotors, cut.values(), strict=True))
 
 
-def show_rotor(b: Balances) -> None:
-    """What the balance says of which rotor was cut, to a test that is told the rest."""
-    table, generator = [], np.random.default_rng(0)
+@dataclass(frozen=True)
+class Told:
+    """A condition as a test of the rotor sees it.
+
+    small: whether the cut changes less than two sets of propellers differ; expected: share right, if what is left is
+    normal; sides, hits (flights,): whether the change is to the predicted side, the rotors right; mm (flights,): of
+    the cut, as measured.
+    """
+
+    pair: Condition
+    small: bool
+    expected: float
+    sides: np.ndarray
+    hits: np.ndarray
+    mm: np.ndarray
+
+
+def rotor_tests(b: Balances) -> list[Told]:
+    """Each condition with cut blades, change and scatter fitted to the others."""
+    out, generator = [], np.random.default_rng(0)
     for k, (pair, cut) in enumerate(zip(b.pairs, b.cuts, strict=True)):
         rest = np.arange(len(b.pairs)) != k
         found, left = fitted(b.means[rest], [c for c, r in zip(b.cuts, rest, strict=True) if r])
         whiten = np.linalg.inv(np.linalg.cholesky(left.T @ left / (rest.sum() - 2))).T
         rivals = np.array([change(c, *found) for c in _rivals(cut)]) @ whiten
         right, true = np.array([set(c) == set(cut) for c in _rivals(cut)]), change(cut, *found) @ whiten
-        drawn = true + generator.standard_normal((DRAWS, 4))
-        own = b.own(pair) @ whiten
-        table.append((pair, len(own), right[_nearest(own, rivals)].sum(), right[_nearest(drawn, rivals)].mean(),
-                      true @ true < 2.0 * len(true), (own @ true > 0.0).sum(),
-                      own @ true / (true @ true) * sum(cut.values())))
+        drawn, own = true + generator.standard_normal((DRAWS, 4)), b.own(pair) @ whiten
+        out.append(Told(pair, bool(true @ true < 2.0 * len(true)), float(right[_nearest(drawn, rivals)].mean()),
+                        own @ true > 0.0, right[_nearest(own, rivals)], own @ true / (true @ true) * sum(cut.values())))
+    return out
+
+
+def show_rotor(tests: list[Told]) -> None:
+    """What the balance says of which rotor was cut, to a test that is told the rest."""
     print("\n| cut | flights | the cut changes less than two sets of propellers differ | changed to the predicted "
           "side | exact rotors, told their number and the mm | expected of these | severity, told the rotors |\n"
           "|---|---|---|---|---|---|---|")
     for text, large in (("all", False), ("at least 1.5 mm off a rotor", True)):
-        some = [t for t in table if not large or pad.large(t[0][1])]
-        n, hits = sum(t[1] for t in some), sum(t[2] for t in some)
-        told = [(mm, pad.cut_mm(t[0][1])) for t in some for mm in t[6]]
-        print(f"| {text} | {n} | {sum(t[1] for t in some if t[4])} | {sum(t[5] for t in some)} | {hits} = {hits / n:.2f}"
-              f" | {sum(t[1] * t[3] for t in some) / n:.2f} | {spearmanr(*zip(*told, strict=True)).statistic:.2f} |")
-    for pair, n, hits, expected, small, *_ in table:
-        print(f"  {' '.join(pair):55s} {hits} of {n}, expected {expected:.2f}{', small' if small else ''}")
+        some = [t for t in tests if not large or pad.large(t.pair[1])]
+        flights = sum(len(t.hits) for t in some)
+        small, sides = sum(len(t.hits) for t in some if t.small), sum(int(t.sides.sum()) for t in some)
+        expected = sum(t.expected * len(t.hits) for t in some) / flights
+        print(f"| {text} | {flights} | {small} | {sides} | {_shown(some, _right)} | {expected:.2f} | "
+              f"{_shown(some, _severity)} |")
+    for t in tests:
+        print(f"  {' '.join(t.pair):55s} {t.hits.sum()} of {len(t.hits)}, expected {t.expected:.2f}"
+              f"{', small' if t.small else ''}")
+
+
+def _right(some: Sequence[Told]) -> float:
+    return float(np.concatenate([t.hits for t in some]).mean())
+
+
+def _severity(some: Sequence[Told]) -> float:
+    true = np.concatenate([np.full(len(t.mm), pad.cut_mm(t.pair[1])) for t in some])
+    return float(spearmanr(np.concatenate([t.mm for t in some]), true).statistic)
+
+
+def _shown(some: Sequence[Told], figure: Callable[[Sequence[Told]], float]) -> str:
+    """A figure with its 90 % interval, conditions resampled."""
+    drawn = np.random.default_rng(0).integers(0, len(some), (pad.RESAMPLES, len(some)))
+    low, high = np.nanpercentile([figure([some[i] for i in row]) for row in drawn], (5, 95))
+    return f"{figure(some):.2f} ({low:.2f} to {high:.2f})"
 
 
 def _nearest(seen: np.ndarray, rivals: np.ndarray) -> np.ndarray:
@@ -195,7 +234,7 @@ def main() -> None:
     options = parser.parse_args()
     balances = Balances(options.folder, options.part)
     show_scatter(balances)
-    show_rotor(balances)
+    show_rotor(rotor_tests(balances))
     show_family(balances)
 
 

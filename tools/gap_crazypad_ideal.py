@@ -5,9 +5,10 @@
 Every flight is described by 63 numbers relative to the mean of the drone's other normal flights: hover balance,
 unsteadiness, heave and corrections of `hover_balance`, the voltage, thrust told to each rotor, and spectra of
 commands and accelerations in seven bands. Four learners (a discriminant on the balance, one on all numbers, a forest,
-the nearest flight) are told the labels of (1) all other conditions of both drones, (2) all other flights, those of the same
-condition too, (3) the other drone. The diagnosis is told none. That several are tried and the best may be read favours
-these tests. Intervals resample conditions within families. What the balance alone can tell: `gap_crazypad_balance.py`.
+the nearest flight) are told the labels of (1) all other conditions of both drones, (2) all other flights, those of the
+same condition too, (3) the other drone. The diagnosis is told none. That several are tried and the best may be read
+favours these tests. Intervals resample conditions within families. What the balance alone can tell:
+`gap_crazypad_balance.py`.
 """
 
 import argparse

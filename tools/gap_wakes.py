@@ -1,0 +1,153 @@
+"""How many of neural-swarm's flights under another vehicle a test sees that is told when it was under it.
+
+    python tools/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]
+
+The seconds come from the other vehicles' own logs, where the data hold a cut of the same time: another vehicle within
+0.15 m sideways and 0.1 to 0.6 m above, as the data's labels say. In these seconds against the rest of the flight: the
+mean force along z, the power of that force above 1 Hz, and the power of the yaw torque from 2 to 20 Hz. The same
+three are taken of nominal flights of the same vehicle and kind of flying, in the same seconds shifted along the flight
+by each half second. A flight is seen where one of the three is beyond all but a third of one per cent of these, which
+makes 1 % false alarms. --answers: what `gap_real.py --keep` wrote, to print what the diagnosis says beside it.
+build: days 19 and 20.
+"""
+
+import argparse
+import csv
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from airtouch import vehicle as vehicles
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
+from airtouch.gap.sealed.blind_score import wilson
+from airtouch.gap.signals.channels import residual
+from airtouch.logs import read
+
+SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
+LEAST_S = 0.5  #: under another vehicle that the data must show
+STEP_S = 0.5  #: by which the seconds are shifted along nominal flights
+FALSE_ALARMS = 0.01
+FORCE_HZ, YAW_HZ = 1.0, (2.0, 20.0)
+BUILD_DAYS = ("19", "20")
+MEASURES = ("mean force", "its shaking", "yaw torque")
+
+
+@dataclass(frozen=True)
+class Track:
+    """A cut of a log: force along z (n,) over gravity and its fast part, fast yaw torque (n,), what counts (n,)."""
+
+    row: dict[str, str]
+    place: np.ndarray  #: x, y, z, m
+    force: np.ndarray
+    shaking: np.ndarray
+    yaw: np.ndarray
+    usable: np.ndarray
+
+    @property
+    def start_s(self) -> float:
+        return float(self.row["start_s"])
+
+
+def track(folder: Path, row: dict[str, str]) -> Track:
+    """One cut, made ready."""
+    vehicle = vehicles.load(folder / f"{row['vehicle']}.toml")
+    flight: Flight = ready(read(folder / "flights" / row["file"]), vehicle)
+    left = np.nan_to_num(residual(flight, vehicle))
+    usable = flight.usable & ~flight.bridged & (flight.phase != GROUND)
+    force = np.where(usable, left[:, 2], 0.0) / vehicle.gravity_mps2
+    fast = sosfiltfilt(butter(2, FORCE_HZ, "highpass", fs=1.0 / PERIOD_S, output="sos"), force)
+    yaw = sosfiltfilt(butter(2, YAW_HZ, "bandpass", fs=1.0 / PERIOD_S, output="sos"), np.where(usable, left[:, 5], 0.0))
+    place = np.column_stack([flight.log[name] for name in ("x_m", "y_m", "z_m")])
+    return Track(row, place, force, fast, yaw, usable)
+
+
+def under(one: Track, other: Track) -> np.ndarray:
+    """Samples (n,) at which another vehicle is above; False where its cut does not reach."""
+    shift = round((one.start_s - other.start_s) / PERIOD_S)
+    place = np.full_like(one.place, np.nan)
+    index = np.arange(len(place)) + shift
+    there = (index >= 0) & (index < len(other.place))
+    place[there] = other.place[index[there]]
+    apart = place - one.place
+    return (np.hypot(apart[:, 0], apart[:, 1]) < SIDEWAYS_M) & (apart[:, 2] > ABOVE_M[0]) & (apart[:, 2] < ABOVE_M[1])
+
+
+def measures(t: Track, acts: np.ndarray) -> np.ndarray:
+    """The three MEASURES (3,) of the samples that act over those that do not; the mean force downwards is positive."""
+    here, rest = acts & t.usable, ~acts & t.usable
+    def over(x: np.ndarray) -> float:
+        return float(np.log(np.mean(x[here] ** 2) / np.mean(x[rest] ** 2)))
+    return np.array([t.force[rest].mean() - t.force[here].mean(), over(t.shaking), over(t.yaw)])
+
+
+def chance(acts: np.ndarray, nominal: list[Track]) -> np.ndarray:
+    """MEASURES (shifts, 3) of nominal flights at the same seconds, shifted around each flight."""
+    out, step = [], int(STEP_S / PERIOD_S)
+    for t in nominal:
+        n = len(t.force)
+        own = np.resize(acts, n) if len(acts) < n else acts[:n]
+        for shift in range(0, n, step):
+            moved = np.roll(own, shift)
+            if (moved & t.usable).sum() * PERIOD_S > 0.5 * LEAST_S:
+                out.append(measures(t, moved))
+    return np.array(out)
+
+
+def overhead(one: Track, tracks: list[Track]) -> np.ndarray:
+    """Samples (n,) at which any vehicle of the same flight is above, as far as the data hold its path."""
+    folder, name = one.row["flight"].rsplit("/", 1)
+    number = name.split("_")[1]
+    same = [t for t in tracks if t.row["cf"] != one.row["cf"] and t.row["flight"].rsplit("/", 1)[0] == folder
+            and t.row["flight"].rsplit("_", 1)[1] == number]
+    return np.logical_or.reduce([np.zeros(len(one.place), bool), *(under(one, t) for t in same)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("flights", nargs="?", type=Path,
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
+    parser.add_argument("--part", choices=("build", "all"), default="build")
+    parser.add_argument("--answers", type=Path)
+    options = parser.parse_args()
+    folder = options.flights / "neuralswarm"
+    rows = [r for name in ("manifest.csv", "baselines.csv") for r in csv.DictReader((folder / name).open())]
+    rows = [r for r in rows if options.part == "all" or r["day"] in BUILD_DAYS]
+    tracks = [track(folder, r) for r in rows if r.get("truth") != "ground_effect"]
+    nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
+    said = {}
+    if options.answers:
+        for case in map(json.loads, options.answers.read_text().splitlines()):
+            said[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
+    table: dict[str, list[bool]] = {}
+    unknown = 0
+    print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
+    for t in (t for t in tracks if t.row.get("truth") == "downwash"):
+        acts = overhead(t, tracks)
+        seconds = (acts & t.usable).sum() * PERIOD_S
+        if seconds < LEAST_S:
+            unknown += 1
+            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
+                  f"{said.get(t.row['file'], '')} |")
+            continue
+        like = [n for n in nominal if (n.row["vehicle"], n.row["manoeuvre"]) == (t.row["vehicle"], t.row["manoeuvre"])]
+        usual = chance(acts, like)
+        limit = np.quantile(usual, 1.0 - FALSE_ALARMS / len(MEASURES), axis=0)
+        mine = measures(t, acts)
+        seen = bool((mine > limit).any())
+        table.setdefault(t.row["vehicle"], []).append(seen)
+        shown = " | ".join(f"{m:.2f} ({u:.2f})" for m, u in zip(mine, limit, strict=True))
+        print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {shown} | {'yes' if seen else 'no'} | "
+              f"{said.get(t.row['file'], '')} |", flush=True)
+    for vehicle, hits in table.items():
+        share = wilson(sum(hits), len(hits))
+        print(f"{vehicle}: seen {sum(hits)} of {len(hits)} [{share['low']:.0%}, {share['high']:.0%}]")
+    print(f"{unknown} more, whose other vehicle's path the data do not hold")
+
+
+if __name__ == "__main__":
+    main()
