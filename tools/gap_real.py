@@ -21,9 +21,9 @@ import os
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -38,6 +38,7 @@ from airtouch.gap.result import Diagnosis
 from airtouch.gap.sealed.blind import interchangeable
 from airtouch.gap.sealed.blind_score import wilson
 from airtouch.logs import read
+from airtouch.logs.flight_log import FlightLog
 from gap_authors import questions
 from gap_peers import NAMES
 
@@ -61,6 +62,7 @@ class Case:
     flight: str
     baseline: tuple[str, ...]
     condition: str = ""
+    partner: tuple[tuple[str, float], ...] = ()  #: logs of other vehicles, and when they begin after this flight, s
 
 
 def authors(folder: Path, part: str) -> Iterator[Case]:
@@ -88,6 +90,31 @@ def swarm(folder: Path, part: str) -> Iterator[Case]:
         if _wanted(part, r["day"] in BUILD_DAYS):
             yield Case("swarm", r["truth"], str(own / f"{r['vehicle']}.toml"), str(own / "flights" / r["file"]),
                        tuple(base[r["group"]]), r["vehicle"])
+
+
+def with_partners(cases: Iterable[Case], folder: Path) -> list[Case]:
+    """Cases of neural-swarm with the paths of other vehicles, as far as the data hold cuts of the same time."""
+    own = folder / "neuralswarm"
+    cuts = {r["file"]: r for name in ("manifest.csv", "baselines.csv") for r in csv.DictReader((own / name).open())}
+
+    def flown(r: dict[str, str]) -> tuple[str, str]:
+        day, name = r["flight"].rsplit("/", 1)
+        return day, name.split("_")[1]
+
+    out = []
+    for case in cases:
+        mine = cuts.get(Path(case.flight).name)
+        others = [] if mine is None else [r for r in cuts.values() if flown(r) == flown(mine) and r["cf"] != mine["cf"]]
+        out.append(replace(case, partner=tuple(
+            (str(own / "flights" / r["file"]), float(r["start_s"]) - float(mine["start_s"])) for r in others if mine
+            and float(r["start_s"]) < float(mine["stop_s"]) and float(mine["start_s"]) < float(r["stop_s"]))))
+    return out
+
+
+def _later(path: str, seconds: float) -> FlightLog:
+    """A log whose clock begins later by so many seconds."""
+    log = read(path)
+    return FlightLog({**log.columns, "t_s": log["t_s"] + seconds}, log.meta)
 
 
 def nominal(folder: Path, part: str) -> Iterator[Case]:
@@ -157,7 +184,8 @@ def answered(case: Case) -> dict:
            "baseline": len(case.baseline), "effects": []}
     try:
         told = diagnose([read(case.flight)], vehicles.load(case.vehicle), [read(b) for b in case.baseline],
-                        before=_LAST.get((case.vehicle, case.baseline)))
+                        before=_LAST.get((case.vehicle, case.baseline)),
+                        partner=[_later(*p) for p in case.partner])
     except AirTouchError as error:
         return {**out, "verdict": "refused", "why": str(error)}
     _LAST.clear()
@@ -232,6 +260,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rows", nargs="+", choices=sorted(ROWS), default=USUAL)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--keep", type=Path, help="JSON lines; cases that it holds are not diagnosed again")
+    parser.add_argument("--partner", action="store_true",
+                        help="give neural-swarm's flights the paths of other vehicles that the data hold")
     parser.add_argument("--quick", action="store_true",
                         help=f"fails where more than {QUICK_WRONG} of its flights are wrong")
     args = parser.parse_args(arguments)
@@ -239,6 +269,8 @@ def main(arguments: list[str] | None = None) -> int:
         cases = quick([c for row in USUAL for c in ROWS[row](args.flights, "view" if row == "peers" else "build")])
     else:
         cases = [c for row in args.rows for c in ROWS[row](args.flights, args.part)]
+    if args.partner:
+        cases = with_partners(cases, args.flights)
     done = {}
     if args.keep and args.keep.exists():
         done = {(c["row"], c["flight"]): c for c in map(json.loads, args.keep.read_text().splitlines())}

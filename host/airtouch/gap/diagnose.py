@@ -15,6 +15,7 @@ from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.overhead import told, told_seconds
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
@@ -39,15 +40,16 @@ WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bia
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
              progress: Callable[[str], None] | None = None, without: Iterable[str] = (),
-             pictures: bool = False, before: Diagnosis | None = None) -> Diagnosis:
+             pictures: bool = False, before: Diagnosis | None = None, partner: Sequence[FlightLog] = ()) -> Diagnosis:
     """Name the unmodelled effect that the flights have in common and how much of the gap it is.
 
     flights: one or more; what they share is looked for. baseline: flights declared free of
     unmodelled effects, on which the vehicle is calibrated and the floor is measured; without
     them the floor is the sensors' declared noise and the command view is left out. without:
     names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
-    diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. Raises
-    AirTouchError when no flight can be used.
+    diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. partner: logs of
+    other vehicles in the air with one flight, on its clock and in its frame; where one is overhead, a wake is judged in
+    these seconds. Raises AirTouchError when no flight can be used, or for a partner of several flights.
     """
     say, without = progress or (lambda _: None), tuple(without)
     left_out: list[str] = []
@@ -64,6 +66,14 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         study, fitted = calibrate.calibrated(vehicle, nominal, without=without) if nominal \
             else (calibrate.declared(vehicle, ()), None)
     some = _some(seen)
+    held = (study, fitted)
+    if partner:
+        if len(flights) != 1:
+            raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
+        seconds = told_seconds(flights[0], partner)
+        study = told(study, seen[0], nominal, seconds)
+        left_out.append(f"the other vehicle was overhead for {sum(b - a for a, b in seconds):.1f} s" if seconds
+                        else "the other vehicle was never overhead")
     data = _data(study, some)
     selection, gap_cells = _selected(data, without, say)
     say("how far")
@@ -91,7 +101,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         measure.cannot_of([f.cannot for f in seen]), tuple(f.name for f in seen),
         tuple(unexplained(study, some, selection, cells)) if verdict == "unknown" else (), made, first, steps,
         vehicle.name, tuple(f.name for f in nominal), fitted.parameters if fitted else {},
-        picture.of(study, seen, nominal, named, first, cells) if pictures else None, (study, fitted))
+        picture.of(study, seen, nominal, named, first, cells) if pictures else None, held)
 
 
 def brief(study: Study, flights: Sequence[Flight], without: Iterable[str] = (), data: Data | None = None) -> Diagnosis:
@@ -129,7 +139,8 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
     """
     selection = select(data, candidates.all_candidates(without), say, without)
     cells = cells_of(data, selection.parts, selection.chosen)
-    of_loop, passing = _of_the_loop(data, selection), _comes_and_goes(selection)
+    of_loop = _of_the_loop(data, selection)
+    passing = _comes_and_goes(selection) and not data.study.overhead  # seconds that are known are no gust's
     if data.study.recorded and (of_loop or passing):
         gap = shrink_of(data, selection.parts, selection.chosen, cells)
         if gap.share.value < LOOP_SHARE and (of_loop or gap.before > STANDS_OUT):

@@ -22,21 +22,27 @@ from airtouch.errors import AirTouchError
 @click.option("--without", multiple=True, metavar="EFFECT", help="Exclude a candidate; may be repeated.")
 @click.option("--effects-file", "--effect-file", "effect_files", multiple=True, metavar="FILE",
               help="Python file with effects of your own; may be repeated.")
+@click.option("--partner", multiple=True, metavar="LOG",
+              help="Log of another vehicle in the air with REAL, of one clock and frame; may be repeated.")
 @click.option("--each", is_flag=True, help="Diagnose each flight alone.")
 def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
                      report: Path | None, json_path: Path | None, dask: str | None, force: bool,
-                     without: tuple[str, ...], effect_files: tuple[str, ...], each: bool) -> None:
+                     without: tuple[str, ...], effect_files: tuple[str, ...], partner: tuple[str, ...],
+                     each: bool) -> None:
     """Find the unmodelled effect that REAL flights have in common, and the part of the gap that it explains.
 
     REAL and --baseline are log files, folders or patterns; give REAL first. One flight is enough. With
-    --baseline, nominal flights of the same vehicle, weaker effects are found. Prints where the gap lies, which
-    effect causes it and how far it closes; `none` and `unknown` are answers too, with exit code 0.
+    --baseline, nominal flights of the same vehicle, weaker effects are found; with --partner as well, shorter
+    wakes. Prints where the gap lies, which effect causes it and how far it closes; `none` and `unknown` are answers
+    too, with exit code 0.
     """
     check_free(report, json_path, force)
     if each and report:
         raise AirTouchError("--report shows one diagnosis; leave --each out")
     if dask and not each:
         raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each")
+    if each and partner:
+        raise AirTouchError("--partner is of one flight; leave --each out")
     with Bar() as bar:
         from airtouch.cli.gap import files, show
         from airtouch.simulation import effects
@@ -46,7 +52,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         for name in without:
             effects.get(name)
         flights, nominal = files.Flights(real), files.Flights(baseline)
-        case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without)
+        case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without, list(files.Flights(partner)))
         if not each:
             logs = list(flights)
             if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
@@ -71,13 +77,13 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     written(json_path, report)
 
 
-def _case(vehicle: Any, nominal: list, without: tuple[str, ...]) -> Callable:
+def _case(vehicle: Any, nominal: list, without: tuple[str, ...], partner: list) -> Callable:
     """A function that diagnoses flights, with all other arguments fixed."""
     from functools import partial
 
     from airtouch.gap import diagnose
 
-    return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without))
+    return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without), partner=partner)
 
 
 def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> None:

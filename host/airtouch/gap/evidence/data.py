@@ -34,6 +34,8 @@ class Study:
     nominal: int = 0  #: how many there were
     scatter: Scatter | None = None  #: how strong effects seem to be in flights that have none
     relations: Any = None  #: relations.library.Library that holds for the nominal flights, if there is one
+    #: (flight, from_s, to_s) in which another vehicle is known to be overhead; none: nobody knows
+    overhead: tuple[tuple[str, float, float], ...] = ()
 
     @property
     def simulated(self) -> bool:

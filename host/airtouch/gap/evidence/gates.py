@@ -60,12 +60,30 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     level, bursts = {wide: judge(data, whole, (), wide) for wide in (False, True)}, _bursts(data)
     out = {}
     for name, variants in candidates.gated(without).items():
+        if name == candidates.OVERHEAD and data.study.overhead:
+            out[name] = _best(data, whole, name, variants, data.study.overhead, level, len(without_effect))
+            continue
         judged = [_judged(data, whole, name, terms, gate, cost, level, len(without_effect)) for variant in variants
-                  for terms, gate, cost in (_by_blocks(data, whole, without_effect, variant), (variant, *bursts))
-                  if gate]
+                  for terms, gate, cost in (_by_blocks(data, whole, without_effect, variant), (variant, *bursts)) if gate]
         if judged:
             out[name] = max(judged, key=lambda j: j.gain)
     return out
+
+
+def within(data: Data, name: str, gate: Gate) -> Gated | None:
+    """An effect that acts within a gate that nobody chose; None in a flight that is too short to say."""
+    whole = whole_of(data)
+    blocks = len(_each(data, whole, ()))
+    if blocks < LEAST_BLOCKS:
+        return None
+    level = {wide: judge(data, whole, (), wide) for wide in (False, True)}
+    return _best(data, whole, name, candidates.gated()[name], gate, level, blocks)
+
+
+def _best(data: Data, whole: Part, name: str, variants: Sequence[Sequence[Term]], gate: Gate,
+          level: dict[bool, float], blocks: int) -> Gated:
+    """The variant of an effect that gains most within a gate that costs nothing, as nobody chose it."""
+    return max((_judged(data, whole, name, v, gate, 0.0, level, blocks) for v in variants), key=lambda j: j.gain)
 
 
 def _judged(data: Data, whole: Part, name: str, terms: Sequence[Term], gate: Gate, cost: float,

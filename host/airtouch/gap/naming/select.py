@@ -29,7 +29,7 @@ from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SHAKES, Term, is_random, random_of
+from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, OVERHEAD, SHAKES, Term, is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.unnamed.generic import generic_gain, height_gain
 
@@ -156,7 +156,8 @@ def _passing(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float
                if g.gain >= steady + LEAST_GAIN and _news(on.data, g.name, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
-    best = max(passing, key=lambda g: g.gain)
+    known = [g for g in passing if on.data.study.overhead and g.name == OVERHEAD]  # its seconds are, not only likely
+    best = max(known or passing, key=lambda g: g.gain)
     terms = best.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - best.cost
     return Judged(best.name, terms, gain, (best.fitted, best.fitted), choice=best.cost, strength=best.strength,

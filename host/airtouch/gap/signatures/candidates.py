@@ -52,6 +52,7 @@ _ONE_BY_ONE = frozenset({"controller_gain"})  #: effects whose parameters are al
 #: values of parameters of a mean part, whose random part is a term of its own (`random_part_of`)
 _FIXED = {"ground_effect": {"turbulence": 0.0}, "downwash": {"turbulence": 0.0, "width": 0.0}}
 GATED = ("wind", "gust", "downwash")  #: effects that may come and go within a flight
+OVERHEAD = "downwash"  #: the effect of another vehicle overhead
 SHAKES = frozenset({"downwash"})  #: effects that are only tried with their random part: the mean alone has other names
 UNSTEADY = ("ground_effect", "downwash")  #: effects with a random part, where and when their mean part acts
 #: relative standard deviation of a strength from flight to flight that no likelihood shows: lines of four rotors at

@@ -1,0 +1,85 @@
+"""When another vehicle was overhead, from its own log, and what nominal flights seem to have in such seconds.
+
+Where nobody tells when a wake acts, its seconds are looked for, and nominal flights gain much from such a search. Where
+the other vehicle's path is known, nothing is looked for: an effect in the told seconds is held against the same seconds
+of the baseline flights, shifted around each of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airtouch.errors import AirTouchError
+from airtouch.gap.evidence.data import Data, Study
+from airtouch.gap.evidence.gates import Gate, within
+from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.signatures.candidates import OVERHEAD
+from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.logs.flight_log import FlightLog
+
+PLACE = ("x_m", "y_m", "z_m")
+#: where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
+SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
+APART_S = 0.1  #: stretches with less between them are one
+LEAST_S = 0.05  #: shorter ones are none
+SHIFTS = 8  #: of the told seconds around each baseline flight
+
+
+def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Samples (n,) at which a vehicle at `other` (n, 3) is over one at `own` (n, 3), m; False where NaN."""
+    apart = other - own
+    return (np.hypot(apart[:, 0], apart[:, 1]) < SIDEWAYS_M) & (apart[:, 2] > ABOVE_M[0]) & (apart[:, 2] < ABOVE_M[1])
+
+
+def told_seconds(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[float, float], ...]:
+    """Stretches, s from the log's first row, in which one of the partners is overhead.
+
+    All logs hold t_s of one clock and positions in one frame. Raises AirTouchError where one of them has no such.
+    """
+    for each in (log, *partners):
+        if not each.has("t_s", *PLACE):
+            raise AirTouchError(f"{each.source}: no {', '.join(('t_s', *PLACE))}; a partner is found by both paths")
+    begin = log["t_s"][0]
+    time = np.arange(begin, log["t_s"][-1], PERIOD_S)
+
+    def path(one: FlightLog) -> np.ndarray:
+        return np.column_stack([np.interp(time, one["t_s"], one[name], np.nan, np.nan) for name in PLACE])
+
+    acts = np.logical_or.reduce([np.zeros(len(time), bool), *(above(path(log), path(p)) for p in partners)])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))) * PERIOD_S
+    out: list[tuple[float, float]] = []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if out and first - out[-1][1] < APART_S:
+            out[-1] = (out[-1][0], float(last))
+        else:
+            out.append((float(first), float(last)))
+    return tuple((a, b) for a, b in out if b - a >= LEAST_S)
+
+
+def told(study: Study, flight: Flight, nominal: Sequence[Flight], seconds: Sequence[tuple[float, float]]) -> Study:
+    """The study of a flight over which another vehicle was in these seconds.
+
+    The nominal size of what it does is that in the same seconds of the baseline flights. The study as it is without
+    such seconds, or without baseline flights to hold them against.
+    """
+    if not seconds or study.scatter is None or not nominal:
+        return study
+    sizes = [_size(Data(study, [f]), gate) for f in nominal for gate in _shifted(f, seconds)]
+    passing = {**study.scatter.passing, OVERHEAD: (float(np.mean(sizes)), float(np.std(sizes, ddof=1)))}
+    return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
+                   scatter=replace(study.scatter, passing=passing))
+
+
+def _size(data: Data, gate: Gate) -> float:
+    """Size (`size_of`) that what acts overhead seems to have within a gate."""
+    found = within(data, OVERHEAD, gate)
+    long = sum(len(f) for f in data.flights) * PERIOD_S
+    return size_of(found.gain / long, found.strength) if found is not None else 0.0
+
+
+def _shifted(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
+    """The same stretches SHIFTS times around a flight, cut at its end."""
+    long = len(flight) * PERIOD_S
+    return [tuple((flight.name, (a + shift) % long, min((a + shift) % long + b - a, long)) for a, b in seconds)
+            for shift in np.arange(SHIFTS) * long / SHIFTS]

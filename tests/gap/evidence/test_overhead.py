@@ -1,0 +1,93 @@
+"""A wake in seconds that another vehicle's log tells."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import gap_real
+from airtouch.cli import airtouch
+from airtouch.errors import AirTouchError
+from airtouch.gap.diagnose import diagnose
+from airtouch.gap.evidence import gates, overhead
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.signatures.candidates import OVERHEAD
+from airtouch.gap.signatures.nominal_scatter import size_of
+from airtouch.logs.flight_log import FlightLog
+from gap_flights import VEHICLE, flown
+
+SECONDS = ((7.0, 7.4), (9.2, 9.7), (13.0, 13.3))
+
+
+def path(begin_s, place, seconds=20.0):
+    """The log of a vehicle that hangs at a place."""
+    time = begin_s + np.arange(0.0, seconds, 0.01)
+    return FlightLog({"t_s": time, **{k: np.full(len(time), v) for k, v in zip(overhead.PLACE, place, strict=True)}},
+                     {"source": "one"})
+
+
+def test_a_vehicle_is_overhead_where_both_logs_hold_the_time():
+    low = path(3.0, (0.0, 0.0, 0.5))
+    assert overhead.told_seconds(low, [path(8.0, (0.1, 0.0, 0.9), 4.0)]) == (pytest.approx((5.0, 9.0), abs=0.02),)
+    for place in ((0.2, 0.0, 0.9), (0.0, 0.0, 0.55), (0.0, 0.0, 1.2), (0.0, 0.0, 0.1)):
+        assert overhead.told_seconds(low, [path(3.0, place)]) == ()
+
+
+def test_two_vehicles_overhead_one_after_another_are_two_stretches():
+    low = path(0.0, (0.0, 0.0, 0.5))
+    others = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]
+    assert np.array(overhead.told_seconds(low, others)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
+
+
+def test_a_partner_without_a_path_is_refused():
+    blind = FlightLog({"t_s": np.arange(10.0)}, {"source": "blind.csv"})
+    with pytest.raises(AirTouchError, match="x_m"):
+        overhead.told_seconds(path(0.0, (0.0, 0.0, 0.5)), [blind])
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return flown(1, 62)[0]
+
+
+def evidence(study, one, nominal):
+    """Size of a wake in SECONDS beyond the limit of the nominal flights, and its gain."""
+    told = overhead.told(study, one, nominal, SECONDS)
+    found = gates.gated(Data(told, [one]))[OVERHEAD]
+    size = size_of(found.gain / (len(one) * PERIOD_S), found.strength)
+    return told.scatter.unusual(OVERHEAD, size), found.gain
+
+
+def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, quiet):
+    nominal = flown(2, 70)
+    t = np.arange(len(quiet)) * PERIOD_S
+    acts = np.any([(t >= a) & (t < b) for a, b in SECONDS], axis=0)
+    force = quiet.acceleration.copy()
+    force[acts, 2] -= 0.06 * VEHICLE.gravity_mps2
+    over, gain = evidence(study, replace(quiet, acceleration=force), nominal)
+    assert over > 0.0 and gain > LEAST_GAIN
+    over, gain = evidence(study, quiet, nominal)
+    assert over < 0.0 or gain < LEAST_GAIN
+
+
+def test_no_seconds_change_nothing(study, quiet):
+    assert overhead.told(study, quiet, [quiet], ()) is study
+
+
+def test_a_partner_belongs_to_one_flight(tmp_path):
+    with pytest.raises(AirTouchError, match="one flight"):
+        diagnose([f.log for f in flown(2, 62)], VEHICLE, partner=[path(0.0, (0.0, 0.0, 0.5))])
+    told = CliRunner().invoke(airtouch, ["gap", "diagnose", "x.csv", "--each", "--partner", "y.csv"])
+    assert told.exit_code != 0 and "one flight" in str(told.exception or told.output)
+
+
+def test_a_short_wake_of_a_recorded_flight_is_named_with_its_seconds(flights):
+    cases = [c for c in gap_real.swarm(flights, "build") if c.flight.endswith("downwash_cf102d19_008.csv.gz")]
+    case, = gap_real.with_partners(cases, flights)
+    assert case.partner
+    found = gap_real.answered(case)
+    assert gap_real.answer(found) == "downwash"
+    assert any(abs(s["from_s"] - 5.5) < 0.3 for s in found["effects"][0]["seconds"])
