@@ -9,6 +9,11 @@ three are taken of nominal flights of the same vehicle and kind of flying, in th
 by each half second. A flight is seen where one of the three is beyond all but a third of one per cent of these, which
 makes 1 % false alarms. --answers: what `gap_real.py --keep` wrote, to print what the diagnosis says beside it.
 build: days 19 and 20.
+
+    python tools/gap_wakes.py [FLIGHTS] --false-alarms    # what the diagnosis says of nominal flights, 15 min
+
+Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), told that another
+vehicle was overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
 """
 
 import argparse
@@ -22,13 +27,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+import gap_real
 from airtouch import vehicle as vehicles
+from airtouch.gap.evidence import gates, overhead
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
+from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.naming.select import news
+from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_score import wilson
 from airtouch.gap.signals.channels import residual
+from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.logs import read
 
-SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
 LEAST_S = 0.5  #: under another vehicle that the data must show
 STEP_S = 0.5  #: by which the seconds are shifted along nominal flights
 FALSE_ALARMS = 0.01
@@ -73,8 +84,7 @@ def under(one: Track, other: Track) -> np.ndarray:
     index = np.arange(len(place)) + shift
     there = (index >= 0) & (index < len(other.place))
     place[there] = other.place[index[there]]
-    apart = place - one.place
-    return (np.hypot(apart[:, 0], apart[:, 1]) < SIDEWAYS_M) & (apart[:, 2] > ABOVE_M[0]) & (apart[:, 2] < ABOVE_M[1])
+    return overhead.above(one.place, place)
 
 
 def measures(t: Track, acts: np.ndarray) -> np.ndarray:
@@ -98,7 +108,7 @@ def chance(acts: np.ndarray, nominal: list[Track]) -> np.ndarray:
     return np.array(out)
 
 
-def overhead(one: Track, tracks: list[Track]) -> np.ndarray:
+def overhead_at(one: Track, tracks: list[Track]) -> np.ndarray:
     """Samples (n,) at which any vehicle of the same flight is above, as far as the data hold its path."""
     folder, name = one.row["flight"].rsplit("/", 1)
     number = name.split("_")[1]
@@ -107,18 +117,58 @@ def overhead(one: Track, tracks: list[Track]) -> np.ndarray:
     return np.logical_or.reduce([np.zeros(len(one.place), bool), *(under(one, t) for t in same)])
 
 
+def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
+    """How often nominal flights have a wake in seconds in which they have none."""
+    told: dict[tuple[str, str], list[tuple[tuple[float, float], ...]]] = {}
+    for t in (t for t in tracks if t.row.get("truth") == "downwash"):
+        acts = _overhead_s(overhead_at(t, tracks))
+        if sum(b - a for a, b in acts) >= LEAST_S:
+            told.setdefault((t.row["vehicle"], t.row["manoeuvre"]), []).append(acts)
+    kind = {t.row["file"]: (t.row["vehicle"], t.row["manoeuvre"]) for t in tracks}
+    passed, tried = [], 0
+    for case in gap_real.nominal(flights, "build"):
+        name = Path(case.flight).name
+        if name not in kind:
+            continue
+        vehicle = vehicles.load(case.vehicle)
+        base = [ready(read(b), vehicle) for b in case.baseline]
+        study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
+        for seconds in told.get(kind[name], []):
+            known = overhead.told(study, flight, base, seconds)
+            found = gates.gated(Data(known, [flight])).get(OVERHEAD)
+            tried += 1
+            if found is not None and news(Data(known, [flight]), OVERHEAD, found.gain, found.strength) >= LEAST_GAIN:
+                passed.append(name)
+        print(f"{name}: {passed.count(name)} of {len(told.get(kind[name], []))}", flush=True)
+    share = wilson(len(passed), tried)
+    print(f"a wake in told seconds of nominal flights: {len(passed)} of {tried} [{share['low']:.1%}, "
+          f"{share['high']:.1%}], in {len(set(passed))} flights")
+
+
+def _overhead_s(acts: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Stretches, s, of samples (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))) * PERIOD_S
+    return tuple((float(a), float(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", nargs="?", type=Path,
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
     parser.add_argument("--part", choices=("build", "all"), default="build")
     parser.add_argument("--answers", type=Path)
+    parser.add_argument("--false-alarms", action="store_true")
     options = parser.parse_args()
     folder = options.flights / "neuralswarm"
     rows = [r for name in ("manifest.csv", "baselines.csv") for r in csv.DictReader((folder / name).open())]
     rows = [r for r in rows if options.part == "all" or r["day"] in BUILD_DAYS]
+    if options.false_alarms:
+        rows = [r for r in rows if r["day"] in BUILD_DAYS]
     tracks = [track(folder, r) for r in rows if r.get("truth") != "ground_effect"]
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
+    if options.false_alarms:
+        show_false_alarms(options.flights, tracks)
+        return
     said = {}
     if options.answers:
         for case in map(json.loads, options.answers.read_text().splitlines()):
@@ -127,7 +177,7 @@ def main() -> None:
     unknown = 0
     print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
-        acts = overhead(t, tracks)
+        acts = overhead_at(t, tracks)
         seconds = (acts & t.usable).sum() * PERIOD_S
         if seconds < LEAST_S:
             unknown += 1

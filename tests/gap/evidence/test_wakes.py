@@ -23,9 +23,9 @@ def test_another_vehicle_is_above_where_both_cuts_hold_the_time():
 
 def test_only_vehicles_of_the_same_flight_count():
     low, high = cut(), cut("cf51", 0.0, (0.0, 0.0, 0.9))
-    assert gap_wakes.overhead(low, [low, high]).all()
+    assert gap_wakes.overhead_at(low, [low, high]).all()
     high.row["flight"] = "day/cf51_02"
-    assert not gap_wakes.overhead(low, [low, high]).any()
+    assert not gap_wakes.overhead_at(low, [low, high]).any()
 
 
 def test_a_push_in_these_seconds_is_beyond_chance_and_none_is_not():

@@ -69,7 +69,7 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     if by_relations is not None and passing is None and first not in SHAKES:  # these have more shapes than their class
         return by_relations
     if passing is not None and any(s.named and s.name == passing.name
-                                   and _news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
+                                   and news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
         singles, least, steps = _steps(on, candidates, alone, need, None, progress)
     before = nameless(on, None)
     after = nameless(on, steps[-1]) if steps else before
@@ -153,7 +153,7 @@ def _passing(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float
         return None
     steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
     passing = [g for g in gated(on.data, without).values()
-               if g.gain >= steady + LEAST_GAIN and _news(on.data, g.name, g.gain, g.strength) >= LEAST_GAIN]
+               if g.gain >= steady + LEAST_GAIN and news(on.data, g.name, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
     known = [g for g in passing if on.data.study.overhead and g.name == OVERHEAD]  # its seconds are, not only likely
@@ -161,10 +161,10 @@ def _passing(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float
     terms = best.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - best.cost
     return Judged(best.name, terms, gain, (best.fitted, best.fitted), choice=best.cost, strength=best.strength,
-                  evidence=_news(on.data, best.name, best.gain, best.strength))
+                  evidence=news(on.data, best.name, best.gain, best.strength))
 
 
-def _news(data: Data, name: str, gain: float, strength: np.ndarray) -> float:
+def news(data: Data, name: str, gain: float, strength: np.ndarray) -> float:
     """Evidence for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights may have as much.
 
     strength (k,): of its parameters, in natural steps.
