@@ -37,7 +37,6 @@ from airtouch.gap.naming.select import news
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.blind_score import wilson
 from airtouch.gap.signals.channels import residual
-from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.logs import read
 
 LEAST_S = 0.5  #: under another vehicle that the data must show
@@ -135,9 +134,9 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
         for seconds in told.get(kind[name], []):
             known = overhead.told(study, flight, base, seconds)
-            found = gates.gated(Data(known, [flight])).get(OVERHEAD)
+            found = gates.gated(Data(known, [flight])).get(gates.TOLD)
             tried += 1
-            if found is not None and news(Data(known, [flight]), OVERHEAD, found.gain, found.strength) >= LEAST_GAIN:
+            if found is not None and news(Data(known, [flight]), found.key, found.gain, found.strength) >= LEAST_GAIN:
                 passed.append(name)
         print(f"{name}: {passed.count(name)} of {len(told.get(kind[name], []))}", flush=True)
     share = wilson(len(passed), tried)

@@ -15,6 +15,7 @@ from airtouch.gap.answer.unexplained import unexplained
 from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import fit
+from airtouch.gap.evidence.gates import TOLD
 from airtouch.gap.evidence.overhead import told, told_seconds
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
@@ -140,7 +141,7 @@ def _selected(data: Data, without: Sequence[str], say: Callable[[str], None] = l
     selection = select(data, candidates.all_candidates(without), say, without)
     cells = cells_of(data, selection.parts, selection.chosen)
     of_loop = _of_the_loop(data, selection)
-    passing = _comes_and_goes(selection) and not data.study.overhead  # seconds that are known are no gust's
+    passing = _comes_and_goes(selection) and selection.named[0].key != TOLD  # seconds that are known are no gust's
     if data.study.recorded and (of_loop or passing):
         gap = shrink_of(data, selection.parts, selection.chosen, cells)
         if gap.share.value < LOOP_SHARE and (of_loop or gap.before > STANDS_OUT):

@@ -14,7 +14,6 @@ from airtouch.gap.evidence import gates, overhead
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
-from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, flown
@@ -56,9 +55,9 @@ def quiet():
 def evidence(study, one, nominal):
     """Size of a wake in SECONDS beyond the limit of the nominal flights, and its gain."""
     told = overhead.told(study, one, nominal, SECONDS)
-    found = gates.gated(Data(told, [one]))[OVERHEAD]
+    found = gates.gated(Data(told, [one]))[gates.TOLD]
     size = size_of(found.gain / (len(one) * PERIOD_S), found.strength)
-    return told.scatter.unusual(OVERHEAD, size), found.gain
+    return told.scatter.unusual(found.key, size), found.gain
 
 
 def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, quiet):

@@ -32,6 +32,7 @@ LIVELY_HZ = 1.0  #: frequency above which a burst shows
 LIVELY, DEGREES = 6.0, 3.0  #: power of a burst over the flight's median; independent values in a piece
 #: phases in which the floor's own air acts, and no two flights are alike: no stretch lies there
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
+TOLD = "told"  #: a wake in seconds in which another vehicle is known to be overhead
 WHOLE = 0.9  #: share of a flight's blocks above which an effect does not come and go
 Gate = tuple[tuple[str, float, float], ...]
 
@@ -44,6 +45,7 @@ class Gated:
     fitted: Fit
     gain: float
     cost: float
+    key: str  #: of `Scatter.passing`, what nominal flights have of it: the effect's name, or TOLD
 
     @property
     def strength(self) -> np.ndarray:
@@ -52,7 +54,10 @@ class Gated:
 
 
 def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
-    """Effects that may come and go, each in the stretches in which it explains most; not those that never act."""
+    """Effects that may come and go, each in the stretches in which it explains most; not those that never act.
+
+    Where another vehicle is known to be overhead, what it does there is one more, TOLD.
+    """
     whole = whole_of(data)
     without_effect = _each(data, whole, ())
     if len(without_effect) < LEAST_BLOCKS:
@@ -61,8 +66,7 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     out = {}
     for name, variants in candidates.gated(without).items():
         if name == candidates.OVERHEAD and data.study.overhead:
-            out[name] = _best(data, whole, name, variants, data.study.overhead, level, len(without_effect))
-            continue
+            out[TOLD] = replace(_best(data, whole, name, variants, data.study.overhead, level, len(without_effect)), key=TOLD)
         judged = [_judged(data, whole, name, terms, gate, cost, level, len(without_effect)) for variant in variants
                   for terms, gate, cost in (_by_blocks(data, whole, without_effect, variant), (variant, *bursts)) if gate]
         if judged:
@@ -96,7 +100,8 @@ def _judged(data: Data, whole: Part, name: str, terms: Sequence[Term], gate: Gat
     fitted = fit(data, whole, acting)
     free = sum(len(t.free) for t in acting)
     without = level[bool(random_of(acting))]
-    return Gated(name, fitted, judge(data, whole, fitted.terms) - without - cost - 0.5 * free * np.log(blocks), cost)
+    gain = judge(data, whole, fitted.terms) - without - cost - 0.5 * free * np.log(blocks)
+    return Gated(name, fitted, gain, cost, name)
 
 
 def _by_blocks(data: Data, whole: Part, off: np.ndarray, terms: Sequence[Term]) -> tuple[Sequence[Term], Gate, float]:

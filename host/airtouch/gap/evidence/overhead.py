@@ -12,7 +12,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data, Study
-from airtouch.gap.evidence.gates import Gate, within
+from airtouch.gap.evidence.gates import TOLD, Gate, within
 from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
@@ -66,7 +66,7 @@ def told(study: Study, flight: Flight, nominal: Sequence[Flight], seconds: Seque
     if not seconds or study.scatter is None or not nominal:
         return study
     sizes = [_size(Data(study, [f]), gate) for f in nominal for gate in _shifted(f, seconds)]
-    passing = {**study.scatter.passing, OVERHEAD: (float(np.mean(sizes)), float(np.std(sizes, ddof=1)))}
+    passing = {**study.scatter.passing, TOLD: (float(np.mean(sizes)), float(np.std(sizes, ddof=1)))}
     return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
                    scatter=replace(study.scatter, passing=passing))
 

@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.gap.evidence.clock import clock_gain, clock_left
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import CELL_GAIN, cell_gains, fit
-from airtouch.gap.evidence.gates import gated
+from airtouch.gap.evidence.gates import TOLD, gated
 from airtouch.gap.evidence.problem import GROUPS, cell_words
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import (
@@ -29,7 +29,7 @@ from airtouch.gap.naming.related import inference_of, related
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.naming.selection import TEMPERATURE, UNKNOWN_ASSUMED, UNKNOWN_GAIN, Hypothesis, Judged, Selection
 from airtouch.gap.signals.channels import COUNT
-from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, OVERHEAD, SHAKES, Term, is_random, random_of
+from airtouch.gap.signatures.candidates import CLOCK, COMPANIONS, MEAN, SHAKES, Term, is_random, random_of
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.gap.unnamed.generic import generic_gain, height_gain
 
@@ -68,8 +68,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Hypothesis]],
     first = next((s.name for s in steps if s.named), "")
     if by_relations is not None and passing is None and first not in SHAKES:  # these have more shapes than their class
         return by_relations
-    if passing is not None and any(s.named and s.name == passing.name
-                                   and news(on.data, s.name, s.share, passing.strength) < LEAST_GAIN for s in steps):
+    if passing is not None and any(s.named and s.name == passing.name and news(
+            on.data, passing.key, s.share, passing.strength) < LEAST_GAIN for s in steps):
         singles, least, steps = _steps(on, candidates, alone, need, None, progress)
     before = nameless(on, None)
     after = nameless(on, steps[-1]) if steps else before
@@ -153,24 +153,24 @@ def _passing(on: Trial, singles: Mapping[str, Judged], least: Mapping[str, float
         return None
     steady = max([height_gain(on.data, on.parts), *(j.gain for n, j in singles.items() if j.evidence >= least[n])])
     passing = [g for g in gated(on.data, without).values()
-               if g.gain >= steady + LEAST_GAIN and news(on.data, g.name, g.gain, g.strength) >= LEAST_GAIN]
+               if g.gain >= steady + LEAST_GAIN and news(on.data, g.key, g.gain, g.strength) >= LEAST_GAIN]
     if not passing:
         return None
-    known = [g for g in passing if on.data.study.overhead and g.name == OVERHEAD]  # its seconds are, not only likely
+    known = [g for g in passing if g.key == TOLD]  # its seconds are, not only likely
     best = max(known or passing, key=lambda g: g.gain)
     terms = best.fitted.terms
     gain = sum(gain_of(on, half, terms) for half in (0, 1)) - best.cost
     return Judged(best.name, terms, gain, (best.fitted, best.fitted), choice=best.cost, strength=best.strength,
-                  evidence=news(on.data, best.name, best.gain, best.strength))
+                  evidence=news(on.data, best.key, best.gain, best.strength), key=best.key)
 
 
-def news(data: Data, name: str, gain: float, strength: np.ndarray) -> float:
+def news(data: Data, key: str, gain: float, strength: np.ndarray) -> float:
     """Evidence for an effect that comes and goes: its gain, but LEAST_GAIN where nominal flights may have as much.
 
-    strength (k,): of its parameters, in natural steps.
+    key: `Gated.key`. strength (k,): of its parameters, in natural steps.
     """
     assert data.study.scatter is not None  # nothing that comes and goes is looked for without nominal flights
-    return min(gain, LEAST_GAIN + data.study.scatter.unusual(name, size_of(gain / seconds(data), strength)))
+    return min(gain, LEAST_GAIN + data.study.scatter.unusual(key, size_of(gain / seconds(data), strength)))
 
 
 def _beside(on: Trial, candidates: Mapping[str, Sequence[Hypothesis]], steps: Sequence[Judged],

@@ -45,6 +45,7 @@ class Judged:
     apart: np.ndarray | float = 0.0
     evidence: float = 0.0
     named: bool = True
+    key: str = ""  #: of one that comes and goes: what of `Scatter.passing` it is held against
     share: float = np.inf  #: where several effects are named: gain over the hypothesis of the others alone
 
     @property
