@@ -8,32 +8,45 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import less
-from airtouch.gap.result import Found, Quantity
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import VEHICLE, flown
 
 
-def mass_of(value, deviation):
-    interval = Quantity(value, value - 1.645 * deviation, value + 1.645 * deviation)
-    return Found("mass", {"fraction": interval})
+def read(name, x, covariance, reading):
+    """Values and 90 % intervals of an effect's parameters with a reading, from scaled ones."""
+    term = next(t for t in terms(name) if len(t.free) == len(x))
+    return term.quantities(*with_reading(term, np.array(x), np.array(covariance), reading))
+
+
+def mass(value, deviation, reading):
+    step = terms("mass")[0].step("fraction")
+    return read("mass", [value / step], [[(deviation / step) ** 2]], reading)["fraction"]
 
 
 def test_a_reading_is_weighted_by_its_precision():
     """Two measurements of one number: the closed form of the weighted mean and its error."""
-    both = with_reading(mass_of(0.10, 0.01), {"fraction": (0.11, 0.02)}).parameters["fraction"]
+    both = mass(0.10, 0.01, {"fraction": (0.11, 0.02)})
     assert both.value == pytest.approx((4.0 * 0.10 + 0.11) / 5.0)
     assert both.high - both.low == pytest.approx(2.0 * 1.645 * 0.01 * np.sqrt(0.8), rel=1e-6)
 
 
 def test_an_interval_is_wider_where_replay_and_reading_disagree():
-    both = with_reading(mass_of(0.10, 0.01), {"fraction": (0.20, 0.01)}).parameters["fraction"]
+    both = mass(0.10, 0.01, {"fraction": (0.20, 0.01)})
     assert both.value == pytest.approx(0.15)
     assert both.low < 0.10 < 0.20 < both.high
 
 
+def test_what_the_replay_knows_as_a_sum_stays_a_sum():
+    """Of x + y the replay is sure, of either alone it is not: a reading of x moves y by as much the other way."""
+    term = terms("com_offset")[0]
+    both = read("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
+                {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
+    assert both["x"].value == pytest.approx(0.5 * term.step("x"), rel=0.01)
+    assert both["y"].value == pytest.approx(1.5 * term.step("y"), rel=0.01)
+
+
 def test_a_parameter_without_a_reading_stays():
-    own = mass_of(0.10, 0.01)
-    assert with_reading(own, {}) == own
+    assert mass(0.10, 0.01, {}).value == pytest.approx(0.10)
 
 
 def test_a_fit_goes_on_until_it_stands_still(study):

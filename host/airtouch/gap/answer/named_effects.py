@@ -13,15 +13,14 @@ from airtouch.gap.naming.selection import Judged, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import Found
 from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term, parameter_of
-from airtouch.simulation.effects import get
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data
 RESTARTS = 12  #: of a fit of several parameters, at most
 WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
 #: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong
 MODEL_ERROR = 0.1
-#: fraction of a parameter by which the loop's model may be wrong where the relations of signals measure it too:
-#: replayed inertia and late sensors lay 27 and 29 % off, the median of nine flights of two opened sealed sets
+#: fraction of an effect's only parameter by which the loop's model may be wrong, where the relations of signals measure
+#: it too: replayed inertia and late sensors lay 27 and 29 % off, the median of nine flights of two opened sealed sets
 LOOP_ERROR = 0.25
 
 
@@ -38,6 +37,7 @@ def chosen_effects(data: Data, selection: Selection) -> list[Found]:
     fitted = (best_shape(data, whole, replayed, _mean_of_halves(judged)) if replayed
               else Fit((), np.zeros(0), np.zeros((0, 0)), np.zeros(0), 0.0))
     chosen = {t.name for t in selection.chosen.terms}
+    readings = selection.inference.readings if selection.inference is not None else {}
     out, first = [], 0
     for t in fitted.terms:
         part = slice(first, first + len(t.free)) if t.kind == MEAN else None
@@ -52,12 +52,11 @@ def chosen_effects(data: Data, selection: Selection) -> list[Found]:
         covariance = (fitted.covariance[part, part] if part is not None
                       else strength_variance(data, whole, fitted.terms, t))
         spread = _spread(data.study.controller, judged, t, covariance,
-                         MODEL_ERROR if selection.inference is None else LOOP_ERROR)
-        out.append(Found(t.name, t.quantities(x, spread), t.gate))
+                         LOOP_ERROR if t.name in readings and len(t.free) == 1 else MODEL_ERROR)
+        out.append(Found(t.name, t.quantities(*with_reading(t, x, spread, readings.get(t.name, {}))), t.gate))
     for t in (t for t in selection.chosen.terms if t.kind == CLOCK):
-        out.append(Found(t.name, t.quantities(t.scaled(t.values), _of_clock(t, sum(len(f) for f in data.flights)))))
-    if selection.inference is not None:
-        out = [with_reading(e, selection.inference.readings.get(e.name, {})) for e in out]
+        spread = _of_clock(t, sum(len(f) for f in data.flights))
+        out.append(Found(t.name, t.quantities(*with_reading(t, t.scaled(t.values), spread, readings.get(t.name, {})))))
     order = {s.name: i for i, s in reversed(list(enumerate(selection.named)))}
     return sorted(out, key=lambda e: order.get(e.name, len(order)))
 
@@ -113,26 +112,24 @@ def with_random_part(effect: Found, part: Term) -> Found:
     return Found(effect.name, {**effect.parameters, "strength": raised, **scaled}, effect.seconds)
 
 
-def with_reading(effect: Found, reading: Reading) -> Found:
-    """The effect with the parameters that its replay and the relations of signals give together.
+def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Reading) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled parameters (k,) and covariance (k, k) of an effect, by its replay and by the relations of signals.
 
-    The mean is weighted by precision; where the two differ by more than their deviations, the interval is wider by that
-    factor (Birge 1932).
+    Both are weighted by precision (the update of a Kalman filter), so that parameters that the replay knows as a sum or
+    a product move together. Where the two differ by more than their errors, the covariance grows by that factor
+    squared (Birge 1932).
     """
-    out = dict(effect.parameters)
-    for name, (value, deviation) in reading.items():
-        own = out[name]
-        if own.low is None or own.high is None:
-            continue
-        limits = parameter_of(get(effect.name), name)
-        own_deviation = max((own.high - own.low) / (2.0 * WITHIN_90), 1e-3 * deviation)
-        weight = own_deviation ** -2, deviation ** -2
-        mean = (weight[0] * own.value + weight[1] * value) / sum(weight)
-        distance = abs(own.value - value) / float(np.hypot(own_deviation, deviation))
-        half = WITHIN_90 * sum(weight) ** -0.5 * max(1.0, distance)
-        out[name] = replace(own, value=float(np.clip(mean, limits.low, limits.high)),
-                            low=max(mean - half, limits.low), high=min(mean + half, limits.high))
-    return replace(effect, parameters=out)
+    read = [i for i, name in enumerate(term.free) if name in reading]
+    if not read:
+        return x, covariance
+    names = [term.free[i] for i in read]
+    value = np.array([(reading[n][0] - (parameter_of(term.effect, n).neutral or 0.0)) / term.step(n) for n in names])
+    variance = np.diag([(reading[n][1] / term.step(n)) ** 2 for n in names])
+    precision = np.linalg.inv(covariance[np.ix_(read, read)] + variance)
+    gain, apart = covariance[:, read] @ precision, value - x[read]
+    wider = max(1.0, float(apart @ precision @ apart) / len(read))
+    low, high = term.bounds()
+    return np.clip(x + gain @ apart, low, high), wider * (covariance - gain @ covariance[read])
 
 
 def _mean_of_halves(chosen: Judged) -> np.ndarray | None:

@@ -1,5 +1,6 @@
 """Infer the effects in a flight from the relations of its signals: likeliest hypothesis, evidence for each effect."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -72,12 +73,13 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
 
 
 def _readings(best: Hypothesis) -> Mapping[str, Reading]:
-    """Parameters of the effects of a hypothesis; several classes of one effect give one reading."""
-    out: dict[str, dict[str, tuple[float, float]]] = {}
-    for f in best.fits:
-        if f.of.readout is not None:
-            out.setdefault(f.of.effect, {}).update(read_out(f.of.readout, get(f.of.effect), f.strength))
-    return out
+    """Parameters of the effects of a hypothesis.
+
+    An effect of which several parameters act gives none: each was calibrated acting alone.
+    """
+    count = Counter(f.of.effect for f in best.fits)
+    return {f.of.effect: read_out(f.of.readout, get(f.of.effect), f.strength)
+            for f in best.fits if f.of.readout is not None and count[f.of.effect] == 1}
 
 
 def _nameless(flight: FlightFeatures, best: Hypothesis, shares: Shares) -> tuple[float, float]:
