@@ -72,6 +72,18 @@ def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, q
     assert over < 0.0 or gain < LEAST_GAIN
 
 
+def test_a_flight_that_shakes_all_along_has_no_wake_in_told_seconds(study, quiet):
+    force = quiet.acceleration.copy()
+    force[:, 2] += 0.03 * VEHICLE.gravity_mps2 * np.random.default_rng(3).normal(size=len(quiet))
+    over, _ = evidence(study, replace(quiet, acceleration=force), flown(2, 70))
+    assert over < 0.0
+
+
+def test_the_rest_of_a_flight_is_apart_from_the_told_seconds():
+    left = overhead._outside((("f", 1.0, 4.0), ("f", 6.0, 6.2)), ((2.0, 2.5), (6.1, 6.3)))
+    assert left == (("f", 1.0, 1.75), ("f", 2.75, 4.0))
+
+
 def test_no_seconds_change_nothing(study, quiet):
     assert overhead.told(study, quiet, [quiet], ()) is study
 

@@ -2,7 +2,7 @@
 
 Where nobody tells when a wake acts, its seconds are looked for, and nominal flights gain much from such a search. Where
 the other vehicle's path is known, nothing is looked for: an effect in the told seconds is held against the same seconds
-of the baseline flights, shifted around each of them.
+of the baseline flights, shifted around each of them, and of the rest of the flight itself, which may be flown harder.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,10 @@ PLACE = ("x_m", "y_m", "z_m")
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
 APART_S = 0.1  #: stretches with less between them are one
 LEAST_S = 0.05  #: shorter ones are none
-SHIFTS = 8  #: of the told seconds around each baseline flight
+SHIFTS = 8  #: of the told seconds around each baseline flight, and around the rest of the flight
+MARGIN_S = 0.25  #: around the told seconds, in which a wake may already or still act
+LEAST_SHARE = 0.5  #: of the told seconds that shifted ones must hold
+NORMAL = 1.4826  #: standard deviation of a normal variable over its median deviation
 
 
 def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -60,13 +63,20 @@ def told_seconds(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[f
 def told(study: Study, flight: Flight, nominal: Sequence[Flight], seconds: Sequence[tuple[float, float]]) -> Study:
     """The study of a flight over which another vehicle was in these seconds.
 
-    The nominal size of what it does is that in the same seconds of the baseline flights. The study as it is without
+    The nominal size of what it does is that in the same seconds of the baseline flights or, where that is more, of the
+    rest of this flight: its median and median deviation, as a vehicle whose path is unknown may be over it as well. The
+    study as it is without
     such seconds, or without baseline flights to hold them against.
     """
     if not seconds or study.scatter is None or not nominal:
         return study
     sizes = [_size(Data(study, [f]), gate) for f in nominal for gate in _shifted(f, seconds)]
-    passing = {**study.scatter.passing, TOLD: (float(np.mean(sizes)), float(np.std(sizes, ddof=1)))}
+    data, long = Data(study, [flight]), sum(b - a for a, b in seconds)
+    rest = [_outside(gate, seconds) for gate in _shifted(flight, seconds)]
+    own = np.array([_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_SHARE * long] or [0.0])
+    spread = NORMAL * float(np.median(np.abs(own - np.median(own))))
+    passing = {**study.scatter.passing, TOLD: (max(float(np.mean(sizes)), float(np.median(own))),
+                                               max(float(np.std(sizes, ddof=1)), spread))}
     return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
                    scatter=replace(study.scatter, passing=passing))
 
@@ -76,6 +86,16 @@ def _size(data: Data, gate: Gate) -> float:
     found = within(data, OVERHEAD, gate)
     long = sum(len(f) for f in data.flights) * PERIOD_S
     return size_of(found.gain / long, found.strength) if found is not None else 0.0
+
+
+def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
+    """What of a gate is farther than MARGIN_S from each of the stretches."""
+    out = list(gate)
+    for begin, end in seconds:
+        out = [(name, a, b) for name, first, last in out
+               for a, b in ((first, min(last, begin - MARGIN_S)), (max(first, end + MARGIN_S), last))
+               if b - a >= LEAST_S]
+    return tuple(out)
 
 
 def _shifted(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
