@@ -65,11 +65,11 @@ CASES = (
 
 def cases(only: str = "") -> list[Case]:
     """Those whose names begin so. AirTouchError where none does."""
-    cases = [case for case in CASES if case.name.startswith(only)]
-    if not cases:
+    matches = [case for case in CASES if case.name.startswith(only)]
+    if not matches:
         raise AirTouchError(f"no case begins with {only!r}; --only is the beginning of one of: "
                             f"{'; '.join(case.name for case in CASES)}")
-    return cases
+    return matches
 
 
 def mission(case: Case) -> Scenario:
@@ -115,14 +115,14 @@ class Leg:
 def summary(legs: Sequence[Leg]) -> str:
     """All flights of a case with one setting."""
     late = [delays(leg.crossed, leg.reported) for leg in legs]
-    delays, crossed = np.concatenate(late), sum(len(leg.crossed) for leg in legs)
-    false = sum(len(leg.reported) for leg in legs) - len(delays)
+    late_s, crossed = np.concatenate(late), sum(len(leg.crossed) for leg in legs)
+    false = sum(len(leg.reported) for leg in legs) - len(late_s)
     text = (f"{sum(leg.ending == 'ok' for leg in legs)} of {len(legs)} ended well, "
             f"{min(leg.low_m for leg in legs):.2f} to {max(leg.high_m for leg in legs):.2f} m; "
-            f"felt {len(delays)} of {crossed}")
-    if len(delays):
-        text += (f" ({np.sum(np.abs(delays) <= TOLERANCE_S)} within {TOLERANCE_S} s), {delays.min():.1f} to "
-                 f"{delays.max():.1f} s late")
+            f"felt {len(late_s)} of {crossed}")
+    if len(late_s):
+        text += (f" ({np.sum(np.abs(late_s) <= TOLERANCE_S)} within {TOLERANCE_S} s), {late_s.min():.1f} to "
+                 f"{late_s.max():.1f} s late")
     return f"{text}; {false} false"
 
 
