@@ -13,7 +13,8 @@ Where each decision is made; a folder imports only those above it:
   from which `identify` finds a `closed_loop`; at edges: `edge_response`.
 - `signals`, what is compared: `channels`, `spectra`, `command_view`; what raises the floor: `response`, `lost_rows`.
 - `evidence`, how likely the flights are under an effect: `data`, `problem`, `fit` with `slopes`, `least_squares`,
-  `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `clock` what only the log's times show.
+  `random_effects` and `vibration_lines`; `gates` finds what comes and goes, `overhead` takes
+  its seconds from another vehicle's log, `clock` what only the log's times show.
 - `unnamed`, what no effect explains: `generic`, of a `regression` on `columns` of the flight's own signals (`basis`)
   and free `powers`.
 - `relations`, what a flight's signals do to one another, compared with simulated flights of each effect: `features` of
