@@ -46,6 +46,31 @@ def rows(text):
     return {re.sub(r"\((?:host/docs/)?", "(", line) for line in text.splitlines() if line.startswith("|")}
 
 
+def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
+    """Goals of gap-real.md and rows of results.md against the tables flight by flight."""
+    page = (DOCS / "gap-real.md").read_text("utf-8")
+
+    def table(start):
+        return re.search(r"^\| flights \|.*\n\|[-|]+\n((?:\|.*\n)+)", page[page.index(start):], re.M).group(1)
+
+    view, build, nominal = map(table, ("nothing was fitted on", "were built on.", "**Every nominal flight"))
+
+    def told(rows, truth):
+        found = [re.search(r"(\d+) of (\d+)", line).groups() for line in rows.splitlines()
+                 if f"| {truth} |" in line and line.startswith("| neural") and "--partner" not in line]
+        return " of ".join(str(sum(map(int, column))) for column in zip(*found, strict=True))
+
+    every = [re.search(r"(\d+) of (\d+)", line).groups() for line in nominal.splitlines()]
+    together = " of ".join(str(sum(map(int, column))) for column in zip(*every, strict=True))
+    results = (DOCS / "results.md").read_text("utf-8")
+    goals = page[page.index("## Goals"):page.index("## Flight by flight")].splitlines()
+    for truth, sign in (("none", "same, blind"), ("ground effect", "effect named"), ("downwash", "downwash named, no")):
+        shown = "".join(line for line in goals if sign in line)
+        assert told(view, truth) in shown and told(view, truth) in results, truth
+        assert told(build, truth) in results and (truth == "none" or told(build, truth) in shown), truth
+    assert together in page[:page.index("## Flight by flight")] and together in results
+
+
 def test_every_page_can_be_reached_from_the_readme():
     linked = set(re.findall(r"\(host/docs/([\w-]+\.md)", (ROOT / "README.md").read_text("utf-8")))
     seen, todo = set(), list(linked)
