@@ -15,6 +15,7 @@ import argparse
 import csv
 import itertools
 import json
+import os
 import re
 import sys
 import time
@@ -43,6 +44,21 @@ GRID = [hover_balance.Beliefs(own=own, worked_on=(*hover_balance.BELIEFS.worked_
         for own, yaw, hung, manner in itertools.product(
             (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),
             ({}, {"damaged": SAME}))]
+
+
+def manifest(folder: Path, part: str) -> list[dict[str, str]]:
+    """Rows of the manifest, all of them or, of part "build", those of the building part."""
+    rows = list(csv.DictReader((folder / "manifest.csv").open()))
+    return [r for r, built in zip(rows, building(rows), strict=True) if built or part == "all"]
+
+
+def folder_and_part(description: str | None) -> argparse.Namespace:
+    """`folder` and `part` of the command line of a tool with this description."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="?", type=Path,
+                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
+    parser.add_argument("--part", choices=("build", "all"), default="build")
+    return parser.parse_args()
 
 
 def family(condition: str) -> str:

@@ -11,8 +11,6 @@ scatter in the building conditions. Then
   numbers is right more often in the mean of the families. Cut rotors are drawn from the conditions of at least 1.5 mm.
 """
 
-import argparse
-import csv
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -80,8 +78,7 @@ class Balances:
     """
 
     def __init__(self, folder: Path, part: str) -> None:
-        rows = list(csv.DictReader((folder / "manifest.csv").open()))
-        rows = [r for r, built in zip(rows, pad.building(rows), strict=True) if built or part == "all"]
+        rows = pad.manifest(folder, part)
         self.vehicle = vehicles.load("crazyflie-2.1")
         table = np.array([hover_balance.pattern(ready(read(folder / r["file"]), self.vehicle), self.vehicle)
                           for r in rows])
@@ -191,12 +188,12 @@ def _nearest(seen: np.ndarray, rivals: np.ndarray) -> np.ndarray:
 def show_family(b: Balances) -> None:
     """The diagnosis on drawn flights of each family that are as it believes."""
     generator, beliefs = np.random.default_rng(0), hover_balance.BELIEFS
-    every = hover_balance.hypotheses(b.vehicle)
+    hypotheses = hover_balance.hypotheses(b.vehicle)
     found, _ = fitted(b.means, b.cuts)
     cuts = np.array([change(c, *found) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if pad.large(text)])
     kinds = {"normal": [np.zeros((1, 4))], "rotor damage": [cuts],
-             "added weight": [h.change for h in every if h.name == "mass"],
-             "slung load": [h.change for h in every if h.name == "slung_load"]}
+             "added weight": [h.change for h in hypotheses if h.name == "mass"],
+             "slung load": [h.change for h in hypotheses if h.name == "slung_load"]}
     print(f"\nthe diagnosis on {FLIGHTS} drawn flights of each family, which are as it believes")
     for drone, base in b.bases.items():
         reference = hover_balance.Reference(np.zeros(6), base.variance, np.zeros(2))
@@ -211,27 +208,23 @@ def show_family(b: Balances) -> None:
                 manner = beliefs.damaged if kind == "rotor damage" else hover_balance.STEADY
                 seen[4:6] = [generator.normal(m, np.hypot(s, np.sqrt(v)))
                              for (m, s), v in zip(manner, base.variance[4:], strict=True)]
-                names.append(_family(hover_balance.evidence(seen, reference, every, beliefs)[0], every))
+                names.append(_family(hover_balance.evidence(seen, reference, hypotheses, beliefs)[0], hypotheses))
             right[kind] = np.mean([n == kind for n in names])
         print(f"{drone}: family, balanced {np.mean(list(right.values())):.2f}; "
               + ", ".join(f"{k} {v:.2f}" for k, v in right.items()))
 
 
-def _family(logs: np.ndarray, every: list[hover_balance.Hypothesis]) -> str:
+def _family(logs: np.ndarray, hypotheses: list[hover_balance.Hypothesis]) -> str:
     """The likeliest family of a log evidence for each hypothesis."""
     chance: dict[str, float] = {}
-    for h, p in zip(every, np.exp(logs - logs.max()), strict=True):
+    for h, p in zip(hypotheses, np.exp(logs - logs.max()), strict=True):
         name = {"none": "normal", **pad.FAMILY_OF}.get(h.name, h.name)
         chance[name] = chance.get(name, 0.0) + float(p)
     return max(chance, key=chance.__getitem__)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
-    parser.add_argument("--part", choices=("build", "all"), default="build")
-    options = parser.parse_args()
+    options = pad.folder_and_part(__doc__)
     balances = Balances(options.folder, options.part)
     show_scatter(balances)
     show_rotor(rotor_tests(balances))

@@ -11,8 +11,6 @@ favours these tests. Intervals resample conditions within families. What the bal
 `gap_crazypad_balance.py`.
 """
 
-import argparse
-import csv
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -78,7 +76,7 @@ def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
     weight = vehicle.mass_kg * vehicle.gravity_mps2 / 4.0
     thrust, voltage = vehicle.thrust(flight.pwm) / weight, flight.log["vbat_V"]
     levels, spectra = [], []
-    for first, last in hover_balance._hovers(flight):
+    for first, last in hover_balance.hovers(flight):
         mixed = thrust[first:last] @ hover_balance.MIX.T
         told = np.nanmean(voltage[first:last])
         slope = np.polyfit(np.arange(last - first) * PERIOD_S, np.nan_to_num(voltage[first:last], nan=told), 1)[0]
@@ -93,8 +91,7 @@ def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
 
 def table_of(folder: Path, part: str) -> Table:
     """All flights, or those on which numbers may be chosen."""
-    rows = list(csv.DictReader((folder / "manifest.csv").open()))
-    rows = [r for r, built in zip(rows, pad.building(rows), strict=True) if built or part == "all"]
+    rows = pad.manifest(folder, part)
     vehicle = vehicles.load("crazyflie-2.1")
     raw = np.array([described(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
     drone = np.array([r["drone"] for r in rows])
@@ -180,11 +177,7 @@ def show_distinct(table: Table) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path,
-                        default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")) / "crazypad")
-    parser.add_argument("--part", choices=("build", "all"), default="build")
-    options = parser.parse_args()
+    options = pad.folder_and_part(__doc__)
     table = table_of(options.folder, options.part)
     pairs, n = sorted(set(table.pair)), len(table.rows)
     print(f"{n} flights, {len(pairs)} conditions of a drone, {table.numbers.shape[1]} numbers")

@@ -43,7 +43,6 @@ LEAST_S = 0.5  #: under another vehicle that the data must show
 STEP_S = 0.5  #: by which the seconds are shifted along nominal flights
 FALSE_ALARMS = 0.01
 FORCE_HZ, YAW_HZ = 1.0, (2.0, 20.0)
-BUILD_DAYS = ("19", "20")
 MEASURES = ("mean force", "its shaking", "yaw torque")
 
 
@@ -72,7 +71,7 @@ def track(folder: Path, row: dict[str, str]) -> Track:
     force = np.where(usable, left[:, 2], 0.0) / vehicle.gravity_mps2
     fast = sosfiltfilt(butter(2, FORCE_HZ, "highpass", fs=1.0 / PERIOD_S, output="sos"), force)
     yaw = sosfiltfilt(butter(2, YAW_HZ, "bandpass", fs=1.0 / PERIOD_S, output="sos"), np.where(usable, left[:, 5], 0.0))
-    place = np.column_stack([flight.log[name] for name in ("x_m", "y_m", "z_m")])
+    place = np.column_stack([flight.log[name] for name in overhead.PLACE])
     return Track(row, place, force, fast, yaw, usable)
 
 
@@ -118,11 +117,11 @@ def overhead_at(one: Track, tracks: list[Track]) -> np.ndarray:
 
 def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
     """How often nominal flights have a wake in seconds in which they have none."""
-    told: dict[tuple[str, str], list[tuple[tuple[float, float], ...]]] = {}
+    seconds_of: dict[tuple[str, str], list[tuple[tuple[float, float], ...]]] = {}
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
-        acts = _overhead_s(overhead_at(t, tracks))
+        acts = overhead.stretches_s(overhead_at(t, tracks))
         if sum(b - a for a, b in acts) >= LEAST_S:
-            told.setdefault((t.row["vehicle"], t.row["manoeuvre"]), []).append(acts)
+            seconds_of.setdefault((t.row["vehicle"], t.row["manoeuvre"]), []).append(acts)
     kind = {t.row["file"]: (t.row["vehicle"], t.row["manoeuvre"]) for t in tracks}
     passed, tried = [], 0
     for case in gap_real.nominal(flights, "build"):
@@ -132,22 +131,49 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         vehicle = vehicles.load(case.vehicle)
         base = [ready(read(b), vehicle) for b in case.baseline]
         study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
-        for seconds in told.get(kind[name], []):
-            known = overhead.told(study, flight, base, seconds)
-            found = gates.gated(Data(known, [flight])).get(gates.TOLD)
+        for seconds in seconds_of.get(kind[name], []):
+            known = overhead.with_overhead(study, flight, base, seconds)
+            wake = gates.gated(Data(known, [flight])).get(gates.TOLD)
             tried += 1
-            if found is not None and news(Data(known, [flight]), found.key, found.gain, found.strength) >= LEAST_GAIN:
+            if wake is not None and news(Data(known, [flight]), wake.key, wake.gain, wake.strength) >= LEAST_GAIN:
                 passed.append(name)
-        print(f"{name}: {passed.count(name)} of {len(told.get(kind[name], []))}", flush=True)
+        print(f"{name}: {passed.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
     share = wilson(len(passed), tried)
     print(f"a wake in told seconds of nominal flights: {len(passed)} of {tried} [{share['low']:.1%}, "
           f"{share['high']:.1%}], in {len(set(passed))} flights")
 
 
-def _overhead_s(acts: np.ndarray) -> tuple[tuple[float, float], ...]:
-    """Stretches, s, of samples (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))) * PERIOD_S
-    return tuple((float(a), float(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
+def show_seen(tracks: list[Track], answers: Path | None) -> None:
+    """A line for each flight under another vehicle, and for each vehicle how many the test sees."""
+    nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
+    answer_of = {}
+    if answers:
+        for case in map(json.loads, answers.read_text().splitlines()):
+            answer_of[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
+    table: dict[str, list[bool]] = {}
+    unknown = 0
+    print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
+    for t in (t for t in tracks if t.row.get("truth") == "downwash"):
+        acts = overhead_at(t, tracks)
+        seconds = (acts & t.usable).sum() * PERIOD_S
+        if seconds < LEAST_S:
+            unknown += 1
+            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
+                  f"{answer_of.get(t.row['file'], '')} |")
+            continue
+        like = [n for n in nominal if (n.row["vehicle"], n.row["manoeuvre"]) == (t.row["vehicle"], t.row["manoeuvre"])]
+        of_nominal = chance(acts, like)
+        limit = np.quantile(of_nominal, 1.0 - FALSE_ALARMS / len(MEASURES), axis=0)
+        own = measures(t, acts)
+        seen = bool((own > limit).any())
+        table.setdefault(t.row["vehicle"], []).append(seen)
+        shown = " | ".join(f"{m:.2f} ({u:.2f})" for m, u in zip(own, limit, strict=True))
+        print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {shown} | {'yes' if seen else 'no'} | "
+              f"{answer_of.get(t.row['file'], '')} |", flush=True)
+    for vehicle, hits in table.items():
+        share = wilson(sum(hits), len(hits))
+        print(f"{vehicle}: seen {sum(hits)} of {len(hits)} [{share['low']:.0%}, {share['high']:.0%}]")
+    print(f"{unknown} more, whose other vehicle's path the data do not hold")
 
 
 def main() -> None:
@@ -160,42 +186,13 @@ def main() -> None:
     options = parser.parse_args()
     folder = options.flights / "neuralswarm"
     rows = [r for name in ("manifest.csv", "baselines.csv") for r in csv.DictReader((folder / name).open())]
-    rows = [r for r in rows if options.part == "all" or r["day"] in BUILD_DAYS]
-    if options.false_alarms:
-        rows = [r for r in rows if r["day"] in BUILD_DAYS]
+    everywhere = options.part == "all" and not options.false_alarms
+    rows = [r for r in rows if everywhere or r["day"] in gap_real.BUILD_DAYS]
     tracks = [track(folder, r) for r in rows if r.get("truth") != "ground_effect"]
-    nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
     if options.false_alarms:
         show_false_alarms(options.flights, tracks)
-        return
-    said = {}
-    if options.answers:
-        for case in map(json.loads, options.answers.read_text().splitlines()):
-            said[case["flight"]] = case["effects"][0]["name"] if case["effects"] else case["verdict"]
-    table: dict[str, list[bool]] = {}
-    unknown = 0
-    print(f"| flight | under, s | {' | '.join(MEASURES)} | seen | the diagnosis |\n|---|---|---|---|---|---|---|")
-    for t in (t for t in tracks if t.row.get("truth") == "downwash"):
-        acts = overhead_at(t, tracks)
-        seconds = (acts & t.usable).sum() * PERIOD_S
-        if seconds < LEAST_S:
-            unknown += 1
-            print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | | | | path not held | "
-                  f"{said.get(t.row['file'], '')} |")
-            continue
-        like = [n for n in nominal if (n.row["vehicle"], n.row["manoeuvre"]) == (t.row["vehicle"], t.row["manoeuvre"])]
-        usual = chance(acts, like)
-        limit = np.quantile(usual, 1.0 - FALSE_ALARMS / len(MEASURES), axis=0)
-        mine = measures(t, acts)
-        seen = bool((mine > limit).any())
-        table.setdefault(t.row["vehicle"], []).append(seen)
-        shown = " | ".join(f"{m:.2f} ({u:.2f})" for m, u in zip(mine, limit, strict=True))
-        print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {shown} | {'yes' if seen else 'no'} | "
-              f"{said.get(t.row['file'], '')} |", flush=True)
-    for vehicle, hits in table.items():
-        share = wilson(sum(hits), len(hits))
-        print(f"{vehicle}: seen {sum(hits)} of {len(hits)} [{share['low']:.0%}, {share['high']:.0%}]")
-    print(f"{unknown} more, whose other vehicle's path the data do not hold")
+    else:
+        show_seen(tracks, options.answers)
 
 
 if __name__ == "__main__":

@@ -141,7 +141,7 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
 
-    scenario = mission.scene_of(scenario) if isinstance(scenario, str) and scenario in mission.names() else scenario
+    scenario = mission.scene_or_scenario(scenario) if isinstance(scenario, str) else scenario
     pairs = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
     logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=pairs, without=without, seed=seed))
     lost = [f for f in logs if isinstance(f, Diverged)]

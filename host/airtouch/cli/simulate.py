@@ -88,7 +88,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     plugins = [_read(path) for path in files]
     for path in files:
         effects.load_file(path)
-    scene = mission.scene_of(scenario) if scenario in mission.names() else scenarios.load(scenario)
+    scene = mission.scene_or_scenario(scenario)
     craft = vehicles.load(vehicle)
     pairs = [effects.parse(text) for text in chosen]
     plan = scenarios.draw_flight(scene, seed, 0)

@@ -81,6 +81,11 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
     return Mission(scene.name, tuple(legs), plan.values, round(max(level)[1], 4) if level else None)
 
 
+def scene_or_scenario(name_or_path: str | Path) -> scenario.Scenario:
+    """`scene_of`, for what need not take off: where there is none, the error is the scenarios'."""
+    return scene_of(name_or_path) if str(name_or_path) in names() else scenario.load(name_or_path)
+
+
 def scene_of(name_or_path: str | Path) -> scenario.Scenario:
     """The scenario of a built-in mission, a built-in scenario or a .toml file.
 

@@ -16,7 +16,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data, Study
 from airtouch.gap.evidence.fit import fit
 from airtouch.gap.evidence.gates import TOLD
-from airtouch.gap.evidence.overhead import told, told_seconds
+from airtouch.gap.evidence.overhead import seconds_overhead, with_overhead
 from airtouch.gap.evidence.problem import LOOP
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.naming.judging import halves
@@ -53,6 +53,9 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     these seconds. Raises AirTouchError when no flight can be used, or for a partner of several flights.
     """
     say, without = progress or (lambda _: None), tuple(without)
+    if partner and len(flights) != 1:
+        raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
+    seconds = seconds_overhead(flights[0], partner) if partner else ()
     left_out: list[str] = []
     nominal = list(measure.usable(baseline, vehicle, left_out))
     seen = list(measure.usable(flights, vehicle, left_out))
@@ -69,10 +72,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     some = _some(seen)
     held = (study, fitted)
     if partner:
-        if len(flights) != 1:
-            raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
-        seconds = told_seconds(flights[0], partner)
-        study = told(study, seen[0], nominal, seconds)
+        study = with_overhead(study, seen[0], nominal, seconds)
         left_out.append(f"the other vehicle was overhead for {sum(b - a for a, b in seconds):.1f} s" if seconds
                         else "the other vehicle was never overhead")
     data = _data(study, some)

@@ -141,13 +141,13 @@ class Diagnosis:
 
     def __repr__(self) -> str:
         """One line: verdict, effects, the answer's probability, gap before and after; `plain` has everything."""
-        said = [self.verdict, ", ".join(e.name for e in self.effects)]
+        parts = [self.verdict, ", ".join(e.name for e in self.effects)]
         if self.ranking:
-            said.append(f"probability {self.ranking[0].probability:.0%}")
+            parts.append(f"probability {self.ranking[0].probability:.0%}")
         before, after = (self.gap.get(k) for k in ("before", "after"))
         if before is not None and after is not None:
-            said.append(f"gap {before:.3g} before, {after:.3g} after (floor 1)")
-        return f"Diagnosis({'; '.join(s for s in said if s)})"
+            parts.append(f"gap {before:.3g} before, {after:.3g} after (floor 1)")
+        return f"Diagnosis({'; '.join(s for s in parts if s)})"
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready, GAP.md's fields and more; floats rounded to six digits."""

@@ -43,7 +43,7 @@ def segments(log: FlightLog) -> list[Segment]:
     edges = [e for e in edges if flying[e.sample]]
     ground_height = _height(log, edges)
     at = [e.sample for e in edges]
-    for start, stop in _runs(flying):
+    for start, stop in runs(flying):
         here = slice(start, stop)
         crossing = edges[bisect_left(at, start):bisect_left(at, stop)]
         kinds[here] = KINDS.index("cruise" if crossing and not log.has(*VELOCITY[:2]) else "hover")
@@ -87,7 +87,7 @@ def _smooth(values: np.ndarray, width: int) -> np.ndarray:
     return np.convolve(finite, np.full(width, 1.0 / width), mode="same")
 
 
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
     """Start and stop of each run of True in (n,) bool."""
     return [(a, b) for a, b in _constant_runs(mask) if mask[a]]
 

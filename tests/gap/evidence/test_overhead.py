@@ -30,21 +30,21 @@ def path(begin_s, place, seconds=20.0):
 
 def test_a_vehicle_is_overhead_where_both_logs_hold_the_time():
     low = path(3.0, (0.0, 0.0, 0.5))
-    assert overhead.told_seconds(low, [path(8.0, (0.1, 0.0, 0.9), 4.0)]) == (pytest.approx((5.0, 9.0), abs=0.02),)
+    assert overhead.seconds_overhead(low, [path(8.0, (0.1, 0.0, 0.9), 4.0)]) == (pytest.approx((5.0, 9.0), abs=0.02),)
     for place in ((0.2, 0.0, 0.9), (0.0, 0.0, 0.55), (0.0, 0.0, 1.2), (0.0, 0.0, 0.1)):
-        assert overhead.told_seconds(low, [path(3.0, place)]) == ()
+        assert overhead.seconds_overhead(low, [path(3.0, place)]) == ()
 
 
 def test_two_vehicles_overhead_one_after_another_are_two_stretches():
     low = path(0.0, (0.0, 0.0, 0.5))
     others = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]
-    assert np.array(overhead.told_seconds(low, others)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
+    assert np.array(overhead.seconds_overhead(low, others)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
 
 
 def test_a_partner_without_a_path_is_refused():
     blind = FlightLog({"t_s": np.arange(10.0)}, {"source": "blind.csv"})
     with pytest.raises(AirTouchError, match="x_m"):
-        overhead.told_seconds(path(0.0, (0.0, 0.0, 0.5)), [blind])
+        overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [blind])
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def quiet():
 
 def evidence(study, one, nominal):
     """Size of a wake in SECONDS beyond the limit of the nominal flights, and its gain."""
-    told = overhead.told(study, one, nominal, SECONDS)
+    told = overhead.with_overhead(study, one, nominal, SECONDS)
     found = gates.gated(Data(told, [one]))[gates.TOLD]
     size = size_of(found.gain / (len(one) * PERIOD_S), found.strength)
     return told.scatter.unusual(found.key, size), found.gain
@@ -85,7 +85,7 @@ def test_the_rest_of_a_flight_is_apart_from_the_told_seconds():
 
 
 def test_no_seconds_change_nothing(study, quiet):
-    assert overhead.told(study, quiet, [quiet], ()) is study
+    assert overhead.with_overhead(study, quiet, [quiet], ()) is study
 
 
 def test_a_partner_belongs_to_one_flight(tmp_path):

@@ -150,13 +150,13 @@ def waiting(uri: str, stop: threading.Event) -> Callable[[str], None]:
     """For `Drone`: what to say while nobody answers, once, on stderr. It raises AirTouchError after `stop`."""
     from airtouch.crazyflie.connection.link import remedy
 
-    said: list[str] = []
+    reasons: list[str] = []
 
     def unanswered(reason: str) -> None:
         if stop.is_set():
             raise AirTouchError(f"{uri}: stopped before anybody answered")
-        if not said:
-            said.append(reason)
+        if not reasons:
+            reasons.append(reason)
             click.echo(f"airtouch: {uri}: no answer yet: {reason}; {remedy(uri)} Still trying.", err=True)
 
     return unanswered

@@ -85,15 +85,16 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     began = time.monotonic()
     if not simulated:
         training, failures = _read(flights, evaluate.spare_of(module))
-    kept = out.with_suffix(".training")
-    if detector == "best" and any(kept.glob("*")):
-        click.echo(f"{kept}: kept by a stopped training; what it did with the same flights and options is not repeated")
+    checkpoints = out.with_suffix(".training")
+    if detector == "best" and any(checkpoints.glob("*")):
+        click.echo(f"{checkpoints}: kept by a stopped training; what it did with the same flights and options is not "
+                   "repeated")
     with _progress_bars() as progress:
         if simulated:
             training, what = _simulate(simulated, scenario, without, seed, progress)
             failures = 0
         if detector == "best":
-            options["work"] = kept
+            options["work"] = checkpoints
         model = module.fit([sensors.without(log, silence) for log in training], seed=seed, progress=progress,
                            command=_command(), **options)
     if what:

@@ -12,11 +12,10 @@ from airtouch.gap.loop.closed_loop import ClosedLoop
 from airtouch.gap.naming.selection import Judged, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import Found
-from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term, parameter_of
+from airtouch.gap.signatures.candidates import CLOCK, COUNTED, MEAN, OWN_SCATTER, SPECTRUM, Term
 
 SHAPE_PRICE = 1.0  #: nats that another shape of an effect must gain on all the data
 RESTARTS = 12  #: of a fit of several parameters, at most
-WITHIN_90 = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
 #: fraction of a parameter by which the model of the loop or of a random effect's spectrum may be wrong
 MODEL_ERROR = 0.1
 #: fraction of an effect's only parameter by which the loop's model may be wrong, where the relations of signals measure
@@ -122,9 +121,9 @@ def with_reading(term: Term, x: np.ndarray, covariance: np.ndarray, reading: Rea
     read = [i for i, name in enumerate(term.free) if name in reading]
     if not read:
         return x, covariance
-    names = [term.free[i] for i in read]
-    value = np.array([(reading[n][0] - (parameter_of(term.effect, n).neutral or 0.0)) / term.step(n) for n in names])
-    variance = np.diag([(reading[n][1] / term.step(n)) ** 2 for n in names])
+    measured = replace(term, free=tuple(term.free[i] for i in read))
+    value = measured.scaled({name: reading[name][0] for name in measured.free})
+    variance = np.diag([(reading[name][1] / term.step(name)) ** 2 for name in measured.free])
     precision = np.linalg.inv(covariance[np.ix_(read, read)] + variance)
     gain, apart = covariance[:, read] @ precision, value - x[read]
     wider = max(1.0, float(apart @ precision @ apart) / len(read))

@@ -65,16 +65,16 @@ def _how_far(diagnosis: Diagnosis) -> str:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
     added = "it" if len(diagnosis.effects) == 1 else "them"
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
-    left, bad = summary.remaining(cells), summary.worse(cells)
+    open_cells, worse_cells = summary.remaining(cells), summary.worse(cells)
     over = sum(c.regime == "all" and summary.stands_out(c) for c in cells)
-    more = ""
-    if left:
-        more = f"; {len(left)} of {over} cells still stand out, mostly {_after_in_words(left[0])}"
-    if bad:
-        more += f", and {len(bad)} got worse"
+    remark = ""
+    if open_cells:
+        remark = f"; {len(open_cells)} of {over} cells still stand out, mostly {_after_in_words(open_cells[0])}"
+    if worse_cells:
+        remark += f", and {len(worse_cells)} got worse"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
             "floor on data "
-            f"held out, from {short(before)} to {short(after)} times the floor{more}.")
+            f"held out, from {short(before)} to {short(after)} times the floor{remark}.")
 
 
 def _after_in_words(cell: Cell) -> str:

@@ -24,6 +24,7 @@ from scipy.stats import qmc
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.logs.flight_log import VELOCITY
+from airtouch.logs.segments import runs
 from airtouch.vehicle import Vehicle
 
 #: lift, roll, pitch, yaw in units of a rotor's share of the weight, from thrusts of rotors 1 to 4
@@ -96,7 +97,7 @@ def pattern(flight: Flight, vehicle: Vehicle, voltage_too: bool = True) -> np.nd
     mixed = thrust @ MIX.T
     corrected = _corrections(flight)
     means, power, heave, jumps, size = [], [], [], [], []
-    for first, last in _hovers(flight):
+    for first, last in hovers(flight):
         part = mixed[first:last]
         means.append(part.mean(axis=0))
         size.append(last - first)
@@ -128,13 +129,12 @@ def _bands(f: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.array([np.log10(p[(f >= a) & (f < b)].mean(axis=0)) for a, b in pairs])
 
 
-def _hovers(flight: Flight) -> list[tuple[int, int]]:
+def hovers(flight: Flight) -> list[tuple[int, int]]:
     """Stretches in the air without take-off and landing."""
     air = (flight.phase != GROUND) & ~flight.on_ground
-    change = np.flatnonzero(np.diff(np.concatenate([[0], air.astype(np.int8), [0]])))
     trim = int(SETTLE_S / PERIOD_S)
-    found = [(a + trim, b - trim) for a, b in zip(change[::2], change[1::2], strict=True)]
-    return [(a, b) for a, b in found if (b - a) * PERIOD_S >= LEAST_S]
+    trimmed = [(a + trim, b - trim) for a, b in runs(air)]
+    return [(a, b) for a, b in trimmed if (b - a) * PERIOD_S >= LEAST_S]
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,8 @@ def gated(data: Data, without: Sequence[str] = ()) -> dict[str, Gated]:
     out = {}
     for name, variants in candidates.gated(without).items():
         if name == candidates.OVERHEAD and data.study.overhead:
-            told = _best(data, whole, name, variants, data.study.overhead, level, len(without_effect))
-            out[TOLD] = replace(told, key=TOLD)
+            wake = _best(data, whole, name, variants, data.study.overhead, level, len(without_effect))
+            out[TOLD] = replace(wake, key=TOLD)
         judged = [_judged(data, whole, name, terms, gate, cost, level, len(without_effect)) for variant in variants
                   for terms, gate, cost in (_by_blocks(data, whole, without_effect, variant), (variant, *bursts))
                   if gate]

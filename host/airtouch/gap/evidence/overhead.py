@@ -17,6 +17,7 @@ from airtouch.gap.flights.flight import PERIOD_S, Flight
 from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.segments import runs
 
 PLACE = ("x_m", "y_m", "z_m")
 #: where the wake of a vehicle overhead is felt: Crazyflies under others, neural-swarm; from 0.15 m aside within 3 %
@@ -35,7 +36,12 @@ def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (np.hypot(apart[:, 0], apart[:, 1]) < SIDEWAYS_M) & (apart[:, 2] > ABOVE_M[0]) & (apart[:, 2] < ABOVE_M[1])
 
 
-def told_seconds(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[float, float], ...]:
+def stretches_s(acts: np.ndarray) -> tuple[tuple[float, float], ...]:
+    """Stretches, s from the first sample, of the samples (n,) that are True."""
+    return tuple((first * PERIOD_S, last * PERIOD_S) for first, last in runs(acts))
+
+
+def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[float, float], ...]:
     """Stretches, s from the log's first row, in which one of the partners is overhead.
 
     All logs hold t_s of one clock and positions in one frame. Raises AirTouchError where one of them has no such.
@@ -50,23 +56,22 @@ def told_seconds(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tuple[f
         return np.column_stack([np.interp(time, one["t_s"], one[name], np.nan, np.nan) for name in PLACE])
 
     acts = np.logical_or.reduce([np.zeros(len(time), bool), *(above(path(log), path(p)) for p in partners)])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))) * PERIOD_S
     out: list[tuple[float, float]] = []
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    for first, last in stretches_s(acts):
         if out and first - out[-1][1] < APART_S:
-            out[-1] = (out[-1][0], float(last))
+            out[-1] = (out[-1][0], last)
         else:
-            out.append((float(first), float(last)))
+            out.append((first, last))
     return tuple((a, b) for a, b in out if b - a >= LEAST_S)
 
 
-def told(study: Study, flight: Flight, nominal: Sequence[Flight], seconds: Sequence[tuple[float, float]]) -> Study:
+def with_overhead(study: Study, flight: Flight, nominal: Sequence[Flight], seconds: Sequence[tuple[float, float]],
+                  ) -> Study:
     """The study of a flight over which another vehicle was in these seconds.
 
     The nominal size of what it does is that in the same seconds of the baseline flights or, where that is more, of the
-    rest of this flight: its median and median deviation, as a vehicle whose path is unknown may be over it as well. The
-    study as it is without
-    such seconds, or without baseline flights to hold them against.
+    rest of this flight: its median and median deviation, as a vehicle whose path is unknown may be over it as well.
+    Without such seconds, and without baseline flights to hold them against, the study stays as it is.
     """
     if not seconds or study.scatter is None or not nominal:
         return study

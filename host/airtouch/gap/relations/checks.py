@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airtouch.gap.relations.density import fit, log_density, unchanged
-from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.hypotheses import FlightFeatures
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
 from airtouch.gap.relations.learning import SEED, Drawing, Scene, drawings, fly, scaled
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Readout
 from airtouch.gap.signatures.candidates import interchangeable
-from airtouch.simulation.effects import EFFECTS, NAMES
+from airtouch.simulation.effects import EFFECTS, NAMES, Active
 
 CHECKS, A_CLASS, CALIBRATION = 300, 12, 80  #: nominal flights; flights of each class to check it, and to calibrate it
 #: numbers of the flights; each class has 1000 of its own
@@ -49,12 +47,10 @@ def _shares(scene: Scene, library: Library, place: int, drawing: Drawing) -> tup
     for i in range(A_CLASS):
         rng = np.random.default_rng([SEED, 96, place, i])
         strength = float(np.exp(rng.uniform(np.log(drawing.kind.highest / RANGE), np.log(drawing.kind.highest))))
-        f = fly(scene, FIRST_OF_CLASS + 1000 * place + i, [drawing.active(strength, rng)])
-        if f is None:
+        flight = _flown(scene, library, FIRST_OF_CLASS + 1000 * place + i, drawing.active(strength, rng))
+        if flight is None:
             continue
-        y = library.coordinates(f[None])[0]
-        flight, found = FlightFeatures(y, library.model), fit(own, y, unchanged(len(y)))
-        here = flight.at_fits((found,))
+        here = flight.with_class(own)
         two = flight.with_one_more(here, lambda c, _: not interchangeable(c.effect, own.effect))[0]
         excess = library.excess(flight.squared_distance(here))
         for shares, gain in ((nameless, flight.nameless_evidence(here) - here.evidence - LEAST_GAIN),
@@ -71,17 +67,23 @@ def _readout(scene: Scene, library: Library, place: int, drawing: Drawing) -> Re
     rng = np.random.default_rng([SEED, 95, place])
     flights = iter(range(FIRST_CALIBRATION + 1000 * place, FIRST_CALIBRATION + 1000 * (place + 1)))
 
-    def fitted(strength: float) -> Calibrated | None:
-        return _fitted(scene, library, own, drawing, strength, next(flights), rng)
+    def flown(strength: float) -> Calibrated | None:
+        """A flight with the effect at a strength; None where it does not end well."""
+        active = drawing.active(strength, rng)
+        flight = _flown(scene, library, next(flights), active)
+        if flight is None:
+            return None
+        here = flight.with_class(own)
+        return Calibrated(here.fits[0].strength, scaled(drawing, active), here.evidence > LEAST_EVIDENCE)
 
     low = high
     for _ in range(HALVINGS):
-        ended = [f for f in (fitted(low) for _ in range(3)) if f is not None]
+        ended = [f for f in (flown(low) for _ in range(3)) if f is not None]
         if ended and np.mean([f.shows for f in ended]) < 0.5:
             break
         low /= 2.0
     drawn = np.exp(rng.uniform(np.log(min(low, 0.5 * high)), np.log(high), CALIBRATION))
-    shown = [f for f in (fitted(s) for s in drawn) if f is not None and f.shows]
+    shown = [f for f in (flown(s) for s in drawn) if f is not None and f.shows]
     if len(shown) < LEAST_FLIGHTS:
         return None
     amount = np.array([f.amount for f in shown])
@@ -98,13 +100,7 @@ class Calibrated:
     shows: bool
 
 
-def _fitted(scene: Scene, library: Library, own: EffectClass, drawing: Drawing, strength: float, number: int,
-            rng: np.random.Generator) -> Calibrated | None:
-    """A flight with an effect of a strength; None where it does not end well."""
-    active = drawing.active(strength, rng)
+def _flown(scene: Scene, library: Library, number: int, active: Active) -> FlightFeatures | None:
+    """The features of a flight with an effect; None where it does not end well."""
     features = fly(scene, number, [active])
-    if features is None:
-        return None
-    values = library.coordinates(features[None])[0]
-    found = fit(own, values, unchanged(len(values)))
-    return Calibrated(found.strength, scaled(drawing, active), found.evidence - log_density(values) > LEAST_EVIDENCE)
+    return None if features is None else FlightFeatures(library.coordinates(features[None])[0], library.model)

@@ -64,9 +64,12 @@ class FlightFeatures:
 
     def single_effects(self) -> list[Hypothesis]:
         """A hypothesis for every class alone, the likeliest first."""
-        base = log_density(self.values)
-        fits = [fit(c, self.values, unchanged(len(self.values))) for c in self.model.classes]
-        return sorted((Hypothesis((f,), f.level - base, f.evidence - base) for f in fits), key=lambda h: -h.evidence)
+        return sorted(map(self.with_class, self.model.classes), key=lambda h: -h.evidence)
+
+    def with_class(self, of: EffectClass) -> Hypothesis:
+        """The hypothesis of one class alone."""
+        base, f = log_density(self.values), fit(of, self.values, unchanged(len(self.values)))
+        return Hypothesis((f,), f.level - base, f.evidence - base)
 
     def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
                       ) -> list[Hypothesis]:

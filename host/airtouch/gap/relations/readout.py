@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.signatures.candidates import parameter_of, unit
+from airtouch.gap.signatures.candidates import neutral_of, parameter_of, unit
 from airtouch.simulation.effects import Effect
 
 LOGARITHMIC = frozenset({"motor_lag", "imu_noise", "controller_gain"})  #: effects whose parameters are factors
@@ -75,7 +75,7 @@ def amount_of(effect: Effect, name: str, value: float) -> float:
     if effect.name in LOGARITHMIC:
         return float(np.log(value))
     p = parameter_of(effect, name)
-    return (value - (p.neutral or 0.0)) / unit(p)
+    return (value - neutral_of(p)) / unit(p)
 
 
 def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
@@ -87,5 +87,5 @@ def read_out(readout: Readout, effect: Effect, strength: np.ndarray) -> Reading:
             value = float(np.exp(amount))
             out[name] = value, value * float(deviation)
         else:
-            out[name] = (p.neutral or 0.0) + float(amount) * unit(p), float(deviation) * unit(p)
+            out[name] = neutral_of(p) + float(amount) * unit(p), float(deviation) * unit(p)
     return out

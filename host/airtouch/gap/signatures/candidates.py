@@ -100,7 +100,7 @@ class Term:
         values = dict(self.values)
         for name, amount in zip(self.free, x, strict=True):
             p = self._parameter(name)
-            values[name] = float(min(max(_neutral(p) + amount * unit(p), p.low), p.high))
+            values[name] = float(min(max(neutral_of(p) + amount * unit(p), p.low), p.high))
         return values
 
     def fitted(self, x: np.ndarray) -> "Term":
@@ -128,13 +128,13 @@ class Term:
         low, high = [], []
         for name in self.free:
             p = self._parameter(name)
-            low.append((p.low - _neutral(p)) / unit(p))
-            high.append((p.high - _neutral(p)) / unit(p))
+            low.append((p.low - neutral_of(p)) / unit(p))
+            high.append((p.high - neutral_of(p)) / unit(p))
         return np.array(low), np.array(high)
 
     def scaled(self, values: Mapping[str, float]) -> np.ndarray:
         """Scaled values (k,) of the free parameters, from values in their units."""
-        return np.array([(values[n] - _neutral(self._parameter(n))) / self.step(n) for n in self.free])
+        return np.array([(values[n] - neutral_of(self._parameter(n))) / self.step(n) for n in self.free])
 
     def among_all(self, x: np.ndarray, other: float = 0.0) -> np.ndarray:
         """Values (k,) of the first k free parameters in their places among all that its effect may have free.
@@ -178,11 +178,12 @@ def parameter_of(effect: Effect, name: str) -> Parameter:
 
 def unit(p) -> float:
     """The natural step of a parameter, in its unit: from neutral to default, else RANGE_STEP of its range."""
-    step = abs(p.default - _neutral(p))
+    step = abs(p.default - neutral_of(p))
     return step if step > 0.0 else RANGE_STEP * (p.high - p.low)
 
 
-def _neutral(p) -> float:
+def neutral_of(p: Parameter) -> float:
+    """The value of a parameter at which its effect does nothing; 0 where it has none."""
     """The value at which a parameter does nothing, 0 where it has none."""
     return 0.0 if p.neutral is None else p.neutral
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.gap.signatures.candidates import free_of, unit
+from airtouch.gap.signatures.candidates import free_of, neutral_of, unit
 from airtouch.simulation import effects
 from airtouch.simulation.effects import Active, Effect
 
@@ -113,9 +113,9 @@ def _any(effect: Effect) -> Callable[[float, np.random.Generator], Values]:
         direction /= np.linalg.norm(direction)
         out = {}
         for p, x in zip(free, direction, strict=True):
-            signed = -abs(x) if p.high <= (p.neutral or 0.0) else abs(x) if p.low >= (p.neutral or 0.0) else \
+            signed = -abs(x) if p.high <= neutral_of(p) else abs(x) if p.low >= neutral_of(p) else \
                 x * rng.choice([-1.0, 1.0])
-            out[p.name] = float(np.clip((p.neutral or 0.0) + s * signed * unit(p), p.low, p.high))
+            out[p.name] = float(np.clip(neutral_of(p) + s * signed * unit(p), p.low, p.high))
         return out
 
     return make

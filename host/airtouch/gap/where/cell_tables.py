@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
+from airtouch.gap.signatures.candidates import WITHIN_90
 from airtouch.gap.where.band_sums import BANDS_HZ, REGIMES, Sums
 from airtouch.logs.segments import KINDS
 
@@ -13,7 +14,6 @@ DRAWS = 400  #: bootstrap samples of each phase
 LEAST_FLIGHTS = 5  #: flights from which on the bootstrap draws flights; of fewer it draws blocks
 LEAST_SECONDS = 0.3  #: seconds that a cell needs; one with less is left out
 INTERVAL = (5.0, 95.0)  #: percentiles between which the 90 % intervals lie
-SIGMAS = 1.645  #: standard deviations of a normal variable on either side that hold 90 %
 FREEDOM = 4.0  #: degrees of freedom of a block at most, as blocks differ by more than chance
 AIR = "air"  #: key of the floor of phases in which no nominal flight was
 
@@ -70,7 +70,7 @@ def _rows(sums: Sums, rows: np.ndarray) -> Sums:
 def _offset(mean: np.ndarray, square: np.ndarray, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Interval of a mean square that is a constant and something that varies around it."""
     variance = np.maximum(square - mean ** 2, 0.0)
-    error = SIGMAS * np.sqrt(variance / freedom)
+    error = WITHIN_90 * np.sqrt(variance / freedom)
     below, above = (freedom / chi2.ppf(p / 100.0, freedom) for p in INTERVAL[::-1])
     size = np.abs(mean)
     return np.maximum(size - error, 0.0) ** 2 + variance * below, (size + error) ** 2 + variance * above

@@ -151,16 +151,16 @@ def source_of(name: str) -> str:
 
 def _in_words(error: Exception) -> str:
     """The error in a line, with the nearest right names where a name was wrong."""
-    said = str(error).splitlines()[0]
-    if missing := re.match(r"cannot import name '(\w+)' from '([\w.]+)'", said):
+    text = str(error).splitlines()[0]
+    if missing := re.match(r"cannot import name '(\w+)' from '([\w.]+)'", text):
         name, module = missing.groups()
         return f"{module} has no {name!r}{nearest(name, vars(sys.modules[module]))}"
-    if argument := re.match(r"(\w+)\.__init__\(\) got an unexpected keyword argument '(\w+)'", said):
+    if argument := re.match(r"(\w+)\.__init__\(\) got an unexpected keyword argument '(\w+)'", text):
         kind, name = argument.groups()
         known = {"Effect": Effect, "Parameter": Parameter}.get(kind)
         if known:
             return f"{kind} takes no {name!r}{nearest(name, [f.name for f in dataclasses.fields(known)])}"
-    return f"{type(error).__name__}: {said}"
+    return f"{type(error).__name__}: {text}"
 
 
 def _line_of(error: Exception, source: str) -> str:
