@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import select
 import signal
 from pathlib import Path
 
@@ -69,6 +70,21 @@ def test_a_process_that_dies_loses_nothing(checked, tmp_path, monkeypatch):
     assert (tmp_path / "died").exists() and any("died" in s for s in said)
     for n in names:
         assert (tmp_path / "answers" / f"{n}.json").read_bytes() == (folder / "answers" / f"{n}.json").read_bytes()
+
+
+def test_what_is_sent_to_a_process_fits_into_its_pipe(checked, tmp_path, monkeypatch):
+    """Else Python 3.11 waits for ever when the process dies while it is written (CPython issue 94777)."""
+    sent = []
+
+    def in_order(submit, cases, ahead):
+        sent.extend(cases)
+        return iter(())
+
+    monkeypatch.setattr(blind_run, "in_order", in_order)
+    with pytest.raises(AirTouchError):  # nothing comes back
+        blind_run.answer(checked[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
+                         study=object())
+    assert sent and all(len(pickle.dumps(case)) < select.PIPE_BUF for case in sent)
 
 
 def test_processes_that_die_again_and_again_are_told(checked, tmp_path, monkeypatch):

@@ -5,7 +5,7 @@ One JSON for each case under OUT/answers: what is there is not done again.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
@@ -27,6 +27,7 @@ from airtouch.vehicle import load
 Say = Callable[[str], None]
 Mapper = Callable[[Callable, Iterable], Iterable]
 Case = tuple[str, tuple[str, ...], FlightLog]  #: name of a flight, effects left out, its log
+CaseFile = tuple[str, tuple[str, ...], Path]  #: the same with the log's file
 Answer = tuple[str, tuple[str, ...], str]
 AHEAD = 4  #: flights sent to each process and not yet back
 DEATHS = 3  #: of local processes, after which the work goes on
@@ -73,9 +74,9 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
         if not todo:
             return
         study = study or study_in(folder)
-        logs = ((name, without, read(folder / f"{name}.csv.gz")) for name, without in todo)
+        files = [(name, without, folder / f"{name}.csv.gz") for name, without in todo]
         try:
-            for name, without, text in _answers(study, logs, min(workers, len(todo)), spread):
+            for name, without, text in _answers(study, files, min(workers, len(todo)), spread):
                 write_bytes(text.encode(), _place(answers, name, without), True)
                 progress(name)
         except BrokenProcessPool:
@@ -83,13 +84,18 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
     raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
 
 
-def _answers(study: Study, logs: Iterable[Case], workers: int, spread: Mapper | None) -> Iterator[Answer]:
-    """Answers as they come, in the order of the flights."""
+def _answers(study: Study, files: Sequence[CaseFile], workers: int, spread: Mapper | None) -> Iterator[Answer]:
+    """Answers as they come, in the order of the flights.
+
+    Local processes read the logs themselves: if a process dies while a log is written to its pipe, Python 3.11 waits
+    for ever (CPython issue 94777). A file's name fits into the pipe.
+    """
     if spread is not None or workers == 1:
+        logs = ((name, without, read(path)) for name, without, path in files)
         yield from (spread or map)(partial(_diagnosed, study), logs)
         return
     with ProcessPoolExecutor(workers, initializer=_begin, initargs=(study,)) as pool:
-        yield from in_order(lambda case: pool.submit(with_study, case), logs, AHEAD * workers)
+        yield from in_order(lambda case: pool.submit(with_study, case), files, AHEAD * workers)
 
 
 def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
@@ -107,10 +113,11 @@ def _begin(study: Study | None) -> None:
     _study = study
 
 
-def with_study(case: Case) -> Answer:
+def with_study(case: CaseFile) -> Answer:
     """The answer to one case, in a process that `_begin` has given the study."""
     assert _study is not None
-    return _diagnosed(_study, case)
+    name, without, path = case
+    return _diagnosed(_study, (name, without, read(path)))
 
 
 def _diagnosed(study: Study, case: Case) -> Answer:
