@@ -132,7 +132,7 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         base = [ready(read(b), vehicle) for b in case.baseline]
         study, flight = calibrate.calibrated(vehicle, base)[0], ready(read(case.flight), vehicle)
         for seconds in seconds_of.get(kind[name], []):
-            known = overhead.with_overhead(study, flight, base, seconds)
+            known = overhead.with_overhead(study, flight, seconds)
             wake = gates.gated(Data(known, [flight])).get(gates.TOLD)
             tried += 1
             if wake is not None and news(Data(known, [flight]), wake.key, wake.gain, wake.strength) >= LEAST_GAIN:

@@ -72,7 +72,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     some = _some(seen)
     held = (study, fitted)
     if partner:
-        study = with_overhead(study, seen[0], nominal, seconds)
+        study = with_overhead(study, seen[0], seconds)
         left_out.append(f"the other vehicle was overhead for {sum(b - a for a, b in seconds):.1f} s" if seconds
                         else "the other vehicle was never overhead")
     data = _data(study, some)

@@ -14,6 +14,7 @@ from airtouch.gap.evidence import gates, overhead
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
+from airtouch.gap.signatures.candidates import OVERHEAD
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, flown
@@ -52,30 +53,29 @@ def quiet():
     return flown(1, 62)[0]
 
 
-def evidence(study, one, nominal):
-    """Size of a wake in SECONDS beyond the limit of the nominal flights, and its gain."""
-    told = overhead.with_overhead(study, one, nominal, SECONDS)
-    found = gates.gated(Data(told, [one]))[gates.TOLD]
-    size = size_of(found.gain / (len(one) * PERIOD_S), found.strength)
-    return told.scatter.unusual(found.key, size), found.gain
+def evidence(study, one):
+    """Size of a wake in SECONDS beyond its limit, and its gain."""
+    known = overhead.with_overhead(study, one, SECONDS)
+    wake = gates.gated(Data(known, [one]))[gates.TOLD]
+    size = size_of(wake.gain / (len(one) * PERIOD_S), wake.strength)
+    return known.scatter.unusual(wake.key, size), wake.gain
 
 
 def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, quiet):
-    nominal = flown(2, 70)
     t = np.arange(len(quiet)) * PERIOD_S
     acts = np.any([(t >= a) & (t < b) for a, b in SECONDS], axis=0)
     force = quiet.acceleration.copy()
     force[acts, 2] -= 0.06 * VEHICLE.gravity_mps2
-    over, gain = evidence(study, replace(quiet, acceleration=force), nominal)
+    over, gain = evidence(study, replace(quiet, acceleration=force))
     assert over > 0.0 and gain > LEAST_GAIN
-    over, gain = evidence(study, quiet, nominal)
+    over, gain = evidence(study, quiet)
     assert over < 0.0 or gain < LEAST_GAIN
 
 
 def test_a_flight_that_shakes_all_along_has_no_wake_in_told_seconds(study, quiet):
     force = quiet.acceleration.copy()
     force[:, 2] += 0.03 * VEHICLE.gravity_mps2 * np.random.default_rng(3).normal(size=len(quiet))
-    over, _ = evidence(study, replace(quiet, acceleration=force), flown(2, 70))
+    over, _ = evidence(study, replace(quiet, acceleration=force))
     assert over < 0.0
 
 
@@ -84,8 +84,15 @@ def test_the_rest_of_a_flight_is_apart_from_the_told_seconds():
     assert left == (("f", 1.0, 1.75), ("f", 2.75, 4.0))
 
 
+def test_sizes_scatter_as_those_that_are_looked_for(study, quiet):
+    looked_for = study.scatter.passing[OVERHEAD]
+    assert overhead.with_overhead(study, quiet, SECONDS).scatter.passing[gates.TOLD][1] == looked_for[1]
+    nearly_all = ((0.0, 0.9 * len(quiet) * PERIOD_S),)  # so that the rest is too short to be a yardstick
+    assert overhead.with_overhead(study, quiet, nearly_all).scatter.passing[gates.TOLD] == looked_for
+
+
 def test_no_seconds_change_nothing(study, quiet):
-    assert overhead.with_overhead(study, quiet, [quiet], ()) is study
+    assert overhead.with_overhead(study, quiet, ()) is study
 
 
 def test_a_partner_belongs_to_one_flight(tmp_path):

@@ -1,8 +1,8 @@
-"""When another vehicle was overhead, from its own log, and what nominal flights seem to have in such seconds.
+"""When another vehicle was overhead, from its own log, and what the rest of the flight seems to have of its wake.
 
 Where nobody tells when a wake acts, its seconds are looked for, and nominal flights gain much from such a search. Where
-the other vehicle's path is known, nothing is looked for: an effect in the told seconds is held against the same seconds
-of the baseline flights, shifted around each of them, and of the rest of the flight itself, which may be flown harder.
+the other vehicle's path is known, nothing is looked for: a wake in the told seconds is held against the rest of the same
+flight, as the flight may be flown harder than others. Sizes scatter about that as they do in nominal flights.
 """
 
 from collections.abc import Sequence
@@ -24,10 +24,9 @@ PLACE = ("x_m", "y_m", "z_m")
 SIDEWAYS_M, ABOVE_M = 0.15, (0.1, 0.6)
 APART_S = 0.1  #: stretches with less between them are one
 LEAST_S = 0.05  #: shorter ones are none
-SHIFTS = 8  #: of the told seconds around each baseline flight, and around the rest of the flight
+SHIFTS = 8  #: of the told seconds around the rest of the flight
 MARGIN_S = 0.25  #: around the told seconds, in which a wake may already or still act
 LEAST_SHARE = 0.5  #: of the told seconds that shifted ones must hold
-NORMAL = 1.4826  #: standard deviation of a normal variable over its median deviation
 
 
 def above(own: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -65,23 +64,21 @@ def seconds_overhead(log: FlightLog, partners: Sequence[FlightLog]) -> tuple[tup
     return tuple((a, b) for a, b in out if b - a >= LEAST_S)
 
 
-def with_overhead(study: Study, flight: Flight, nominal: Sequence[Flight], seconds: Sequence[tuple[float, float]],
-                  ) -> Study:
+def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> Study:
     """The study of a flight over which another vehicle was in these seconds.
 
-    The nominal size of what it does is that in the same seconds of the baseline flights or, where that is more, of the
-    rest of this flight: its median and median deviation, as a vehicle whose path is unknown may be over it as well.
-    Without such seconds, and without baseline flights to hold them against, the study stays as it is.
+    The nominal size of its wake is the median of what a wake seems to be in as many seconds of the rest of this flight;
+    the median, as a vehicle whose path is unknown may be over it as well. It scatters as sizes of wakes that are looked
+    for do in nominal flights, and is theirs where the rest is too short. Without such seconds, and where no baseline
+    flights say how sizes scatter, the study stays as it is.
     """
-    if not seconds or study.scatter is None or not nominal:
+    if not seconds or study.scatter is None:
         return study
-    sizes = [_size(Data(study, [f]), gate) for f in nominal for gate in _shifted(f, seconds)]
-    data, long = Data(study, [flight]), sum(b - a for a, b in seconds)
+    data, duration = Data(study, [flight]), sum(b - a for a, b in seconds)
     rest = [_outside(gate, seconds) for gate in _shifted(flight, seconds)]
-    own = np.array([_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_SHARE * long] or [0.0])
-    spread = NORMAL * float(np.median(np.abs(own - np.median(own))))
-    passing = {**study.scatter.passing, TOLD: (max(float(np.mean(sizes)), float(np.median(own))),
-                                               max(float(np.std(sizes, ddof=1)), spread))}
+    sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_SHARE * duration]
+    middle, spread = study.scatter.passing[OVERHEAD]
+    passing = {**study.scatter.passing, TOLD: (float(np.median(sizes)) if sizes else middle, spread)}
     return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
                    scatter=replace(study.scatter, passing=passing))
 
