@@ -1,8 +1,8 @@
 """When another vehicle was overhead, from its own log, and what the rest of the flight seems to have of its wake.
 
 Where nobody tells when a wake acts, its seconds are looked for, and nominal flights gain much from such a search. Where
-the other vehicle's path is known, nothing is looked for: a wake in the told seconds is held against the rest of the same
-flight, as the flight may be flown harder than others. Sizes scatter about that as they do in nominal flights.
+the other vehicle's path is known, nothing is looked for: a wake in the told seconds is held against the rest of that
+flight, which may be flown harder than others. Sizes scatter about that as they do in nominal flights.
 """
 
 from collections.abc import Sequence
