@@ -2,10 +2,10 @@
 
     python tools/gap_crazypad_balance.py [FOLDER] [--part build|all]
 
-One change for a millimetre cut off a rotor is fitted to all conditions with cut blades, told their labels. What is left
+One change for a millimetre cut off a rotor is fitted to all conditions with cut blades, by their labels. The residual
 is how a vehicle differs that was worked on: another set of propellers, for the most part. `Beliefs.worked_on` is this
 scatter in the building conditions. Then
-- a test of the rotor that is told how many rotors were cut, how much of each, and change and scatter of the other
+- a test of the rotor that knows how many rotors were cut, how much of each, and change and scatter of the other
   conditions; it only chooses which rotors. Severity is then measured along the right rotors' change.
 - the diagnosis itself on drawn flights whose changes and scatter are what it believes: no test on the same six
   numbers is right more often in the mean of the families. Cut rotors are drawn from the conditions of at least 1.5 mm.
@@ -23,49 +23,57 @@ from scipy.optimize import least_squares, minimize_scalar
 from scipy.stats import spearmanr
 from scipy.stats import t as student
 
-import gap_crazypad as pad
+import crazypad_figures as figures
+import crazypad_labels as labels
 from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 
-DRAWS = 4000
-FLIGHTS = 400  #: drawn of each family
+DRAWS = 4000  #: of the scatter, for the expected share of right rotors; no source: round number, good to 0.01
+FLIGHTS = 400  #: drawn of each family; no source: round number, good to 0.03
+SMALL = 2.0  #: times the variance of one set of propellers in each axis: what two sets differ by
+WORKED_ON_MOST = 0.1  #: upper bound of the scatter of vehicles that were worked on; no source: far above what was found
+#: the balance's four numbers, as they are printed
 AXES = "lift, roll, pitch, yaw"
 Condition = tuple[str, str]  #: drone and what was done to it
 
 
 def change(cut: dict[int, float], slope: float, yaw: float) -> np.ndarray:
-    """Change (4,) of the balance where so many millimetres are cut off these rotors: one more told by slope a mm.
+    """Change (4,) of the balance where so many millimetres are cut off these rotors.
 
-    yaw: ratio of the change of yaw to that of a rotor whose torque follows its thrust.
+    slope: growth of a rotor's commanded thrust, 1/mm. yaw: ratio of the change of
+    yaw to that of a rotor whose torque follows its thrust.
     """
-    told = np.ones(4)
+    command = np.ones(4)
     for rotor, mm in cut.items():
-        told[rotor - 1] += slope * mm
-    mixed = hover_balance.MIX @ told
+        command[rotor - 1] += slope * mm
+    mixed = hover_balance.MIX @ command
     return np.array([np.log(mixed[0]), *(mixed[1:] / mixed[0] * (1.0, 1.0, yaw))])
 
 
 def fitted(means: np.ndarray, cuts: list[dict[int, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """Slope and yaw ratio (2,) that fit the balances (conditions, 4) best, and what is left (conditions, 4)."""
-    def left(x: np.ndarray) -> np.ndarray:
+    """Slope and yaw ratio (2,) that fit the balances (conditions, 4) best, and their residuals (conditions, 4)."""
+    def residuals(x: np.ndarray) -> np.ndarray:
+        """Residuals (conditions, 4) with slope and yaw ratio x."""
         return np.array([m - change(c, *x) for m, c in zip(means, cuts, strict=True)])
 
-    found = least_squares(lambda x: left(x).ravel(), (0.03, 1.0)).x
-    return found, left(found)
+    solution = least_squares(lambda x: residuals(x).ravel(), (0.03, 1.0)).x
+    return solution, residuals(solution)
 
 
-def worked_on(left: np.ndarray, nominal: np.ndarray, freedom: float) -> np.ndarray:
-    """Scatter (4,) beside the nominal variances (conditions, 4) that makes what is left likeliest.
+def worked_on(residuals: np.ndarray, nominal: np.ndarray, freedom: float) -> np.ndarray:
+    """Scatter (4,) beside the nominal variances (conditions, 4) that makes the residuals (conditions, 4) likeliest.
 
     Roll and pitch have one, as the vehicle is symmetric; the tail is Student's, as the diagnosis takes it.
     """
     def scatter(columns: list[int]) -> float:
+        """The likeliest scatter of these columns together."""
         def minus_log(extra: float) -> float:
+            """Minus the log likelihood of a scatter."""
             width = np.sqrt(nominal[:, columns] + extra ** 2)
-            return -float((student.logpdf(left[:, columns] / width, freedom) - np.log(width)).sum())
-        return float(minimize_scalar(minus_log, bounds=(0.0, 0.1), method="bounded").x)
+            return -float((student.logpdf(residuals[:, columns] / width, freedom) - np.log(width)).sum())
+        return float(minimize_scalar(minus_log, bounds=(0.0, WORKED_ON_MOST), method="bounded").x)
 
     sides = scatter([1, 2])
     return np.array([scatter([0]), sides, sides, scatter([3])])
@@ -78,16 +86,16 @@ class Balances:
     """
 
     def __init__(self, folder: Path, part: str) -> None:
-        rows = pad.manifest(folder, part)
+        rows = labels.manifest(folder, part)
         self.vehicle = vehicles.load("crazyflie-2.1")
         table = np.array([hover_balance.pattern(ready(read(folder / r["file"]), self.vehicle), self.vehicle)
                           for r in rows])
-        drone, normal = [r["drone"] for r in rows], np.array([pad.family(r["condition"]) == "normal" for r in rows])
+        drone, normal = [r["drone"] for r in rows], np.array([labels.family(r["condition"]) == "normal" for r in rows])
         self.bases = {d: hover_balance.reference(table[normal & (np.array(drone) == d)]) for d in sorted(set(drone))}
         self.difference = np.array([self.bases[d].difference(p) for d, p in zip(drone, table, strict=True)])
         self.of = [(r["drone"], r["condition"]) for r in rows]
-        self.pairs = sorted({p for p in self.of if np.isfinite(pad.cut_mm(p[1]))})
-        self.cuts = [pad.millimetres(condition) for _, condition in self.pairs]
+        self.pairs = sorted({p for p in self.of if np.isfinite(labels.cut_mm(p[1]))})
+        self.cuts = [labels.millimetres(condition) for _, condition in self.pairs]
         self.means = np.array([self.own(p).mean(axis=0) for p in self.pairs])
 
     def own(self, pair: Condition) -> np.ndarray:
@@ -96,8 +104,8 @@ class Balances:
 
 
 def show_scatter(b: Balances) -> None:
-    """The fit, what is left, and the `worked_on` that follows."""
-    (slope, yaw), left = fitted(b.means, b.cuts)
+    """Print the fit, the rms of its residuals, and the `worked_on` that follows."""
+    (slope, yaw), residuals = fitted(b.means, b.cuts)
     each = [b.own(p) - b.own(p).mean(axis=0) for p in sorted(set(b.of))]
     within = np.sqrt((np.concatenate(each) ** 2).sum(axis=0) / sum(len(e) - 1 for e in each))
     print(f"{len(b.pairs)} conditions with cut blades: {100 * slope:.1f} % more told to a rotor for each mm, "
@@ -105,8 +113,8 @@ def show_scatter(b: Balances) -> None:
     beliefs = hover_balance.BELIEFS
     nominal = np.array([b.bases[drone].variance[:4] for drone, _ in b.pairs])
     for text, values in (("between flights of a condition", within),
-                         ("left of the conditions, rms", np.sqrt((left ** 2).mean(axis=0))),
-                         ("worked_on that makes these likeliest", worked_on(left, nominal, beliefs.freedom))):
+                         ("left of the conditions, rms", np.sqrt((residuals ** 2).mean(axis=0))),
+                         ("worked_on that makes these likeliest", worked_on(residuals, nominal, beliefs.freedom))):
         print(f"{text}, {AXES}: " + ", ".join(f"{100 * v:.1f} %" for v in values))
 
 
@@ -117,10 +125,10 @@ def _rivals(cut: dict[int, float]) -> Iterator[dict[int, float]]:
 
 
 @dataclass(frozen=True)
-class Told:
+class RotorTest:
     """A condition as a test of the rotor sees it.
 
-    small: whether the cut changes less than two sets of propellers differ; expected: share right, if what is left is
+    small: whether the cut changes less than two sets of propellers differ; expected: share right, if residuals are
     normal; sides, hits (flights,): whether the change is to the predicted side, the rotors right; mm (flights,): of
     the cut, as measured.
     """
@@ -133,64 +141,70 @@ class Told:
     mm: np.ndarray
 
 
-def rotor_tests(b: Balances) -> list[Told]:
+def rotor_tests(b: Balances) -> list[RotorTest]:
     """Each condition with cut blades, change and scatter fitted to the others."""
     out, generator = [], np.random.default_rng(0)
     for k, (pair, cut) in enumerate(zip(b.pairs, b.cuts, strict=True)):
         rest = np.arange(len(b.pairs)) != k
-        found, left = fitted(b.means[rest], [c for c, r in zip(b.cuts, rest, strict=True) if r])
-        whiten = np.linalg.inv(np.linalg.cholesky(left.T @ left / (rest.sum() - 2))).T
-        rivals = np.array([change(c, *found) for c in _rivals(cut)]) @ whiten
-        right, true = np.array([set(c) == set(cut) for c in _rivals(cut)]), change(cut, *found) @ whiten
-        drawn, own = true + generator.standard_normal((DRAWS, 4)), b.own(pair) @ whiten
-        out.append(Told(pair, bool(true @ true < 2.0 * len(true)), float(right[_nearest(drawn, rivals)].mean()),
-                        own @ true > 0.0, right[_nearest(own, rivals)], own @ true / (true @ true) * sum(cut.values())))
+        solution, residuals = fitted(b.means[rest], [c for c, r in zip(b.cuts, rest, strict=True) if r])
+        whiten = np.linalg.inv(np.linalg.cholesky(residuals.T @ residuals / (rest.sum() - 2))).T
+        rivals = np.array([change(c, *solution) for c in _rivals(cut)]) @ whiten
+        right = np.array([set(c) == set(cut) for c in _rivals(cut)])
+        true = change(cut, *solution) @ whiten
+        samples, own = true + generator.standard_normal((DRAWS, 4)), b.own(pair) @ whiten
+        out.append(RotorTest(pair, bool(true @ true < SMALL * len(true)),
+                             float(right[_nearest(samples, rivals)].mean()),
+                             own @ true > 0.0, right[_nearest(own, rivals)],
+                             own @ true / (true @ true) * sum(cut.values())))
     return out
 
 
-def show_rotor(tests: list[Told]) -> None:
-    """What the balance says of which rotor was cut, to a test that is told the rest."""
+def show_rotor(tests: list[RotorTest]) -> None:
+    """Print what the balance says of which rotor was cut, to a test that knows the rest."""
     print("\n| cut | flights | the cut changes less than two sets of propellers differ | changed to the predicted "
           "side | exact rotors, told their number and the mm | expected of these | severity, told the rotors |\n"
           "|---|---|---|---|---|---|---|")
     for text, large in (("all", False), ("at least 1.5 mm off a rotor", True)):
-        some = [t for t in tests if not large or pad.large(t.pair[1])]
-        flights = sum(len(t.hits) for t in some)
-        small, sides = sum(len(t.hits) for t in some if t.small), sum(int(t.sides.sum()) for t in some)
-        expected = sum(t.expected * len(t.hits) for t in some) / flights
-        print(f"| {text} | {flights} | {small} | {sides} | {_shown(some, _right)} | {expected:.2f} | "
-              f"{_shown(some, _severity)} |")
+        group = [t for t in tests if not large or labels.large(t.pair[1])]
+        flights = sum(len(t.hits) for t in group)
+        small, sides = sum(len(t.hits) for t in group if t.small), sum(int(t.sides.sum()) for t in group)
+        expected = sum(t.expected * len(t.hits) for t in group) / flights
+        print(f"| {text} | {flights} | {small} | {sides} | {_with_interval(group, _share_right)} | {expected:.2f} | "
+              f"{_with_interval(group, _severity)} |")
     for t in tests:
         print(f"  {' '.join(t.pair):55s} {t.hits.sum()} of {len(t.hits)}, expected {t.expected:.2f}"
               f"{', small' if t.small else ''}")
 
 
-def _right(some: Sequence[Told]) -> float:
-    return float(np.concatenate([t.hits for t in some]).mean())
+def _share_right(tests: Sequence[RotorTest]) -> float:
+    """Share of flights whose rotors are named right."""
+    return float(np.concatenate([t.hits for t in tests]).mean())
 
 
-def _severity(some: Sequence[Told]) -> float:
-    true = np.concatenate([np.full(len(t.mm), pad.cut_mm(t.pair[1])) for t in some])
-    return float(spearmanr(np.concatenate([t.mm for t in some]), true).statistic)
+def _severity(tests: Sequence[RotorTest]) -> float:
+    """Spearman's rank correlation of measured and true millimetres."""
+    true = np.concatenate([np.full(len(t.mm), labels.cut_mm(t.pair[1])) for t in tests])
+    return float(spearmanr(np.concatenate([t.mm for t in tests]), true).statistic)
 
 
-def _shown(some: Sequence[Told], figure: Callable[[Sequence[Told]], float]) -> str:
+def _with_interval(tests: Sequence[RotorTest], figure: Callable[[Sequence[RotorTest]], float]) -> str:
     """A figure with its 90 % interval, conditions resampled."""
-    drawn = np.random.default_rng(0).integers(0, len(some), (pad.RESAMPLES, len(some)))
-    low, high = np.nanpercentile([figure([some[i] for i in row]) for row in drawn], (5, 95))
-    return f"{figure(some):.2f} ({low:.2f} to {high:.2f})"
+    samples = np.random.default_rng(0).integers(0, len(tests), (figures.RESAMPLES, len(tests)))
+    low, high = np.nanpercentile([figure([tests[i] for i in row]) for row in samples], (5, 95))
+    return f"{figure(tests):.2f} ({low:.2f} to {high:.2f})"
 
 
-def _nearest(seen: np.ndarray, rivals: np.ndarray) -> np.ndarray:
-    return ((seen[:, None] - rivals) ** 2).sum(axis=2).argmin(axis=1)
+def _nearest(balances: np.ndarray, rivals: np.ndarray) -> np.ndarray:
+    """Index (n,) of the rival (rivals, 4) nearest to each balance (n, 4)."""
+    return ((balances[:, None] - rivals) ** 2).sum(axis=2).argmin(axis=1)
 
 
 def show_family(b: Balances) -> None:
-    """The diagnosis on drawn flights of each family that are as it believes."""
+    """Print how often the diagnosis is right on drawn flights of each family that are as it believes."""
     generator, beliefs = np.random.default_rng(0), hover_balance.BELIEFS
     hypotheses = hover_balance.hypotheses(b.vehicle)
-    found, _ = fitted(b.means, b.cuts)
-    cuts = np.array([change(c, *found) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if pad.large(text)])
+    solution, _ = fitted(b.means, b.cuts)
+    cuts = np.array([change(c, *solution) for c, (_, text) in zip(b.cuts, b.pairs, strict=True) if labels.large(text)])
     kinds = {"normal": [np.zeros((1, 4))], "rotor damage": [cuts],
              "added weight": [h.change for h in hypotheses if h.name == "mass"],
              "slung load": [h.change for h in hypotheses if h.name == "slung_load"]}
@@ -201,14 +215,15 @@ def show_family(b: Balances) -> None:
         for kind, (changes,) in kinds.items():
             names = []
             for _ in range(FLIGHTS):
-                seen = np.concatenate([changes[generator.integers(len(changes))], np.zeros(2), [-9.0, -9.0]])
-                worked = beliefs.worked_on if kind != "normal" or generator.random() < 0.5 else np.zeros(4)
-                width = np.sqrt(base.variance[:4] + np.array(worked) ** 2)
-                seen[:4] += width * generator.standard_t(beliefs.freedom, 4)
+                pattern = np.concatenate([changes[generator.integers(len(changes))], np.zeros(2),
+                                          np.full(2, hover_balance.LEAST_POWER)])
+                scatter = beliefs.worked_on if kind != "normal" or generator.random() < 0.5 else np.zeros(4)
+                width = np.sqrt(base.variance[:4] + np.array(scatter) ** 2)
+                pattern[:4] += width * generator.standard_t(beliefs.freedom, 4)
                 manner = beliefs.damaged if kind == "rotor damage" else hover_balance.STEADY
-                seen[4:6] = [generator.normal(m, np.hypot(s, np.sqrt(v)))
-                             for (m, s), v in zip(manner, base.variance[4:], strict=True)]
-                names.append(_family(hover_balance.evidence(seen, reference, hypotheses, beliefs)[0], hypotheses))
+                pattern[4:6] = [generator.normal(m, np.hypot(s, np.sqrt(v)))
+                                for (m, s), v in zip(manner, base.variance[4:], strict=True)]
+                names.append(_family(hover_balance.evidence(pattern, reference, hypotheses, beliefs)[0], hypotheses))
             right[kind] = np.mean([n == kind for n in names])
         print(f"{drone}: family, balanced {np.mean(list(right.values())):.2f}; "
               + ", ".join(f"{k} {v:.2f}" for k, v in right.items()))
@@ -218,13 +233,14 @@ def _family(logs: np.ndarray, hypotheses: list[hover_balance.Hypothesis]) -> str
     """The likeliest family of a log evidence for each hypothesis."""
     chance: dict[str, float] = {}
     for h, p in zip(hypotheses, np.exp(logs - logs.max()), strict=True):
-        name = {"none": "normal", **pad.FAMILY_OF}.get(h.name, h.name)
+        name = {"none": "normal", **figures.FAMILY_OF}.get(h.name, h.name)
         chance[name] = chance.get(name, 0.0) + float(p)
     return max(chance, key=chance.__getitem__)
 
 
 def main() -> None:
-    options = pad.folder_and_part(__doc__)
+    """Print scatter, rotors and families."""
+    options = labels.folder_and_part(__doc__)
     balances = Balances(options.folder, options.part)
     show_scatter(balances)
     show_rotor(rotor_tests(balances))

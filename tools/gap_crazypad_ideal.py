@@ -3,10 +3,10 @@
     python tools/gap_crazypad_ideal.py [FOLDER] [--part build|all]
 
 Every flight is described by 63 numbers relative to the mean of the drone's other normal flights: hover balance,
-unsteadiness, heave and corrections of `hover_balance`, the voltage, thrust told to each rotor, and spectra of
+unsteadiness, heave and corrections of `hover_balance`, the voltage, commanded thrust of each rotor, and spectra of
 commands and accelerations in seven bands. Four learners (a discriminant on the balance, one on all numbers, a forest,
-the nearest flight) are told the labels of (1) all other conditions of both drones, (2) all other flights, those of the
-same condition too, (3) the other drone. The diagnosis is told none. That several are tried and the best may be read
+the nearest flight) have the labels of (1) all other conditions of both drones, (2) all other flights, those of the
+same condition too, (3) the other drone. The diagnosis has none. That several are tried and the best may be read
 favours these tests. Intervals resample conditions within families. What the balance alone can tell:
 `gap_crazypad_balance.py`.
 """
@@ -26,16 +26,19 @@ from sklearn.neighbors import KNeighborsClassifier, KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-import gap_crazypad as pad
+import crazypad_figures as pad
+import crazypad_labels as labels
 from airtouch import vehicle as vehicles
 from airtouch.gap.balance import hover_balance
 from airtouch.gap.flights.flight import PERIOD_S, Flight, ready
 from airtouch.logs import read
 
+#: Hz, limits of the bands: those of `hover_balance` below 2 Hz, octaves above, to half of the sample rate
 BANDS_HZ = (0.3, 0.9, 2.0, 4.0, 8.0, 16.0, 30.0, 50.1)
+WINDOW = 256  #: samples of a block of the spectra: 2.56 s, which resolves the lowest band
 BALANCE = slice(0, 4)  #: lift, roll, pitch, yaw, the first numbers of a flight
-TREES = 300
-RIDGE = 10.0  #: of standardised numbers
+TREES = 300  #: of a forest; no source: round number, more than scikit-learn's 100
+RIDGE = 10.0  #: penalty of the regression on all (standardised) numbers; no source: round number
 
 
 @dataclass(frozen=True)
@@ -50,25 +53,28 @@ class Table:
 
     @property
     def drone(self) -> np.ndarray:
+        """Drone of each flight."""
         return np.array([r["drone"] for r in self.rows])
 
     @property
     def family(self) -> np.ndarray:
-        return np.array([pad.family(r["condition"]) for r in self.rows])
+        """Family of each flight's condition."""
+        return np.array([labels.family(r["condition"]) for r in self.rows])
 
     @property
     def pair(self) -> np.ndarray:
-        """Condition and drone."""
+        """Drone and condition of each flight, as one text."""
         return np.array([f"{r['drone']} {r['condition']}" for r in self.rows])
 
     @property
     def rotors(self) -> np.ndarray:
         """Damaged rotors as a text, empty for none."""
-        return np.array(["".join(map(str, pad.rotors(r["condition"]))) for r in self.rows])
+        return np.array(["".join(map(str, labels.rotors(r["condition"]))) for r in self.rows])
 
     @property
     def cut_mm(self) -> np.ndarray:
-        return np.array([np.nan_to_num(pad.cut_mm(r["condition"])) for r in self.rows])
+        """Millimetres cut off each flight's rotors, 0 where nothing is cut."""
+        return np.array([np.nan_to_num(labels.cut_mm(r["condition"])) for r in self.rows])
 
 
 def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
@@ -78,11 +84,11 @@ def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
     levels, spectra = [], []
     for first, last in hover_balance.hovers(flight):
         mixed = thrust[first:last] @ hover_balance.MIX.T
-        told = np.nanmean(voltage[first:last])
-        slope = np.polyfit(np.arange(last - first) * PERIOD_S, np.nan_to_num(voltage[first:last], nan=told), 1)[0]
-        levels.append([told, slope, *np.log(thrust[first:last].mean(axis=0))])
+        level = np.nanmean(voltage[first:last])
+        slope = np.polyfit(np.arange(last - first) * PERIOD_S, np.nan_to_num(voltage[first:last], nan=level), 1)[0]
+        levels.append([level, slope, *np.log(thrust[first:last].mean(axis=0))])
         signals = np.column_stack([mixed / mixed[:, :1].mean(), flight.acceleration[first:last]])
-        f, p = welch(signals, 1.0 / PERIOD_S, nperseg=256, axis=0)
+        f, p = welch(signals, 1.0 / PERIOD_S, nperseg=WINDOW, axis=0)
         spectra.append([np.log10(p[(f >= a) & (f < b)].mean(axis=0))
                         for a, b in zip(BANDS_HZ[:-1], BANDS_HZ[1:], strict=True)])
     return np.concatenate([hover_balance.pattern(flight, vehicle), np.mean(levels, axis=0),
@@ -91,16 +97,17 @@ def described(flight: Flight, vehicle: vehicles.Vehicle) -> np.ndarray:
 
 def table_of(folder: Path, part: str) -> Table:
     """All flights, or those on which numbers may be chosen."""
-    rows = pad.manifest(folder, part)
+    rows = labels.manifest(folder, part)
     vehicle = vehicles.load("crazyflie-2.1")
     raw = np.array([described(ready(read(folder / r["file"]), vehicle), vehicle) for r in rows])
     drone = np.array([r["drone"] for r in rows])
-    normal = np.array([pad.family(r["condition"]) == "normal" for r in rows])
+    normal = np.array([labels.family(r["condition"]) == "normal" for r in rows])
     own = np.arange(len(rows))
     base = [raw[normal & (drone == drone[i]) & (own != i)].mean(axis=0) for i in own]
     return Table(rows, raw - np.array(base))
 
 
+#: name -> classifier of labels; discriminants take each label as equally likely
 LEARNERS: dict[str, Callable] = {
     "discriminant on the balance": lambda labels: LinearDiscriminantAnalysis(
         solver="lsqr", shrinkage="auto", priors=np.full(len(set(labels)), 1.0 / len(set(labels)))),
@@ -109,6 +116,7 @@ LEARNERS: dict[str, Callable] = {
     "forest on all numbers": lambda labels: RandomForestClassifier(
         TREES, class_weight="balanced_subsample", random_state=0),
     "nearest flight, all numbers": lambda labels: KNeighborsClassifier(1)}
+#: name -> regression of the millimetres cut
 MEASURES: dict[str, Callable] = {
     "discriminant on the balance": lambda: Ridge(1.0), "discriminant on all numbers": lambda: Ridge(RIDGE),
     "forest on all numbers": lambda: RandomForestRegressor(TREES, random_state=0),
@@ -116,27 +124,28 @@ MEASURES: dict[str, Callable] = {
 
 
 def judged(table: Table, folds: list[np.ndarray], learner: str) -> list[dict]:
-    """Every flight with what a learner says that was told the labels of all flights outside its fold, as a case."""
+    """Cases of all flights, each with the answer of a learner that has the labels of all flights outside its fold."""
     x = table.numbers[:, BALANCE] if learner.endswith("the balance") else table.numbers
     out: list[dict] = [{} for _ in table.rows]
     for fold in folds:
-        told = ~fold
-        said = {}
-        for what, labels in (("family", table.family), ("rotors", table.rotors)):
-            use = told & (table.family == "rotor damage") if what == "rotors" else told
-            if len(set(labels[use])) == 1:
-                said[what] = np.full(fold.sum(), labels[use][0])
+        train = ~fold
+        predicted = {}
+        for label, values in (("family", table.family), ("rotors", table.rotors)):
+            use = train & (table.family == "rotor damage") if label == "rotors" else train
+            if len(set(values[use])) == 1:
+                predicted[label] = np.full(fold.sum(), values[use][0])
                 continue
-            model = make_pipeline(StandardScaler(), LEARNERS[learner](labels[use]))
-            said[what] = model.fit(x[use], labels[use]).predict(x[fold])
-        cut = make_pipeline(StandardScaler(), MEASURES[learner]()).fit(x[told], table.cut_mm[told]).predict(x[fold])
-        for i, family, rotors, mm in zip(np.flatnonzero(fold), said["family"], said["rotors"], cut, strict=True):
+            model = make_pipeline(StandardScaler(), LEARNERS[learner](values[use]))
+            predicted[label] = model.fit(x[use], values[use]).predict(x[fold])
+        cut = make_pipeline(StandardScaler(), MEASURES[learner]()).fit(x[train], table.cut_mm[train]).predict(x[fold])
+        for i, family, rotors, mm in zip(np.flatnonzero(fold), predicted["family"], predicted["rotors"], cut,
+                                         strict=True):
             out[i] = {**table.rows[i], **_case(family, rotors, mm)}
     return out
 
 
 def _case(family: str, rotors: str, mm: float) -> dict:
-    """What a learner says in the form of a diagnosis; millimetres stand for the loss of thrust."""
+    """A learner's answer in the form of a diagnosis; millimetres stand for the loss of thrust."""
     if family == "normal":
         return {"verdict": "none", "effects": []}
     if family != "rotor damage":
@@ -147,25 +156,26 @@ def _case(family: str, rotors: str, mm: float) -> dict:
 
 
 def show_learners(table: Table, part: str, folds: list[np.ndarray]) -> None:
-    """One line for each learner: the figures of `gap_crazypad` with their 90 % intervals."""
+    """Print a line for each learner: the figures of `crazypad_figures` with their 90 % intervals."""
     print(f"\n{part}\n| test | family, balanced | of damage, right | exact rotors | severity, Spearman |\n"
           "|---|---|---|---|---|")
     for learner in LEARNERS:
         cases = judged(table, folds, learner)
-        shown = []
+        cells = []
         for figure in (pad.balanced, _damage_right, pad.named, pad.severity):
             low, high = pad.interval(cases, figure)
-            shown.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
-        print(f"| {learner} | " + " | ".join(shown) + " |", flush=True)
+            cells.append(f"{figure(cases):.2f} ({low:.2f} to {high:.2f})")
+        print(f"| {learner} | " + " | ".join(cells) + " |", flush=True)
 
 
 def _damage_right(cases: list[dict]) -> float:
-    right = [pad.answer(c)[0] == "rotor damage" for c in cases if pad.family(c["condition"]) == "rotor damage"]
+    """Share of flights with rotor damage that are called so."""
+    right = [pad.answer(c)[0] == "rotor damage" for c in cases if labels.family(c["condition"]) == "rotor damage"]
     return float(np.mean(right)) if right else float("nan")
 
 
 def show_distinct(table: Table) -> None:
-    """How often the nearest other flight of a drone is of the same condition."""
+    """Print how often the nearest other flight of a drone is of the same condition."""
     x = StandardScaler().fit_transform(table.numbers)
     for text, numbers in (("balance", x[:, BALANCE]), ("all numbers", x)):
         hits = []
@@ -177,7 +187,8 @@ def show_distinct(table: Table) -> None:
 
 
 def main() -> None:
-    options = pad.folder_and_part(__doc__)
+    """Print the learners' figures, with less and with more labels known."""
+    options = labels.folder_and_part(__doc__)
     table = table_of(options.folder, options.part)
     pairs, n = sorted(set(table.pair)), len(table.rows)
     print(f"{n} flights, {len(pairs)} conditions of a drone, {table.numbers.shape[1]} numbers")

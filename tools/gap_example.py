@@ -27,10 +27,10 @@ def main(folder: Path) -> None:
     for name, log in [*((f"nominal_{i}", log) for i, log in enumerate(nominal)), *(("real", log) for log in real)]:
         if not isinstance(log, logs.FlightLog):
             raise SystemExit(f"{name}: {log}")
-        kept = {k: v for k, v in log.columns.items() if not k.startswith(DROPPED)}
+        columns = {k: v for k, v in log.columns.items() if not k.startswith(DROPPED)}
         about = {"vehicle": log.meta["vehicle"], "acc_frame": log.meta["acc_frame"],
                  "made_by": "python tools/gap_example.py"}
-        logs.write(logs.FlightLog(kept, {**about, "source": name}), folder / f"{name}.csv.gz", force=True)
+        logs.write(logs.FlightLog(columns, {**about, "source": name}), folder / f"{name}.csv.gz", force=True)
     (folder / example.ANSWER).write_text(tomli_w.dumps({"effects": EFFECT, "made_by": "python tools/gap_example.py"}))
 
 

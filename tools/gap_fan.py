@@ -23,11 +23,12 @@ from airtouch.logs import read
 from airtouch.simulation.body import rigid_body
 from gap_authors import VEHICLE, questions
 
-BAND_HZ, FAR = (0.6, 12.0), 5.0  #: Hz; power over the floor from which a block is far above it
+BAND_HZ = (0.6, 12.0)  #: Hz, band whose power is compared; no source: round numbers
+FAR = 5.0  #: power over the floor's from which a block is far above it; no source: round number
 
 
 def main(folder: Path) -> None:
-    """Print the torques that each flight beside a fan shows, as a table."""
+    """Print, as a table, the mean torques of each flight and its blocks far above the floor."""
     vehicle = vehicles.load(VEHICLE)
     fan, calm = (list(measure.usable([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])
@@ -40,8 +41,8 @@ def main(folder: Path) -> None:
     for flight in sorted((*calm, *fan), key=lambda one: Path(one.name).name):
         data = Data(study, [flight])
         power = np.abs(data.base[0][AIR][:, inside, 3:6]) ** 2 / study.floor.power[AIR][inside, 3:6]
-        over = np.nanmean(power, axis=1)
-        far = (over[:, [0, 2]] > FAR).any(axis=1)
+        ratio = np.nanmean(power, axis=1)
+        far = (ratio[:, [0, 2]] > FAR).any(axis=1)
         seconds = data.first[0][AIR][far] * PERIOD_S
         thrust = vehicle.thrust(flight.pwm[flight.phase != GROUND]).mean(axis=0)
         roll = arm * (thrust[2] + thrust[3] - thrust[0] - thrust[1]) / vehicle.inertia_kg_m2[0]
@@ -49,7 +50,7 @@ def main(folder: Path) -> None:
         yaw /= vehicle.inertia_kg_m2[2]
         when = ", ".join(f"{s:.0f}" for s in seconds)
         print(f"| {Path(flight.name).name} | {roll:.1f}, {yaw:.1f} | {far.sum()} of {len(far)} | {when} | "
-              f"{over[:, 0].max():.0f}, {over[:, 2].max():.0f} |")
+              f"{ratio[:, 0].max():.0f}, {ratio[:, 2].max():.0f} |")
 
 
 if __name__ == "__main__":

@@ -10,12 +10,16 @@ from airtouch import logs
 from airtouch.detector.shared import channels
 from airtouch.logs.flight_log import FlightLog
 
-#: limits of the bands of a spectrum, Hz
+#: limits of the bands of a spectrum, Hz: about octaves; no other source
 BANDS_HZ = (0.7, 2.0, 6.0, 12.0, 25.0, 50.1)
-WINDOW = 128  #: samples of a spectrum
-BEFORE, AFTER = 500, 100  #: samples around the platform that belong to the pass
-SETTLED = 300  #: samples after the motors start that are left out
-SHORTEST_FREE, SHORTEST_OVER = 400, 100  #: samples
+RATE_HZ = 100.0  #: of the logs
+WINDOW = 128  #: samples of a block of a spectrum: 1.28 s, as a platform is passed in about 2 s
+#: samples around the platform that belong to the pass; chosen by what diagnoses of passes named (host/docs/looks.md,
+#: 2026-11-21 15:20)
+BEFORE, AFTER = 500, 100
+SETTLED = 300  #: samples after the motors start that are left out: the take-off; no source: round number
+SHORTEST_FREE, SHORTEST_OVER = 400, 100  #: samples of free air and of platform, at least; no source: round numbers
+FREE = slice(-320, -20)  #: samples before an entry whose spectrum is that of free air: 3 s, clear of the edge
 
 
 def _edges(log: FlightLog) -> tuple[int, int]:
@@ -42,9 +46,9 @@ def spectra(log: FlightLog) -> np.ndarray:
     out = np.full((2, len(BANDS_HZ) - 1, 9), np.nan)
     entry, leave = _edges(log)
     values = channels.nine_channels(log)
-    for k, (a, b) in enumerate(((max(entry - 320, 0), entry - 20), (entry, leave))):
+    for k, (a, b) in enumerate(((max(entry + FREE.start, 0), entry + FREE.stop), (entry, leave))):
         if b - a >= WINDOW and np.isfinite(values[a:b]).all():
-            f, power = welch(values[a:b], 100.0, nperseg=WINDOW, axis=0)
+            f, power = welch(values[a:b], RATE_HZ, nperseg=WINDOW, axis=0)
             for i, (low, high) in enumerate(pairwise(BANDS_HZ)):
                 out[k, i] = 10.0 * np.log10(power[(f >= low) & (f < high)].mean(axis=0) + 1e-12)
     return out
@@ -52,5 +56,5 @@ def spectra(log: FlightLog) -> np.ndarray:
 
 def apart_db(simulated: Sequence[FlightLog], real: Sequence[FlightLog]) -> np.ndarray:
     """Mean absolute difference (2,) of two sets' median spectra, dB: before and over the platform."""
-    one, two = (np.nanmedian([spectra(log) for log in some], axis=0) for some in (simulated, real))
+    one, two = (np.nanmedian([spectra(log) for log in flights], axis=0) for flights in (simulated, real))
     return np.nanmean(np.abs(one - two), axis=(1, 2))

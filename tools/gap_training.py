@@ -2,7 +2,7 @@
 
     AIRTOUCH_FLIGHTS=../shared/flights .venv/bin/python tools/gap_training.py --out out/gap-training
 
-1. Diagnosis. The folds of the authors' clean flights are cut in two groups (--groups). Those of a group are
+1. Diagnosis. The folds of the authors' clean flights are divided in two groups (--groups). Those of a group are
    diagnosed twice: whole flights against the simulator, without a baseline (what every flight has that it lacks);
    then low passes over the platform, from 5 s before it, with free air earlier in the same flights as baseline
    (what is there only close to a surface, which the rest of the flight would drown; same day, propellers and
@@ -42,32 +42,33 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from gap_passes import apart_db, pieces
 
-VEHICLE = "crazyflie-2.1-flow"
-MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly chosen: it judges on 260 s
+VEHICLE = "crazyflie-2.1-flow"  #: vehicle file of the authors' drone
+MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis uses 260 s at most
+#: names and parameters of effects
 Effects = list[tuple[str, dict[str, float]]]
 Flights = Mapping[dataset.FlightFile, FlightLog]
 
 
-def cut(flights: Flights, named: Sequence[str]) -> list[Flights]:
+def cut(flights: Flights, groups: Sequence[str]) -> list[Flights]:
     """The flights of each group of folds ("012", "34"); AirTouchError for a fold in two groups or in none."""
-    every = "".join(named)
-    odd = [f for f in map(str, {f.condition.fold for f in flights}) if every.count(f) != 1]
+    all_folds = "".join(groups)
+    odd = [f for f in map(str, {f.condition.fold for f in flights}) if all_folds.count(f) != 1]
     if odd:
-        raise AirTouchError(f"--groups {','.join(named)}: fold {odd[0]} must be in one group, and in one only")
-    return [{f: log for f, log in flights.items() if str(f.condition.fold) in folds} for folds in named]
+        raise AirTouchError(f"--groups {','.join(groups)}: fold {odd[0]} must be in one group, and in one only")
+    return [{f: log for f, log in flights.items() if str(f.condition.fold) in folds} for folds in groups]
 
 
-def found_in(flights: Flights, kept: Path) -> dict[str, Any]:
-    """Both diagnoses of some flights and the calibration, JSON-ready; read from `kept` where they are there."""
-    if not kept.is_file():
+def diagnoses(flights: Flights, store: Path) -> dict[str, Any]:
+    """Both diagnoses of some flights and the calibration, JSON-ready; read from the file `store` if it exists."""
+    if not store.is_file():
         calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
         over, before = zip(*filter(None, map(pieces, _evenly_spaced(close, MOST_PASSES))), strict=True)
         craft = vehicle.load(VEHICLE)
-        every, near = diagnose(_evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
-        write_bytes(json.dumps({"all": every.plain(), "close": near.plain(), "calibration": [
-            [a.effect.name, dict(a.values)] for a in near.held[1].active]}, indent=1).encode(), kept, force=True)
-    return json.loads(kept.read_text())
+        whole, near = diagnose(_evenly_spaced(list(calm.values()), MOST), craft), diagnose(over, craft, before)
+        write_bytes(json.dumps({"all": whole.plain(), "close": near.plain(), "calibration": [
+            [a.effect.name, dict(a.values)] for a in near.held[1].active]}, indent=1).encode(), store, force=True)
+    return json.loads(store.read_text())
 
 
 def _evenly_spaced(flights: list[FlightLog], most: int) -> list[FlightLog]:
@@ -75,18 +76,20 @@ def _evenly_spaced(flights: list[FlightLog], most: int) -> list[FlightLog]:
     return [flights[i] for i in np.unique(np.linspace(0, len(flights) - 1, most).astype(int))]
 
 
-def chain(found: Mapping[str, Any]) -> list[tuple[str, Effects]]:
+def chain(diagnosis: Mapping[str, Any]) -> list[tuple[str, Effects]]:
     """(what is added, all effects then on): nothing, what all flights share, what is close by, calibration.
+
+    diagnosis: as `diagnoses` gives it.
 
     An effect that is named twice keeps its first values; a calibrated one gives way to one that was named.
     """
     rows: list[tuple[str, Effects]] = [("nothing", [])]
     on: dict[tuple[str, float | None], tuple[str, dict[str, float]]] = {}
-    for effect in [e for part in ("all", "close") for e in found[part]["effects"]]:
+    for effect in [e for part in ("all", "close") for e in diagnosis[part]["effects"]]:
         values = {k: q["value"] for k, q in effect["parameters"].items()}
         if on.setdefault((effect["name"], values.get("rotor")), (effect["name"], values))[1] is values:
             rows.append((f"+ `{effect['name']}`", list(on.values())))
-    for name, values in found["calibration"]:
+    for name, values in diagnosis["calibration"]:
         on.setdefault((name, values.get("rotor")), (name, values))
     return [*rows, ("+ vehicle as calibrated", list(on.values()))]
 
@@ -135,24 +138,25 @@ def together(runs: Sequence[Sequence[FlightScore]]) -> list[FlightScore]:
 
 def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Namespace) -> str:
     """Cells of one row: scenario texts, one a group of flights tested with it, all seeds."""
-    runs, far = [], []
+    runs, differences = [], []
     for seed in range(options.seeds):
         run: list[FlightScore] = []
         for text, flights in zip(texts, tested, strict=True):
             model = trained(text, seed, options)
             run += [evaluate.evaluate_flight(f, log, best, model).score for f, log in flights.items()]
-            far.append(apart_db(flown(text, options.flights, seed, options.out), list(flights.values())))
+            differences.append(apart_db(flown(text, options.flights, seed, options.out), list(flights.values())))
         runs.append(run)
-    found = summarise(together(runs))
+    figures = summarise(together(runs))
     each = [summarise(r, replicates=2)["mean_abs_error_m"] for r in runs]
     seeds = ", ".join("-" if x is None else f"{x:.3f}" for x in each)
 
     def cell(name: str, scale: float, digits: int) -> str:
-        numbers = (found[name], *(found["intervals"][name] or ()))
+        """A figure times `scale` with its interval."""
+        numbers = (figures[name], *(figures["intervals"][name] or ()))
         value, *ends = ("-" if x is None else f"{scale * x:.{digits}f}" for x in numbers)
         return value + (f" ({' to '.join(ends)})" if ends else "")
 
-    off = "{:.1f}, {:.1f}".format(*np.average(far, axis=0, weights=[len(t) for t in tested] * options.seeds))
+    off = "{:.1f}, {:.1f}".format(*np.average(differences, axis=0, weights=[len(t) for t in tested] * options.seeds))
     return " | ".join((cell("mean_abs_error_m", 1, 3), seeds, cell("missed", 100, 1),
                        cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0), off))
 
@@ -169,15 +173,15 @@ def main() -> None:
     parser.add_argument("--diagnose", action="store_true", help="only diagnose")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    named = options.groups.split(",")
+    group_names = options.groups.split(",")
     read, _ = crossval.readable_flights(files := dataset.collect([need_flights()]))
-    groups = cut({f: read[f.path] for f in files if f.path in read}, named)
+    groups = cut({f: read[f.path] for f in files if f.path in read}, group_names)
     chains = []
-    for name, group in zip(named, groups, strict=True):
-        kept = options.out / f"diagnosis_{name}.json"
+    for name, group in zip(group_names, groups, strict=True):
+        store = options.out / f"diagnosis_{name}.json"
         if options.again:
-            kept.unlink(missing_ok=True)
-        chains.append(chain(found_in(group, kept)))
+            store.unlink(missing_ok=True)
+        chains.append(chain(diagnoses(group, store)))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
     if options.diagnose:
         return
@@ -185,7 +189,7 @@ def main() -> None:
     edges = sum(len(logs.true_edges(log)) for group in groups for log in group.values())
     print(f"{sum(map(len, groups))} recorded flights, {edges} edges; {options.seeds} trainings a row, "
           f"{options.steps} steps on {options.flights} flights\n\n| added to the simulator, found in folds "
-          f"{' / '.join(named)} | error, m | each training | missed, % | false/min | "
+          f"{' / '.join(group_names)} | error, m | each training | missed, % | false/min | "
           "balanced, % | spectra off, dB: before, over |\n|---|---|---|---|---|---|---|", flush=True)
     for i in range(max(map(len, chains))):
         names = [c[i][0] if i < len(c) else "-" for c in chains]

@@ -1,4 +1,4 @@
-"""How many of neural-swarm's flights under another vehicle a test sees that is told when it was under it.
+"""How many of neural-swarm's flights under another vehicle a test sees that knows when it was under it.
 
     python tools/gap_wakes.py [FLIGHTS] [--part build|all] [--answers x.jsonl]
 
@@ -12,12 +12,11 @@ build: days 19 and 20.
 
     python tools/gap_wakes.py [FLIGHTS] --false-alarms    # what the diagnosis says of nominal flights, 15 min
 
-Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), told that another
-vehicle was overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
+Each nominal flight of days 19 and 20 against the others of its group (`gap_real.py --rows nominal`), as if another
+vehicle had been overhead in the seconds of each downwash flight of its kind: how often a wake passes for one there.
 """
 
 import argparse
-import csv
 import json
 import os
 from dataclasses import dataclass
@@ -28,6 +27,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 import gap_real
+import swarm_cuts
 from airtouch import vehicle as vehicles
 from airtouch.gap.evidence import gates, overhead
 from airtouch.gap.evidence.data import Data
@@ -39,58 +39,61 @@ from airtouch.gap.sealed.blind_score import wilson
 from airtouch.gap.signals.channels import residual
 from airtouch.logs import read
 
-LEAST_S = 0.5  #: under another vehicle that the data must show
-STEP_S = 0.5  #: by which the seconds are shifted along nominal flights
-FALSE_ALARMS = 0.01
+LEAST_S = 0.5  #: s under another vehicle that the data must show; no source: round number
+LEAST_SHIFTED = 0.5  #: fraction of LEAST_S that must be usable in a nominal flight; no source: round number
+STEP_S = 0.5  #: s by which the seconds are shifted along nominal flights; no source: round number
+FALSE_ALARMS = 0.01  #: of nominal flights that may be beyond a limit, all MEASURES together; no source: round number
+#: Hz above which force is shaking, and band of the yaw torque; no source: round numbers
 FORCE_HZ, YAW_HZ = 1.0, (2.0, 20.0)
+#: names of what `measures` gives
 MEASURES = ("mean force", "its shaking", "yaw torque")
 
 
 @dataclass(frozen=True)
 class Track:
-    """A cut of a log: force along z (n,) over gravity and its fast part, fast yaw torque (n,), what counts (n,)."""
+    """A cut of a log: force along z (n,) over gravity and its fast part, fast yaw torque (n,), usable samples (n,)."""
 
-    row: dict[str, str]
+    row: swarm_cuts.Row
     place: np.ndarray  #: x, y, z, m
     force: np.ndarray
     shaking: np.ndarray
     yaw: np.ndarray
     usable: np.ndarray
 
-    @property
-    def start_s(self) -> float:
-        return float(self.row["start_s"])
 
-
-def track(folder: Path, row: dict[str, str]) -> Track:
-    """One cut, made ready."""
+def track(folder: Path, row: swarm_cuts.Row) -> Track:
+    """The track of one cut in the data's folder."""
     vehicle = vehicles.load(folder / f"{row['vehicle']}.toml")
     flight: Flight = ready(read(folder / "flights" / row["file"]), vehicle)
-    left = np.nan_to_num(residual(flight, vehicle))
+    unexplained = np.nan_to_num(residual(flight, vehicle))
     usable = flight.usable & ~flight.bridged & (flight.phase != GROUND)
-    force = np.where(usable, left[:, 2], 0.0) / vehicle.gravity_mps2
+    force = np.where(usable, unexplained[:, 2], 0.0) / vehicle.gravity_mps2
     fast = sosfiltfilt(butter(2, FORCE_HZ, "highpass", fs=1.0 / PERIOD_S, output="sos"), force)
-    yaw = sosfiltfilt(butter(2, YAW_HZ, "bandpass", fs=1.0 / PERIOD_S, output="sos"), np.where(usable, left[:, 5], 0.0))
+    yaw = sosfiltfilt(butter(2, YAW_HZ, "bandpass", fs=1.0 / PERIOD_S, output="sos"),
+                      np.where(usable, unexplained[:, 5], 0.0))
     place = np.column_stack([flight.log[name] for name in overhead.PLACE])
     return Track(row, place, force, fast, yaw, usable)
 
 
 def under(one: Track, other: Track) -> np.ndarray:
     """Samples (n,) at which another vehicle is above; False where its cut does not reach."""
-    shift = round((one.start_s - other.start_s) / PERIOD_S)
+    shift = -round(swarm_cuts.delay_s(one.row, other.row) / PERIOD_S)
     place = np.full_like(one.place, np.nan)
     index = np.arange(len(place)) + shift
-    there = (index >= 0) & (index < len(other.place))
-    place[there] = other.place[index[there]]
+    inside = (index >= 0) & (index < len(other.place))
+    place[inside] = other.place[index[inside]]
     return overhead.above(one.place, place)
 
 
 def measures(t: Track, acts: np.ndarray) -> np.ndarray:
-    """The three MEASURES (3,) of the samples that act over those that do not; the mean force downwards is positive."""
-    here, rest = acts & t.usable, ~acts & t.usable
-    def over(x: np.ndarray) -> float:
-        return float(np.log(np.mean(x[here] ** 2) / np.mean(x[rest] ** 2)))
-    return np.array([t.force[rest].mean() - t.force[here].mean(), over(t.shaking), over(t.yaw)])
+    """The three MEASURES (3,) of samples `acts` (n,) against the others: the mean force down, over gravity, logs of
+    ratios of power."""
+    inside, outside = acts & t.usable, ~acts & t.usable
+
+    def log_ratio(x: np.ndarray) -> float:
+        """Natural logarithm of the ratio of the powers of a signal (n,)."""
+        return float(np.log(np.mean(x[inside] ** 2) / np.mean(x[outside] ** 2)))
+    return np.array([t.force[outside].mean() - t.force[inside].mean(), log_ratio(t.shaking), log_ratio(t.yaw)])
 
 
 def chance(acts: np.ndarray, nominal: list[Track]) -> np.ndarray:
@@ -100,30 +103,27 @@ def chance(acts: np.ndarray, nominal: list[Track]) -> np.ndarray:
         n = len(t.force)
         own = np.resize(acts, n) if len(acts) < n else acts[:n]
         for shift in range(0, n, step):
-            moved = np.roll(own, shift)
-            if (moved & t.usable).sum() * PERIOD_S > 0.5 * LEAST_S:
-                out.append(measures(t, moved))
+            shifted = np.roll(own, shift)
+            if (shifted & t.usable).sum() * PERIOD_S > LEAST_SHIFTED * LEAST_S:
+                out.append(measures(t, shifted))
     return np.array(out)
 
 
 def overhead_at(one: Track, tracks: list[Track]) -> np.ndarray:
     """Samples (n,) at which any vehicle of the same flight is above, as far as the data hold its path."""
-    folder, name = one.row["flight"].rsplit("/", 1)
-    number = name.split("_")[1]
-    same = [t for t in tracks if t.row["cf"] != one.row["cf"] and t.row["flight"].rsplit("/", 1)[0] == folder
-            and t.row["flight"].rsplit("_", 1)[1] == number]
-    return np.logical_or.reduce([np.zeros(len(one.place), bool), *(under(one, t) for t in same)])
+    partners = [t for t in tracks if swarm_cuts.partners(one.row, t.row)]
+    return np.logical_or.reduce([np.zeros(len(one.place), bool), *(under(one, t) for t in partners)])
 
 
 def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
-    """How often nominal flights have a wake in seconds in which they have none."""
+    """Print how often the diagnosis names a wake in seconds of nominal flights, in which there is none."""
     seconds_of: dict[tuple[str, str], list[tuple[tuple[float, float], ...]]] = {}
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):
         acts = overhead.stretches_s(overhead_at(t, tracks))
         if sum(b - a for a, b in acts) >= LEAST_S:
             seconds_of.setdefault((t.row["vehicle"], t.row["manoeuvre"]), []).append(acts)
     kind = {t.row["file"]: (t.row["vehicle"], t.row["manoeuvre"]) for t in tracks}
-    passed, tried = [], 0
+    alarms, trials = [], 0
     for case in gap_real.nominal(flights, "build"):
         name = Path(case.flight).name
         if name not in kind:
@@ -134,17 +134,17 @@ def show_false_alarms(flights: Path, tracks: list[Track]) -> None:
         for seconds in seconds_of.get(kind[name], []):
             known = overhead.with_overhead(study, flight, seconds)
             wake = gates.gated(Data(known, [flight])).get(gates.TOLD)
-            tried += 1
+            trials += 1
             if wake is not None and news(Data(known, [flight]), wake.key, wake.gain, wake.strength) >= LEAST_GAIN:
-                passed.append(name)
-        print(f"{name}: {passed.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
-    share = wilson(len(passed), tried)
-    print(f"a wake in told seconds of nominal flights: {len(passed)} of {tried} [{share['low']:.1%}, "
-          f"{share['high']:.1%}], in {len(set(passed))} flights")
+                alarms.append(name)
+        print(f"{name}: {alarms.count(name)} of {len(seconds_of.get(kind[name], []))}", flush=True)
+    share = wilson(len(alarms), trials)
+    print(f"a wake in told seconds of nominal flights: {len(alarms)} of {trials} [{share['low']:.1%}, "
+          f"{share['high']:.1%}], in {len(set(alarms))} flights")
 
 
 def show_seen(tracks: list[Track], answers: Path | None) -> None:
-    """A line for each flight under another vehicle, and for each vehicle how many the test sees."""
+    """Print a line for each flight under another vehicle, and for each vehicle how many the test sees."""
     nominal = [t for t in tracks if t.row.get("truth", "none") == "none"]
     answer_of = {}
     if answers:
@@ -165,10 +165,10 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
         of_nominal = chance(acts, like)
         limit = np.quantile(of_nominal, 1.0 - FALSE_ALARMS / len(MEASURES), axis=0)
         own = measures(t, acts)
-        seen = bool((own > limit).any())
-        table.setdefault(t.row["vehicle"], []).append(seen)
-        shown = " | ".join(f"{m:.2f} ({u:.2f})" for m, u in zip(own, limit, strict=True))
-        print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {shown} | {'yes' if seen else 'no'} | "
+        hit = bool((own > limit).any())
+        table.setdefault(t.row["vehicle"], []).append(hit)
+        cells = " | ".join(f"{m:.2f} ({u:.2f})" for m, u in zip(own, limit, strict=True))
+        print(f"| {t.row['file']} | {seconds:.1f} of {t.row['s_under']} | {cells} | {'yes' if hit else 'no'} | "
               f"{answer_of.get(t.row['file'], '')} |", flush=True)
     for vehicle, hits in table.items():
         share = wilson(sum(hits), len(hits))
@@ -177,6 +177,7 @@ def show_seen(tracks: list[Track], answers: Path | None) -> None:
 
 
 def main() -> None:
+    """Print how many wakes the test sees, or the false alarms of the diagnosis."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", nargs="?", type=Path,
                         default=Path(os.environ.get("AIRTOUCH_FLIGHTS", "../shared/flights")))
@@ -185,9 +186,8 @@ def main() -> None:
     parser.add_argument("--false-alarms", action="store_true")
     options = parser.parse_args()
     folder = options.flights / "neuralswarm"
-    rows = [r for name in ("manifest.csv", "baselines.csv") for r in csv.DictReader((folder / name).open())]
-    everywhere = options.part == "all" and not options.false_alarms
-    rows = [r for r in rows if everywhere or r["day"] in gap_real.BUILD_DAYS]
+    all_days = options.part == "all" and not options.false_alarms
+    rows = [r for r in swarm_cuts.cuts(folder) if all_days or r["day"] in gap_real.BUILD_DAYS]
     tracks = [track(folder, r) for r in rows if r.get("truth") != "ground_effect"]
     if options.false_alarms:
         show_false_alarms(options.flights, tracks)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import gap_crazypad as pad
+import crazypad_figures as pad
 import gap_crazypad_balance as balance
 import gap_crazypad_ideal as ideal
 
