@@ -2,7 +2,7 @@
 
     python tools/days_apart.py ../shared/flights/airtouch [--fewest 7]
 
-The classifier is that of `airtouch twin`. Prints a Markdown table: each day with FEWEST flights or more against each
+The classifier is that of `airtouch twin`. Prints a Markdown table: each day with --fewest flights or more against each
 other one, and, for comparison, two random halves of all flights, which differ in nothing; AUROC of each phase by
 flight, with its 95 % interval. A twin that is fitted to flights of several days cannot be closer to each of them than
 they are to each other.
@@ -19,7 +19,7 @@ from airtouch.detector import best
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
-from airtouch.twin.comparison.two_sample import FEWEST, two_sample, windows
+from airtouch.twin.comparison.two_sample import MIN_FLIGHTS, two_sample, windows
 from airtouch.twin.recorded.channels import channels
 from airtouch.twin.recorded.course import PHASES, Course, course
 
@@ -52,7 +52,7 @@ def main() -> None:
     """One line for each pair of days."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+")
-    parser.add_argument("--fewest", type=int, default=FEWEST, help="flights of a day (default %(default)s)")
+    parser.add_argument("--fewest", type=int, default=MIN_FLIGHTS, help="flights of a day (default %(default)s)")
     options = parser.parse_args()
     days = read(options.folders)
     large = {day: flights for day, flights in sorted(days.items()) if len(flights) >= options.fewest}

@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument("--fold", type=int, action="append", default=[])
     parser.add_argument("--twin", type=Path)
     options = parser.parse_args()
-    recorded = flights.recorded([options.folder], folds=options.fold)
+    recorded = flights.read([options.folder], folds=options.fold)
     show("recorded", list(zip(recorded.courses, recorded.channels, strict=True)))
     if options.twin:
         show("twin", list(flown_by(options.twin, recorded.courses)))

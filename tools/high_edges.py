@@ -174,7 +174,7 @@ def print_logits(title: str, groups: Groups, models: Sequence[BestModel],
 def print_responses(groups: Groups, twin: Path) -> None:
     """The table of what a platform adds above SPLIT_HZ, recorded and by the twin's responses."""
     craft = vehicle.load(str(twin / files.VEHICLE))
-    responses = overlay.responses(scenario.load(twin / files.SCENARIO), craft, RESPONSES)
+    responses = overlay.simulate_responses(scenario.load(twin / files.SCENARIO), craft, RESPONSES)
     print(head("above 3 Hz, over the platform / before", COLUMNS))
     for name, group in groups.items():
         pairs = [shaking(overlay.values_of(log), flown.entry, flown.exit) for log, flown in group

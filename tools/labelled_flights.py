@@ -43,7 +43,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from airtouch.twin import adapt, files
+from airtouch.twin import adapt, cache, files
 
 COMMAND = "tools/labelled_flights.py"
 FIRST_HALF = 3  #: folds below this one are one half, the others the other
@@ -89,20 +89,21 @@ def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, Fl
     return [evaluate.evaluate_flight(f, readable[f.path], best, model).score for f in held]
 
 
-def simulated(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.Flown:
+def simulated(folder: Path, pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
     """Edges of the twin in this folder, laid over the free air of these flights."""
     craft = vehicle.load(str(folder / files.VEHICLE))
     return adapt.simulated_flights(pool, scenario.load(folder / files.SCENARIO), craft, 0, None)[0]
 
 
-def recorded_beside(folders: Sequence[Path], speed: float | None, pool: Sequence[adapt.Flight]) -> adapt.Flown:
+def recorded_beside(folders: Sequence[Path], speed: float | None,
+                    pool: Sequence[adapt.Flight]) -> adapt.SimulatedFlights:
     """Flights of other folders to learn beside the pool's, without the sensors that the pool lacks."""
     listed = dataset.collect(folders, speed)
     readable, left_out = crossval.readable_flights(listed, best.SPARE_SENSORS)
     if left_out:
         raise AirTouchError(f"not usable: {left_out[0][1]}")
-    absent = adapt.lacking(pool)
-    return adapt.Flown([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
+    absent = adapt.absent_sensors(pool)
+    return adapt.SimulatedFlights([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
 
 
 def named(asked: Sequence[Any]) -> str:
@@ -112,13 +113,13 @@ def named(asked: Sequence[Any]) -> str:
 
 def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
          pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: BestModel | None,
-         flown: adapt.Flown | None, options: argparse.Namespace) -> list[FlightScore]:
+         flown: adapt.SimulatedFlights | None, options: argparse.Namespace) -> list[FlightScore]:
     """One training and its scores, or what an earlier run found."""
     steps = {"start": 0, "labelled": options.steps, "unlabelled": options.steps, "alone": options.alone_steps}[row]
     asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
              [f.path.name for f in held], [f.log.source for f in pool]]
     if flown and row in ("labelled", "unlabelled"):
-        asked += [bool(options.beside), adapt.STEPS, sorted(adapt.STRONG.items()), repr(adapt.DECODER),
+        asked += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
                   [training_set.flight_hash(log) for log in flown.logs]]
     rounds = [adapt.ROUNDS] if row == "unlabelled" else []
     path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named([*asked, *rounds])}.json"
@@ -139,7 +140,7 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
         model = best.fit([f.log for f in some], seed=seed, steps=steps, command=COMMAND)
     else:
         file = f"labelled_{count}_draw{draw}_seed{seed}_{named(asked[1:])}.npz"
-        model = adapt.kept_model(options.out / file, labelled)
+        model = cache.model(options.out / file, labelled)
     if row == "unlabelled" and flown:
         names = {f.log.source for f in some}
         others = [adapt.without_range(f) for f in pool if f.log.source not in names]

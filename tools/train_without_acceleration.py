@@ -24,7 +24,7 @@ from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.twin import adapt, files
-from airtouch.twin.recorded.missions import shortened
+from airtouch.twin.recorded.missions import shorten
 
 COMMAND = "tools/train_without_acceleration.py"
 LACKED = ("acceleration",)
@@ -33,7 +33,7 @@ LACKED = ("acceleration",)
 def fit(flights: Sequence[adapt.Flight], twin: Path, air: Sequence[FlightLog], least: float, seed: int) -> BestModel:
     """The detector; its lag is that of the recorded flights. air: flights of any vehicle without edges."""
     scene, craft = scenario.load(twin / files.SCENARIO), vehicle.load(str(twin / files.VEHICLE))
-    flown, _ = adapt.simulated_flights(flights, shortened(scene, least, seed), craft, seed, None)
+    flown, _ = adapt.simulated_flights(flights, shorten(scene, least, seed), craft, seed, None)
     recorded, simulated = ([sensors.without(log, LACKED) for log in logs]
                            for logs in ([f.log for f in flights], flown.logs))
     own = [None] * len(recorded)

@@ -77,7 +77,8 @@ def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monke
 def test_the_other_flights_are_learnt_without_their_labels(house, tmp_path, monkeypatch, capsys):
     """One labelled flight, the other of its day without down range; the scored day is in neither training."""
     best.fit([made_flight(9)], recipe=SMALL).save(tmp_path / "start.npz")
-    monkeypatch.setattr(labelled_flights, "simulated", lambda folder, pool: adapt.Flown([made_flight(20)], [None]))
+    monkeypatch.setattr(labelled_flights, "simulated",
+                        lambda folder, pool: adapt.SimulatedFlights([made_flight(20)], [None]))
     monkeypatch.setattr(adapt, "STEPS", {"shipped": 3, "scratch": 3})
     taught, begun = [], []
 

@@ -38,7 +38,7 @@ def trained(tmp_path, monkeypatch):
     monkeypatch.setattr(best, "Recipe", lambda: SMALL)
     monkeypatch.setattr(scenario, "load", lambda path: str(path))
     monkeypatch.setattr(tool.vehicle, "load", lambda path: load())
-    monkeypatch.setattr(tool, "shortened", lambda scene, least, seed: Shortened((scene, least)))
+    monkeypatch.setattr(tool, "shorten", lambda scene, least, seed: Shortened((scene, least)))
     monkeypatch.setattr(overlay, "responses", lambda scene, *_: asked.append(scene) or [])
     monkeypatch.setattr(overlay, "free_air", lambda flights: flights)
     monkeypatch.setattr(overlay, "flights", lambda *_: (laid, [evaluate.truth(log) for log in laid]))

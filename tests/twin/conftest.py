@@ -21,7 +21,7 @@ def fly_course(vehicle):
     """fly_course(course, effects, number) -> a log that ended well, or None."""
     def flown(course, effects=PLAIN, number=0, seed=3, craft=vehicle, pulse_s=0.0, **mission):
         course = replace(course, pulse_s=pulse_s) if pulse_s else course
-        log = fly(missions.one(course, effects, **mission), craft, seed, number)
+        log = fly(missions.scenario_of(course, effects, **mission), craft, seed, number)
         return None if isinstance(log, Diverged) else log
     return flown
 
@@ -33,9 +33,9 @@ def made(fly_course):
     for number in range(12):
         course = made_course(number, (0.035, 0.06, 0.09)[number % 3], (0.25, 0.35)[number % 2])
         log = fly_course(course, number=number)
-        values = missions.drawn(course)
+        values = missions.course_values(course)
         if log is not None and log["x_m"].max() > values["before"] + values["length"] + 0.15:  # it left the platform
-            plan = scenario.draw_flight(missions.one(course, PLAIN), 3, number)
+            plan = scenario.draw_flight(missions.scenario_of(course, PLAIN), 3, number)
             out.append((course, log, plan))
     assert len(out) >= 8
     return out

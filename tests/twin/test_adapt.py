@@ -144,8 +144,9 @@ def test_no_flight_is_in_training_and_held_out_at_once(made, tmp_path, monkeypat
     scored = []
     monkeypatch.setattr(adapt, "together",
                         lambda start, twin, flights, *_: frozenset(str(f.file.path) for f in flights))
-    monkeypatch.setattr(adapt, "kept_model", lambda path, make: make())
-    monkeypatch.setattr(adapt, "kept_scores", lambda path, flights, model: scored.append(
+    monkeypatch.setattr(adapt.cache, "model", lambda path, make: make())
+    monkeypatch.setattr(adapt.cache, "scores", lambda path, make: make())
+    monkeypatch.setattr(adapt, "score_flights", lambda flights, model: scored.append(
         ({str(f.file.path) for f in flights}, model)) or [str(f.file.path) for f in flights])
     flights = flights_of(made, 8)
     held, half = adapt.held_out_scores(flights, flights, [], None, None, tmp_path, "key", 0, None, "")
@@ -188,7 +189,7 @@ def trainings(monkeypatch):
 
 def test_labelled_flights_are_half_of_what_is_learnt(made, trainings):
     """From `start`, with the twin's flights beside them, and with the lag of the recorded flights."""
-    simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
+    simulated = adapt.SimulatedFlights([log for _, log, _ in made[3:8]], [None] * 5)
     labelled, start, twin = flights_of(made, 2), object(), object()
     model = adapt.together(start, twin, labelled, simulated, 0, None, "")
     (asked,) = trainings
@@ -200,7 +201,7 @@ def test_labelled_flights_are_half_of_what_is_learnt(made, trainings):
 
 def test_flights_without_labels_get_those_of_the_twins_detector(made, trainings):
     """Three flights, the second without an edge that it sees, the third with an entry alone: the first is learnt."""
-    simulated = adapt.Flown([log for _, log, _ in made[3:8]], [None] * 5)
+    simulated = adapt.SimulatedFlights([log for _, log, _ in made[3:8]], [None] * 5)
     start, twin = object(), object()
     adapt.together(start, twin, flights_of(made, 3, down=False), simulated, 0, None, "")
     teacher, asked, again, *_ = trainings
@@ -211,7 +212,7 @@ def test_flights_without_labels_get_those_of_the_twins_detector(made, trainings)
 
 def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
     """Of five flights without labels those in which it sees an entry without exit, or nothing, are left out."""
-    simulated = adapt.Flown([log for _, log, _ in made[:4]], [None] * 4)
+    simulated = adapt.SimulatedFlights([log for _, log, _ in made[:4]], [None] * 4)
     flights = [*flights_of(made, 3), *flights_of(made, 8, down=False)[3:]]
     model = adapt.together(None, object(), flights, simulated, 0, None, "")
     first, teacher, second, better, third = trainings
@@ -225,7 +226,7 @@ def test_a_detector_of_labelled_flights_labels_the_others(made, trainings):
 
 def test_a_teacher_that_sees_nothing_is_the_detector(made, trainings, monkeypatch):
     monkeypatch.setattr(best, "pseudo_labels", lambda flights, model: [[] for _ in flights])
-    simulated = adapt.Flown([made[0][1]], [None])
+    simulated = adapt.SimulatedFlights([made[0][1]], [None])
     flights = [*flights_of(made, 2), *flights_of(made, 4, down=False)[2:]]
     model = adapt.together(None, object(), flights, simulated, 0, None, "")
     assert model.metadata["number"] == len(trainings) == 1

@@ -15,7 +15,8 @@ from twin_courses import PLAIN, made_course
 def laid(vehicle):
     """Responses at the heights of the made flights, four each, with the same air."""
     return [r for clearance in (0.035, 0.06, 0.09)
-            for r in overlay.responses(missions.one(made_course(1, clearance), PLAIN), vehicle, 4, seed=4)]
+            for r in overlay.simulate_responses(missions.scenario_of(made_course(1, clearance), PLAIN), vehicle, 4,
+                                                seed=4)]
 
 
 def test_edges_simulated_half_as_strong_are_doubled(made, laid):
@@ -31,11 +32,11 @@ def test_edges_simulated_half_as_strong_are_doubled(made, laid):
 def test_a_response_is_scaled_by_its_height_and_kind(laid):
     response = next(r for r in laid if height_class(r.edges[0].height_after_m) == "low")
     entry, leave = (e.sample for e in response.edges)
-    strong = edge_strength.as_strong(response, {("low", "entry"): 2.0, ("low", "exit"): 3.0, ("high", "entry"): 9.0})
+    strong = edge_strength.scale(response, {("low", "entry"): 2.0, ("low", "exit"): 3.0, ("high", "entry"): 9.0})
     np.testing.assert_allclose(strong.values[:entry + 20], 2.0 * response.values[:entry + 20])
     np.testing.assert_allclose(strong.values[leave - 20:], 3.0 * response.values[leave - 20:])
     assert strong.edges == response.edges
-    same = edge_strength.as_strong(response, {("high", "entry"): 9.0})
+    same = edge_strength.scale(response, {("high", "entry"): 9.0})
     np.testing.assert_array_equal(same.values, response.values)
 
 
@@ -43,7 +44,7 @@ def test_it_stays_within_bounds_and_needs_flights(made, laid):
     """A platform without air has no strength to copy; two flights of a class are too few to tell."""
     flown = [log for _, log, _ in made]
     tiny = [replace(r, values=0.01 * r.values) for r in laid]
-    assert set(edge_strength.strengths(flown, tiny).values()) <= {edge_strength.LEAST, edge_strength.MOST}
+    assert set(edge_strength.strengths(flown, tiny).values()) <= set(edge_strength.BOUNDS)
     assert edge_strength.strengths(flown[:2], laid) == {}
     bare = type(flown[0])({k: v for k, v in flown[0].columns.items() if k != "zrange_m"}, flown[0].meta)
     assert edge_strength.strengths([bare] * 5, laid) == {}
@@ -52,7 +53,7 @@ def test_it_stays_within_bounds_and_needs_flights(made, laid):
 def test_every_class_of_height_comes_as_often(laid):
     of = {height_class(r.edges[0].height_after_m): r for r in laid}
     some = [of["low"]] * 7 + [of["high"]] * 5
-    evened = edge_strength.every_height(some)
+    evened = edge_strength.balance_heights(some)
     names = [height_class(r.edges[0].height_after_m) for r in evened]
     assert len(evened) == 12 and names.count("low") == names.count("high") == 6
-    assert edge_strength.every_height([]) == []
+    assert edge_strength.balance_heights([]) == []

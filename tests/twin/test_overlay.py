@@ -14,12 +14,12 @@ from twin_courses import PLAIN, made_course
 @pytest.fixture(scope="module")
 def scene():
     """A scenario with the course at 5 cm."""
-    return missions.one(made_course(1, 0.05), PLAIN)
+    return missions.scenario_of(made_course(1, 0.05), PLAIN)
 
 
 @pytest.fixture(scope="module")
 def laid(scene, vehicle):
-    return overlay.responses(scene, vehicle, 3, seed=4)
+    return overlay.simulate_responses(scene, vehicle, 3, seed=4)
 
 
 def test_a_response_is_nothing_before_the_platform_and_something_over_it(laid):
@@ -35,7 +35,7 @@ def test_a_response_is_nothing_before_the_platform_and_something_over_it(laid):
 
 
 def test_same_seed_same_responses_and_another_seed_others(scene, vehicle, laid):
-    again, other = overlay.responses(scene, vehicle, 1, seed=4), overlay.responses(scene, vehicle, 1, seed=5)
+    again, other = (overlay.simulate_responses(scene, vehicle, 1, seed=seed) for seed in (4, 5))
     np.testing.assert_array_equal(again[0].values, laid[0].values)
     assert other[0].values.shape != laid[0].values.shape or np.any(other[0].values != laid[0].values)
 
@@ -48,9 +48,9 @@ def test_free_air_holds_no_edge(made):
         flown = course(log)
         assert len(part.start) + len(part.end) < len(log) - (flown.exit - flown.entry)
         np.testing.assert_array_equal(part.start[-1, 6:], log.stack(overlay.PWM)[flown.entry - 61])
-        assert part.step + part.wait == flown.entry - max(flown.start - 100, 0)
+        assert part.step + part.approach == flown.entry - max(flown.start - 100, 0)
         values = overlay.values_of(log)[:flown.entry - 60]
-        for quiet in part.quiet:  # level flight before the platform, and the velocity step is in none of it
+        for quiet in part.level:  # level flight before the platform, and the velocity step is in none of it
             at = next(i for i in range(len(values)) if np.array_equal(values[i], quiet[0]))
             np.testing.assert_array_equal(values[at:at + len(quiet)], quiet)
             assert flown.level < at and not at < flown.step < at + len(quiet)
@@ -81,7 +81,7 @@ def test_an_edge_comes_as_long_after_the_velocity_step_as_in_a_recorded_flight(m
     _, edges = overlay.flights(air, laid * 5, seed=3)
     waits = [e[0].sample - air[0].step for e in edges if e]
     assert len(waits) > 10 and np.std(waits) > 0.0
-    assert all(0.85 * air[0].wait - 1 <= w <= 1.15 * air[0].wait + 1 for w in waits)
+    assert all(0.85 * air[0].approach - 1 <= w <= 1.15 * air[0].approach + 1 for w in waits)
 
 
 def test_a_third_of_the_flights_has_no_platform(made, laid):
@@ -101,10 +101,10 @@ def test_flights_without_down_range_have_no_free_air(made):
 
 
 def test_a_scenario_without_platform_is_named(vehicle):
-    table = dict(missions.one(made_course(1, 0.05), PLAIN).table)
+    table = dict(missions.scenario_of(made_course(1, 0.05), PLAIN).table)
     table.pop("platform")
     with pytest.raises(AirTouchError, match="only 0 of 3 flights"):
-        overlay.responses(scenario.Scenario("bare", "", table), vehicle, 1)
+        overlay.simulate_responses(scenario.Scenario("bare", "", table), vehicle, 1)
 
 
 def test_logs_of_overlay_flights_train(made, laid):

@@ -15,12 +15,12 @@ from airtouch.twin.comparison.compare import Comparison
 from airtouch.twin.comparison.curves import Curves
 from airtouch.twin.comparison.words import answer, gap_row
 from airtouch.twin.fitting.levers import Lever
-from airtouch.twin.recorded.flights import Recorded
+from airtouch.twin.recorded.flights import RecordedFlights
 
 MOST_GAPS = 30
 
 
-def write_report(path: Path, recorded: Recorded, comparison: Comparison, curves: Curves, levers: Sequence[Lever],
+def write_report(path: Path, recorded: RecordedFlights, comparison: Comparison, curves: Curves, levers: Sequence[Lever],
                  values: np.ndarray, misfit_before: dict[str, float], *, command: str, force: bool = False) -> None:
     """Write the page as a self-contained HTML file.
 
@@ -40,7 +40,7 @@ def write_report(path: Path, recorded: Recorded, comparison: Comparison, curves:
         levers=[(lever.name, f"{value:.4g}", f"{lever.start:.4g}", lever.unit)
                 for lever, value in zip(levers, values, strict=True)],
         images=[(title, text, embed(data)) for title, text, data in images],
-        flights=len(recorded.courses), simulated=len(comparison.flown), lost=comparison.lost,
+        flights=len(recorded.courses), simulated=len(comparison.flights), lost=comparison.diverged,
         left_out=recorded.left_out,
         speeds=sorted({c.speed_from for c in recorded.courses}), command=command, version=__version__)
     write_bytes(page.encode(), path, force)

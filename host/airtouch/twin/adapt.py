@@ -6,7 +6,6 @@ flights.
 """
 
 import hashlib
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,21 +25,27 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.shared.training_set import flight_hash
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
-from airtouch.logs.files import make_folder, write_bytes
+from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.scenario import Scenario
-from airtouch.twin import edge_strength, overlay
+from airtouch.twin import cache, edge_strength, overlay
 from airtouch.vehicle import Vehicle
 
-SIMULATED = 450  #: flights of the twin to train on
-STEPS = {"shipped": 400, "scratch": 2500}  #: optimiser steps of a training from given and from random weights
+#: flights of the twin to train on; compared with 150 on both halves of the authors' flights
+#: (host/docs/twin-findings.md, longer training)
+TWIN_FLIGHTS = 450
+#: optimiser steps of a training from given and from random weights. 2500 was compared with 1000 and 5000 on both halves
+#: (host/docs/twin-findings.md, longer training); no source for 400: round number, above the 300 of fine-tuning
+STEPS = {"shipped": 400, "scratch": 2500}
 #: Augmentation of recorded and simulated flights together from random weights: twice the recipe's, as few flights are
-#: seen for long. Given weights forget more by it (host/docs/twin-findings.md).
-STRONG: dict[str, Any] = {"gain": 0.3, "warp": 0.15, "noise": 0.1, "offset": 0.2, "yaw_deg": 40.0}
-ROUNDS = 2  #: rounds in which flights without labels are labelled, each by the detector of the round before
-FOLDS = 4  #: folds of the cross-validation over labelled flights
-STAGES = 6  #: version of what the stages do; stored results of another version are not used
-FEWEST = 4  #: least number of labelled flights for a hold-out
+#: repeated often; three times is worse. Given weights forget more by it (host/docs/twin-findings.md, longer training).
+AUGMENTATION: dict[str, Any] = {"gain": 0.3, "warp": 0.15, "noise": 0.1, "offset": 0.2, "yaw_deg": 40.0}
+#: rounds in which flights without labels are labelled, each by the detector of the round before; compared with one on
+#: both halves (host/docs/twin-findings.md, a second round of labels)
+ROUNDS = 2
+FOLDS = 4  #: folds of the cross-validation over labelled flights; no source: round number, for time
+STAGE_VERSION = 6  #: version of what the stages do; stored results of another version are not used
+MIN_LABELLED = 4  #: least number of labelled flights for a hold-out: one for each fold
 #: Decoder of a detector that has been trained on simulated edges: its entry logit hardly rises over high platforms, so
 #: that the "over" logit has a large share, smoothed over 0.1 s. Chosen on folds 0 to 2 out of 220, for the least cost
 #: of error, misses and false edges over eight detectors of folds 3 and 4, and rounded (host/docs/looks.md).
@@ -64,8 +69,8 @@ class Flight:
 
 
 @dataclass(frozen=True)
-class Flown:
-    """Simulated flights: logs, and the edges of each; None if its own down range shows them."""
+class SimulatedFlights:
+    """Flights to train on beside recorded ones: logs, and the edges of each; None if its own down range shows them."""
 
     logs: list[FlightLog]
     edges: list[list[Edge] | None]
@@ -95,53 +100,58 @@ def adapt(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, work: Pa
     AirTouchError if no flight crosses an edge.
     """
     make_folder(work)
-    absent = lacking(flights)
+    absent = absent_sensors(flights)
     start = start.serving(absent) if start else None
     key = _key(flights, scene, vehicle, start, seed)
-    flown, origin = simulated_flights(flights, scene, vehicle, seed, progress)
-    flown = replace(flown, logs=[sensors.without(log, absent) for log in flown.logs])
+    twin_flights, origin = simulated_flights(flights, scene, vehicle, seed, progress)
+    twin_flights = replace(twin_flights, logs=[sensors.without(log, absent) for log in twin_flights.logs])
     labelled = [f for f in flights if f.labelled]
-    twin = kept_model(work / f"twin_{key}.npz", lambda: best.fit(
-        flown.logs, seed, start=start, pseudo_labels=flown.edges, decoder=None if start else DECODER,
-        steps=STEPS["shipped" if start else "scratch"], progress=_named(progress, "twin"), command=command,
+    twin = cache.model(work / f"twin_{key}.npz", lambda: best.fit(
+        twin_flights.logs, seed, start=start, pseudo_labels=twin_flights.edges, decoder=None if start else DECODER,
+        steps=STEPS["shipped" if start else "scratch"], progress=_with_name(progress, "twin"), command=command,
         lag_of=([f.log for f in labelled], [None] * len(labelled))))
-    twin_only = kept_scores(work / f"twin_{key}.json", labelled, twin)
-    held, half = [], []
-    if hold_out and len(labelled) >= FEWEST:
-        held, half = held_out_scores(flights, labelled, flown, start, twin, work, key, seed, progress, command)
-    last = [without_range(f) for f in flights] if withhold else flights
+    twin_only = cache.scores(work / f"twin_{key}.json", partial(score_flights, labelled, twin))
+    held_out, held_out_half = [], []
+    if hold_out and len(labelled) >= MIN_LABELLED:
+        held_out, held_out_half = held_out_scores(flights, labelled, twin_flights, start, twin, work, key, seed,
+                                                  progress, command)
+    train = [without_range(f) for f in flights] if withhold else flights
     name = "unlabelled" if withhold else "all"
-    model = kept_model(work / f"{name}_{key}.npz",
-                   lambda: together(start, twin, last, flown, seed, _named(progress, "all flights"), command))
-    own = sum(f.labelled for f in last)
-    counts = {"twin": origin, "labelled": own, "pseudo_labelled": len(flights) - own}
-    return Adapted(replace(model, metadata={**model.metadata, "adapted": counts}), held, half, twin_only)
+    model = cache.model(work / f"{name}_{key}.npz", lambda: together(
+        start, twin, train, twin_flights, seed, _with_name(progress, "all flights"), command))
+    count = sum(f.labelled for f in train)
+    training = {"twin": origin, "labelled": count, "pseudo_labelled": len(flights) - count}
+    return Adapted(replace(model, metadata={**model.metadata, "adapted": training}), held_out, held_out_half, twin_only)
 
 
-def lacking(flights: Sequence[Flight]) -> tuple[str, ...]:
+def absent_sensors(flights: Sequence[Flight]) -> tuple[str, ...]:
     """The sensors that all of the flights lack."""
     return tuple(s for s in sensors.SENSORS if all(s in sensors.missing(f.log) for f in flights))
 
 
 def simulated_flights(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, seed: int,
-                      progress: Progress | None) -> tuple[Flown, dict[str, Any]]:
-    """Simulated flights of the twin, added to the recorded flights' free air if there is any, and their description."""
+                      progress: Progress | None) -> tuple[SimulatedFlights, dict[str, Any]]:
+    """Flights of the twin, added to the recorded flights' free air if there is any, and a description for metadata.
+
+    Raises AirTouchError if too many simulated flights diverge.
+    """
     air = overlay.free_air([f.log for f in flights if f.labelled])
     if not air:
-        flown, what = simulated.training_flights(SIMULATED, scene, vehicle=vehicle, seed=seed, progress=progress)
-        return Flown(flown, [None] * len(flown)), what
+        twin_logs, description = simulated.training_flights(TWIN_FLIGHTS, scene, vehicle=vehicle, seed=seed,
+                                                            progress=progress)
+        return SimulatedFlights(twin_logs, [None] * len(twin_logs)), description
     report = (lambda done, total: progress("simulated edges", done, total, "")) if progress else (lambda *_: None)
-    weak = overlay.responses(scene, vehicle, SIMULATED, seed, report)
-    factors = edge_strength.strengths([f.log for f in flights if f.labelled], weak)
-    strong = [edge_strength.as_strong(r, factors) for r in edge_strength.every_height(weak)]
-    laid, edges = overlay.flights(air, strong, seed)
-    what = {"scenario": scene.name, "flights": len(laid), "seed": seed, "free_air_of": len(air),
-            "strengths": {" ".join(key): round(value, 2) for key, value in factors.items()}}
-    return Flown(laid, list(edges)), what
+    responses = overlay.simulate_responses(scene, vehicle, TWIN_FLIGHTS, seed, report)
+    factors = edge_strength.strengths([f.log for f in flights if f.labelled], responses)
+    scaled = [edge_strength.scale(r, factors) for r in edge_strength.balance_heights(responses)]
+    twin_logs, edges = overlay.flights(air, scaled, seed)
+    description = {"scenario": scene.name, "flights": len(twin_logs), "seed": seed, "free_air_of": len(air),
+                   "strengths": {" ".join(key): round(value, 2) for key, value in factors.items()}}
+    return SimulatedFlights(twin_logs, list(edges)), description
 
 
-def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], flown: Flown, seed: int,
-             progress: Progress | None, command: str) -> BestModel:
+def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight], twin_flights: SimulatedFlights,
+             seed: int, progress: Progress | None, command: str) -> BestModel:
     """A detector trained on recorded and simulated flights; the twin's detector itself without recorded ones.
 
     With labelled flights it is trained from `start` on both kinds, each with half of the crops: a network that is
@@ -149,69 +159,69 @@ def together(start: BestModel | None, twin: BestModel, flights: Sequence[Flight]
     labelled by it, or by the twin's detector where no flight is labelled (`self_trained`).
     """
     labelled = [f for f in flights if f.labelled]
-    others = [f for f in flights if not f.labelled]
-    teacher = _mixed(start, labelled, [], [], flown, seed, progress, command) if labelled else twin
-    return self_trained(start, teacher, labelled, others, flown, seed, progress, command)
+    unlabelled = [f for f in flights if not f.labelled]
+    teacher = _fit_mixture(start, labelled, [], [], twin_flights, seed, progress, command) if labelled else twin
+    return self_trained(start, teacher, labelled, unlabelled, twin_flights, seed, progress, command)
 
 
-def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence[Flight], others: Sequence[Flight],
-                 flown: Flown, seed: int, progress: Progress | None, command: str) -> BestModel:
+def self_trained(start: BestModel | None, teacher: BestModel, labelled: Sequence[Flight], unlabelled: Sequence[Flight],
+                 twin_flights: SimulatedFlights, seed: int, progress: Progress | None, command: str) -> BestModel:
     """A detector trained from `start` on labelled flights, flights that the teacher labels, and simulated ones.
 
     Each kind has the same share of the crops. Flights in which the teacher sees no platform, or not both edges of
-    each, are left out: they may be over one that it missed. The teacher itself where none is left. In each of ROUNDS
-    the detector of the round before is the teacher.
+    each, are left out: they may be over one that it missed. The teacher itself where no flight remains. In each of
+    ROUNDS the detector of the round before is the teacher.
     """
     for _ in range(ROUNDS):
-        labels = best.pseudo_labels([f.log for f in others], teacher)
-        sure = [(f, edges) for f, edges in zip(others, labels, strict=True)
-                if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
-        if not sure:
+        labels = best.pseudo_labels([f.log for f in unlabelled], teacher)
+        complete = [(f, edges) for f, edges in zip(unlabelled, labels, strict=True)
+                    if edges and [e.kind for e in edges] == ["entry", "exit"] * (len(edges) // 2)]
+        if not complete:
             break
-        pupils, pseudo_edges = zip(*sure, strict=True)
-        teacher = _mixed(start, labelled, pupils, pseudo_edges, flown, seed, progress, command)
+        pupils, pseudo_edges = zip(*complete, strict=True)
+        teacher = _fit_mixture(start, labelled, pupils, pseudo_edges, twin_flights, seed, progress, command)
     return teacher
 
 
-def _mixed(start: BestModel | None, labelled: Sequence[Flight], pupils: Sequence[Flight],
-           pseudo_edges: Sequence[list[Edge] | None], flown: Flown, seed: int, progress: Progress | None,
-           command: str) -> BestModel:
+def _fit_mixture(start: BestModel | None, labelled: Sequence[Flight], pupils: Sequence[Flight],
+                 pseudo_edges: Sequence[list[Edge] | None], twin_flights: SimulatedFlights, seed: int,
+                 progress: Progress | None, command: str) -> BestModel:
     """One training on labelled flights, flights `pupils` with pseudo-labels, and simulated ones, of the same weight.
 
     The lag is that of the recorded ones: recorded edges are detected later than simulated ones.
     """
-    count = len(flown.logs)
+    count = len(twin_flights.logs)
     recorded, labels = [f.log for f in (*labelled, *pupils)], [*[None] * len(labelled), *pseudo_edges]
     weights = [count / len(group) for group in (labelled, pupils) for _ in group] + [1.0] * count
-    return best.fit([*recorded, *flown.logs], seed, start=start, pseudo_labels=[*labels, *flown.edges],
+    return best.fit([*recorded, *twin_flights.logs], seed, start=start, pseudo_labels=[*labels, *twin_flights.edges],
                     emphasis=weights, decoder=None if start else DECODER, progress=progress, command=command,
                     steps=STEPS["shipped" if start else "scratch"], lag_of=(recorded, labels),
-                    **({} if start else STRONG))
+                    **({} if start else AUGMENTATION))
 
 
-def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], flown: Flown, start: BestModel | None,
-                    twin: BestModel, work: Path, key: str, seed: int, progress: Progress | None, command: str,
-                    ) -> tuple[list[FlightScore], list[FlightScore]]:
+def held_out_scores(flights: Sequence[Flight], labelled: Sequence[Flight], twin_flights: SimulatedFlights,
+                    start: BestModel | None, twin: BestModel, work: Path, key: str, seed: int,
+                    progress: Progress | None, command: str) -> tuple[list[FlightScore], list[FlightScore]]:
     """Scores of the labelled flights by cross-validation: trained on all other folds, and on half of their flights.
 
     The labelled flights are assigned to FOLDS folds by seed. Models and scores are stored in `work` under `key`.
     """
     order = np.random.default_rng([seed, 7]).permutation(len(labelled))
-    others = [f for f in flights if not f.labelled]
+    unlabelled = [f for f in flights if not f.labelled]
     folds = min(FOLDS, len(labelled))
-    held: list[FlightScore] = []
-    half: list[FlightScore] = []
+    scores: list[FlightScore] = []
+    scores_half: list[FlightScore] = []
     for k in range(folds):
         test = [labelled[i] for i in order[k::folds]]
         train = [labelled[i] for j, i in enumerate(order) if j % folds != k]
-        for share, into in ((1, held), (2, half)):
-            subset = train[:max(len(train) // share, 1)]
-            path = work / f"fold{k}_{share}_{key}"
-            name = f"hold-out {k + 1}/{folds}" + (" (half)" if share == 2 else "")
-            learn = partial(together, start, twin, [*subset, *others], flown, seed, _named(progress, name), command)
-            model = kept_model(path.with_suffix(".npz"), learn)
-            into += kept_scores(path.with_suffix(".json"), test, model)
-    return held, half
+        for divisor, results in ((1, scores), (2, scores_half)):
+            subset = train[:max(len(train) // divisor, 1)]
+            path = work / f"fold{k}_{divisor}_{key}"
+            name = f"hold-out {k + 1}/{folds}" + (" (half)" if divisor == 2 else "")
+            model = cache.model(path.with_suffix(".npz"), partial(
+                together, start, twin, [*subset, *unlabelled], twin_flights, seed, _with_name(progress, name), command))
+            results += cache.scores(path.with_suffix(".json"), partial(score_flights, test, model))
+    return scores, scores_half
 
 
 def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] | None:
@@ -222,11 +232,11 @@ def outlook(adapted: Adapted, labelled: int, more: int = 5) -> dict[str, float] 
     """
     if not adapted.held_out or not adapted.held_out_half:
         return None
-    now, before = (summary.summarise(s)["mean_abs_error_m"] for s in (adapted.held_out, adapted.held_out_half))
-    if not now or not before:
+    now, half = (summary.summarise(s)["mean_abs_error_m"] for s in (adapted.held_out, adapted.held_out_half))
+    if not now or not half:
         return None
-    exponent = float(np.clip(np.log2(before / now), 0.0, 1.0))
-    return {"now_m": now, "half_m": before, "then_m": now * ((labelled + more) / labelled) ** -exponent,
+    exponent = float(np.clip(np.log2(half / now), 0.0, 1.0))
+    return {"now_m": now, "half_m": half, "then_m": now * ((labelled + more) / labelled) ** -exponent,
             "exponent": exponent}
 
 
@@ -236,25 +246,12 @@ def without_range(flight: Flight) -> Flight:
     return replace(flight, log=FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta))
 
 
-def kept_model(path: Path, make: Callable[[], BestModel]) -> BestModel:
-    """The model in a file; where there is none it is made and saved there."""
-    if path.is_file():
-        return best.load(path)
-    model = make()
-    model.save(path, force=True)
-    return model
+def score_flights(flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
+    """The flights' scores by a model."""
+    return [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]
 
 
-def kept_scores(path: Path, flights: Sequence[Flight], model: BestModel) -> list[FlightScore]:
-    """Scores of flights in a JSON file; where there is none the flights are scored and it is written."""
-    if path.is_file():
-        return [FlightScore.from_dict(s) for s in json.loads(path.read_text())]
-    scores = [evaluate.evaluate_flight(f.file, f.log, best, model).score for f in flights]
-    write_bytes(json.dumps([s.as_dict() for s in scores], allow_nan=False).encode(), path, force=True)
-    return scores
-
-
-def _named(progress: Progress | None, name: str) -> Progress | None:
+def _with_name(progress: Progress | None, name: str) -> Progress | None:
     """The progress with a name before each stage."""
     if progress is None:
         return None
@@ -263,20 +260,24 @@ def _named(progress: Progress | None, name: str) -> Progress | None:
 
 def _key(flights: Sequence[Flight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
-    settings = (STAGES, scene.table, vehicle, seed, SIMULATED, STEPS, STRONG, ROUNDS, DECODER,
-                edge_strength.LEAST, edge_strength.MOST)
-    total = hashlib.sha256(repr(settings).encode())
+    settings = (STAGE_VERSION, scene.table, vehicle, seed, TWIN_FLIGHTS, STEPS, AUGMENTATION, ROUNDS, DECODER,
+                *edge_strength.BOUNDS)
+    digest = hashlib.sha256(repr(settings).encode())
     for flight in flights:
-        total.update(f"{flight_hash(flight.log)} {flight.labelled} {flight.file.condition}".encode())
+        digest.update(f"{flight_hash(flight.log)} {flight.labelled} {flight.file.condition}".encode())
     if start is not None:
         for name in sorted(start.weights):
-            total.update(np.asarray(start.weights[name]).tobytes())
-    return total.hexdigest()[:12]
+            digest.update(np.asarray(start.weights[name]).tobytes())
+    return digest.hexdigest()[:12]
 
 
 def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
              progress: Callable[[int, int], None] = lambda *_: None) -> tuple[list[Flight], list[tuple[str, str]]]:
-    """Flights that can be used, and the others with the reason. A speed that is not stated comes from the log."""
+    """Flights that can be used, and (path, reason) of the others.
+
+    A speed that is not stated comes from the log; speed_mps, m/s, where the log has no platform. progress: as
+    progress(done, total).
+    """
     from airtouch.twin.recorded.course import course
 
     usable, left_out = [], []

@@ -17,7 +17,7 @@ from airtouch.twin.recorded import missions
 from airtouch.twin.recorded.course import Course
 from airtouch.vehicle import Vehicle
 
-VEHICLE, SCENARIO = "vehicle.toml", "scenario.toml"
+VEHICLE, SCENARIO = "vehicle.toml", "scenario.toml"  #: names of the files
 
 
 def vehicle_text(vehicle: Vehicle) -> str:
@@ -29,14 +29,17 @@ def vehicle_text(vehicle: Vehicle) -> str:
 
 def scenario_text(courses: Sequence[Course], effects: Mapping[str, Any], name: str,
                   **mission: float) -> str:
-    """A scenario as TOML: each flight draws one of the courses. mission: as of `missions.drawn`."""
+    """A scenario as TOML: each flight draws one of the courses. mission: as of `missions.course_values`."""
     return tomli_w.dumps(missions.table(courses, effects, name, **mission))
 
 
 def write(out: Path, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, courses: Sequence[Course],
           fixed: Mapping[str, Any] | None = None, *, name: str = missions.NAME,
           force: bool = False) -> tuple[Path, Path]:
-    """Write both files into a folder; each is read back as a check. Raises AirTouchError where one exists."""
+    """Write both files into a folder; each is read back as a check.
+
+    values: (levers,). fixed: effects without levers. Raises AirTouchError for a file that exists, without `force`.
+    """
     craft = replace(lever_set.craft(vehicle, levers, values), name=name)
     texts = {VEHICLE: vehicle_text(craft),
              SCENARIO: scenario_text(courses, lever_set.table(levers, values, fixed), name,

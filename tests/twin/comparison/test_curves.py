@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from airtouch.twin.comparison import curves
-from airtouch.twin.comparison.compare import Flown
+from airtouch.twin.comparison.compare import SimulatedFlight
 from airtouch.twin.recorded.channels import RATE_HZ
 from airtouch.twin.recorded.features import names
-from airtouch.twin.recorded.flights import Recorded
+from airtouch.twin.recorded.flights import RecordedFlights
 
 ENTRY, EXIT, ROWS = 400, 700, 1200
 
@@ -26,8 +26,8 @@ def flight(level, lift, clearance=0.04, longer=0):
 def curves_of(recorded, simulated):
     features = np.zeros((len(recorded), len(names())))
     return curves.curves(
-        Recorded("v", [c for c, _ in recorded], [x for _, x in recorded], features, []),
-        [Flown(c, i, x, features[0]) for i, (c, x) in enumerate(simulated)])
+        RecordedFlights("v", [c for c, _ in recorded], [x for _, x in recorded], features, []),
+        [SimulatedFlight(c, i, x, features[0]) for i, (c, x) in enumerate(simulated)])
 
 
 def test_edges_are_taken_against_the_level_before_the_entry():
@@ -60,7 +60,7 @@ def test_spectra_are_quartiles_over_flights():
     at = [k for k, f in enumerate(names()) if f.group == "spectrum"]
     features = np.zeros((3, len(names())))
     features[:, at] = np.array([[1.0], [2.0], [6.0]])
-    recorded = Recorded("v", [c for c, _ in flights], [x for _, x in flights], features, [])
-    simulated = [Flown(c, i, x, features[0]) for i, (c, x) in enumerate(flights)]
+    recorded = RecordedFlights("v", [c for c, _ in flights], [x for _, x in flights], features, [])
+    simulated = [SimulatedFlight(c, i, x, features[0]) for i, (c, x) in enumerate(flights)]
     real, fake = curves.curves(recorded, simulated).spectra
     assert real.shape[0] == 3 and np.allclose(real.T, [1.5, 2.0, 4.0]) and np.allclose(fake, 1.0)

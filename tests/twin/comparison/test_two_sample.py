@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import mannwhitneyu
 
 from airtouch.errors import AirTouchError
-from airtouch.twin.comparison.two_sample import area, area_within, number_names, two_sample, windows
+from airtouch.twin.comparison.two_sample import area, area_within, feature_names, two_sample, windows
 from airtouch.twin.recorded.channels import channels
 from airtouch.twin.recorded.course import course
 from skips import needs
@@ -74,7 +74,7 @@ def test_other_noise_and_other_air_are_told_apart(some, fly_course, vehicle):
 
 def test_windows_stay_in_their_phase_and_flight(some):
     made = windows(some[:3])
-    assert made.values.shape == (len(made.phase), len(number_names()))
+    assert made.values.shape == (len(made.phase), len(feature_names()))
     assert np.isfinite(made.values).all()
     assert set(made.flight) == {n for _, _, n in some[:3]}
 

@@ -42,7 +42,7 @@ def aim(vehicle, chosen):
             courses.append(flown)
             numbers.append(features(log, flown))
     assert len(courses) >= 36
-    return fit.target(courses, np.array(numbers))
+    return fit.target_of(courses, np.array(numbers))
 
 
 def test_levers_at_edges_come_back(aim, vehicle, chosen):

@@ -44,7 +44,7 @@ def aim(vehicle, chosen):
             continue
         numbers.append(features(log, courses[-1]))
     assert len(courses) >= 36
-    return fit.target(courses, np.array(numbers))
+    return fit.target_of(courses, np.array(numbers))
 
 
 @pytest.fixture(scope="module")
@@ -83,9 +83,9 @@ def test_misfit_falls(fitted):
 def test_same_seed_same_levers_and_a_stopped_fit_goes_on(aim, vehicle, chosen, tmp_path):
     settings = {"flights": 24, "fixed": FIXED, "seed": 2}
     whole = fit.fit(aim, vehicle, chosen, rounds=3, **settings)
-    fit.fit(aim, vehicle, chosen, rounds=1, kept=tmp_path / "fit.json", **settings)
+    fit.fit(aim, vehicle, chosen, rounds=1, state_file=tmp_path / "fit.json", **settings)
     told = []
-    resumed = fit.fit(aim, vehicle, chosen, rounds=3, kept=tmp_path / "fit.json",
+    resumed = fit.fit(aim, vehicle, chosen, rounds=3, state_file=tmp_path / "fit.json",
                       progress=lambda done, total, misfit: told.append(done), **settings)
     assert told == [2, 3]
     np.testing.assert_array_equal(resumed.values, whole.values)
@@ -94,16 +94,16 @@ def test_same_seed_same_levers_and_a_stopped_fit_goes_on(aim, vehicle, chosen, t
 def test_a_damaged_fit_is_named(aim, vehicle, chosen, tmp_path):
     (tmp_path / "fit.json").write_text("{")
     with pytest.raises(AirTouchError, match="damaged fit"):
-        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, kept=tmp_path / "fit.json")
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, state_file=tmp_path / "fit.json")
 
 
 def test_a_fit_of_other_flights_is_refused(aim, vehicle, chosen, tmp_path):
     """One flight more, or another vehicle, is another fit."""
     kept = tmp_path / "fit.json"
     fit.fit(fit.Target(aim.courses[:-1], aim.features[:-1], aim.scatter), vehicle, chosen, rounds=1, flights=48,
-            kept=kept)
+            state_file=kept)
     with pytest.raises(AirTouchError, match="other flights"):
-        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, kept=kept)
+        fit.fit(aim, vehicle, chosen, rounds=1, flights=48, state_file=kept)
     keys = {fit.key(aim, vehicle, chosen), fit.key(aim, replace(vehicle, mass_kg=0.05), chosen),
             fit.key(aim, vehicle, chosen, seed=1), fit.key(aim, vehicle, chosen[1:])}
     assert len(keys) == 4

@@ -23,7 +23,7 @@ def test_edges_are_where_the_platform_is(made):
     """Position is true in a simulated log: the drone is at the platform's edges at the course's edges."""
     for planned, log, _ in made:
         read = course(log)
-        values = missions.drawn(planned)
+        values = missions.course_values(planned)
         assert log["x_m"][read.entry] == pytest.approx(values["before"], abs=0.03)
         assert log["x_m"][read.exit] == pytest.approx(values["before"] + values["length"], abs=0.03)
 
@@ -136,7 +136,7 @@ def test_bias_of_the_down_range_moves_the_platform(made):
         assert missions.true_distance(reading, {}) == reading
         assert missions.true_distance(reading, {**bias, "near": {"low": -0.04, "high": -0.02}}) == pytest.approx(true)
     planned = made[0][0]
-    plain, moved = missions.drawn(planned), missions.drawn(planned, {"range_bias": bias})
+    plain, moved = missions.course_values(planned), missions.course_values(planned, {"range_bias": bias})
     assert plain["top"] == pytest.approx(planned.before_m - planned.entered_m)
     assert moved["top"] + moved["clearance"] == pytest.approx(plain["top"] + plain["clearance"], abs=1e-4)
     assert moved["clearance"] > plain["clearance"] + 0.01
@@ -144,6 +144,6 @@ def test_bias_of_the_down_range_moves_the_platform(made):
 
 def test_drawn_values_are_plain_and_positive(made):
     for planned, _, _ in made:
-        values = missions.drawn(replace(planned, stop_s=0.0, before_s=0.0))
+        values = missions.course_values(replace(planned, stop_s=0.0, before_s=0.0))
         assert all(isinstance(v, float) for v in values.values())
         assert values["before"] > 0 and values["stop"] > 0 and values["length"] > 0

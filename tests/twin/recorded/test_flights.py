@@ -26,7 +26,7 @@ def folder(made, tmp_path_factory):
 
 def test_every_usable_flight_has_a_course_channels_and_features(folder, made):
     steps = []
-    recorded = flights.recorded([folder], progress=lambda done, total: steps.append((done, total)))
+    recorded = flights.read([folder], progress=lambda done, total: steps.append((done, total)))
     assert len(recorded.courses) == len(recorded.channels) == len(recorded.features) == 6
     assert recorded.features.shape == (6, len(names())) and recorded.channels[0].shape[1] == 12
     assert [c.speed_mps for c in recorded.courses] == pytest.approx([c.speed_mps for c, _, _ in made[:6]])
@@ -37,6 +37,6 @@ def test_every_usable_flight_has_a_course_channels_and_features(folder, made):
 
 def test_too_few_flights_of_a_fold_say_what_to_fly(folder):
     with pytest.raises(AirTouchError, match="3 of 4 flights can be used and 4 are needed: fly straight .* 1 more"):
-        flights.recorded([folder], folds=[1])
+        flights.read([folder], folds=[1])
     with pytest.raises(AirTouchError, match="no flight is in fold 7 of the manifest"):
-        flights.recorded([folder], folds=[7])
+        flights.read([folder], folds=[7])

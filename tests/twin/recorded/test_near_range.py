@@ -24,7 +24,7 @@ def flown(vehicle):
     for number in range(24):
         planned = replace(made_course(number, 0.05), cruise_m=TOP + (0.025, 0.05, 0.075, 0.1)[number % 4], top_m=TOP)
         planned = replace(planned, before_m=planned.cruise_m)
-        log = fly(missions.one(planned, {**PLAIN, "range_bias": BIAS}), steady, 6, number)
+        log = fly(missions.scenario_of(planned, {**PLAIN, "range_bias": BIAS}), steady, 6, number)
         if isinstance(log, Diverged):
             continue
         try:
@@ -57,6 +57,7 @@ def test_two_platforms_or_too_few_flights_are_not_measured(flown):
 
 def test_a_known_top_is_flown():
     planned = replace(made_course(0, 0.05), top_m=0.73)
-    assert missions.drawn(planned)["top"] == pytest.approx(0.73)
-    assert missions.drawn(planned)["clearance"] == pytest.approx(planned.before_m - 0.73)
-    assert missions.drawn(replace(planned, top_m=0.0))["top"] == pytest.approx(planned.before_m - planned.entered_m)
+    assert missions.course_values(planned)["top"] == pytest.approx(0.73)
+    assert missions.course_values(planned)["clearance"] == pytest.approx(planned.before_m - 0.73)
+    assert missions.course_values(replace(planned, top_m=0.0))["top"] == pytest.approx(
+        planned.before_m - planned.entered_m)

@@ -72,5 +72,5 @@ def test_pulses_need_velocity_control_and_a_period():
 
 
 def test_a_course_without_pulses_draws_none():
-    assert missions.drawn(made_course(0, 0.05), pulse_mps=-0.2)["pulse"] == 0.0
+    assert missions.course_values(made_course(0, 0.05), pulse_mps=-0.2)["pulse"] == 0.0
     assert pulses.period(None, 0, 50) == 0.0

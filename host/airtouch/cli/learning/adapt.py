@@ -111,7 +111,7 @@ def _say(adapted: Any, adapt: Any, summary: Any, labelled: int, hold_out: bool) 
         click.echo("nothing was held out, as asked: what to expect of new flights is not known")
         return
     if not adapted.held_out:
-        click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.FEWEST} are needed to say "
+        click.echo(f"nothing was held out: {labelled} flights label themselves, {adapt.MIN_LABELLED} are needed to say "
                    "what to expect")
         return
     ahead = adapt.outlook(adapted, labelled, MORE)

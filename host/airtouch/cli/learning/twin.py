@@ -69,28 +69,29 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     fitted = calibrate.calibrate(recorded, craft, out, rounds=rounds, flights=batch, seed=seed, workers=workers,
                                  bar=Bar)
     with Bar("flying the twin") as bar:
-        flown, lost = compare.flown(recorded.courses, craft, fitted.levers, fitted.values, seed, levers.FIXED,
-                                    progress=bar)
+        simulated, diverged = compare.fly_courses(recorded.courses, craft, fitted.levers, fitted.values, seed,
+                                                  levers.FIXED, progress=bar)
     with Bar("telling apart") as bar:
         phase = count(1)
-        comparison = compare.compare(recorded, fitted.aim, flown, lost, seed, lambda name: bar(next(phase), 6, name))
+        comparison = compare.compare(recorded, fitted.target, simulated, diverged, seed,
+                                     lambda name: bar(next(phase), 6, name))
     typed = shlex.join(["airtouch", *sys.argv[1:]])
     by_name = {lever.name: float(value) for lever, value in zip(fitted.levers, fitted.values, strict=True)}
     summary = _summary(comparison, by_name, fitted.history, recorded, typed)
     write_bytes(json.dumps(summary, indent=1).encode(), out / SUMMARY, force=True)
     with Bar("report"):
-        twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flown), fitted.levers,
-                                 fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
+        twin_report.write_report(out / REPORT, recorded, comparison, curves(recorded, comparison.flights),
+                                 fitted.levers, fitted.values, fitted.history[0]["misfit"], command=typed, force=True)
     _say(comparison, len(recorded.courses), fitted.history[0]["misfit"])
     click.echo(f"written: {out / files.VEHICLE}, {out / files.SCENARIO}, {out / REPORT}")
 
 
 def _read(flights: Sequence[Path], speed: float | None, folds: Sequence[int]) -> Any:
     """The recorded flights; says why others were left out."""
-    from airtouch.twin.recorded import flights as recordings
+    from airtouch.twin.recorded import flights as recorded_flights
 
     with Bar("reading") as bar:
-        recorded = recordings.recorded(flights, speed_mps=speed, folds=folds, progress=bar)
+        recorded = recorded_flights.read(flights, speed_mps=speed, folds=folds, progress=bar)
     for _, reason in recorded.left_out:
         click.echo(f"airtouch: {reason}", err=True)
     return recorded
@@ -122,7 +123,7 @@ def _check_free(fit_file: Path, resume: bool, force: bool) -> None:
 def _summary(comparison: Any, levers: dict[str, float], history: Any, recorded: Any, typed: str) -> dict[str, Any]:
     """The content of the report as plain values for JSON."""
     return {"command": typed, "flights": [c.as_dict() for c in recorded.courses], "misfit": comparison.misfit,
-            "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.lost,
+            "auroc": [asdict(a) for a in comparison.auroc], "lost": comparison.diverged,
             "gaps": [{"group": g.feature.group, "feature": g.feature.name, "unit": g.feature.unit,
                       "difference": g.difference, "scatters": g.scatters, "flights": g.flights}
                      for g in comparison.gaps],

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.twin.comparison.compare import Flown
+from airtouch.twin.comparison.compare import SimulatedFlight
 from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import RATE_HZ
 from airtouch.twin.recorded.course import Course
 from airtouch.twin.recorded.features import BANDS_HZ, CLASSES, edge_locked, height_class, names
-from airtouch.twin.recorded.flights import Recorded
+from airtouch.twin.recorded.flights import RecordedFlights
 
-BEFORE, BEHIND = 50, 100  #: samples before and after an edge
-MARGIN = 200  #: samples before the entry and after the exit
+BEFORE, AFTER = 50, 100  #: samples before and after an edge, as `features.edge_locked`
+MARGIN = 200  #: samples before the entry and after the exit in the overlaid flight; no source: round number
 QUARTILES = (25, 50, 75)  #: percentiles of the bands in the figures
 
 
@@ -27,7 +27,7 @@ class Signals:
 
 @dataclass(frozen=True)
 class AroundEdges:
-    """Quartiles (3, BEFORE + BEHIND, 12) of the channels around the edges of one kind, and the number of flights."""
+    """Quartiles (3, BEFORE + AFTER, 12) of the channels around the edges of one kind, and the number of flights."""
 
     quartiles: np.ndarray
     flights: int
@@ -46,19 +46,19 @@ class Curves:
     spectra: tuple[np.ndarray, np.ndarray]
 
 
-def curves(recorded: Recorded, simulated: Sequence[Flown]) -> Curves:
+def curves(recorded: RecordedFlights, simulated: Sequence[SimulatedFlight]) -> Curves:
     """The curves of the report. The overlaid flight is that with the median duration over the platform."""
-    length = [f.course.exit - f.course.entry for f in simulated]
-    median_flight = simulated[int(np.argsort(length)[len(length) // 2])]
+    durations = [f.course.exit - f.course.entry for f in simulated]
+    median_flight = simulated[int(np.argsort(durations)[len(durations) // 2])]
     edges = {}
     for name in CLASSES:
         real = [(x, c) for x, c in zip(recorded.channels, recorded.courses, strict=True)
                 if height_class(c.clearance_m) == name]
-        fake = [(f.channels, f.course) for f in simulated if height_class(f.course.clearance_m) == name]
-        if real and fake:
-            edges[name] = {kind: (_around(real, kind), _around(fake, kind)) for kind in ("entry", "exit")}
-    at = [k for k, f in enumerate(names()) if f.group == "spectrum"]
-    powers = recorded.features[:, at], np.array([f.features[at] for f in simulated])
+        model = [(f.channels, f.course) for f in simulated if height_class(f.course.clearance_m) == name]
+        if real and model:
+            edges[name] = {kind: (_around(real, kind), _around(model, kind)) for kind in ("entry", "exit")}
+    spectrum = [k for k, f in enumerate(names()) if f.group == "spectrum"]
+    powers = recorded.features[:, spectrum], np.array([f.features[spectrum] for f in simulated])
     return Curves((_signals(recorded.channels[median_flight.number], recorded.courses[median_flight.number]),
                    _signals(median_flight.channels, median_flight.course)), edges,
                   (_spectra(powers[0]), _spectra(powers[1])))
@@ -74,7 +74,7 @@ def _signals(data: np.ndarray, course: Course) -> Signals:
 
 def _around(flights: Sequence[tuple[np.ndarray, Course]], kind: str) -> AroundEdges:
     """Quartiles of the channels around the edges of one kind."""
-    locked = np.array([edge_locked(x, c, getattr(c, kind), BEFORE, BEHIND) for x, c in flights])
+    locked = np.array([edge_locked(x, c, getattr(c, kind), BEFORE, AFTER) for x, c in flights])
     rows = np.isfinite(locked[:, :, 0]).any(axis=0)
     out = np.full((3, *locked.shape[1:]), np.nan)
     out[:, rows] = np.nanpercentile(locked[:, rows], QUARTILES, axis=0)

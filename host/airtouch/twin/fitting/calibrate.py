@@ -18,22 +18,24 @@ from airtouch.twin.fitting import edge_fit, fit
 from airtouch.twin.fitting import levers as lever_set
 from airtouch.twin.fitting.fit import Target
 from airtouch.twin.fitting.levers import Lever
-from airtouch.twin.recorded import flights as recordings
-from airtouch.twin.recorded.flights import Recorded
+from airtouch.twin.recorded import flights as recorded_flights
+from airtouch.twin.recorded.flights import RecordedFlights
 from airtouch.vehicle import Vehicle
 
 FIT = "fit.json"  #: file with the state of a fit
-ROUNDS, BATCH = 8, 160  #: rounds, and flights per round, of a twin that is fitted for a detector
-BARE = "paper-mixed"  #: scenario to train in if no twin can be fitted
+#: rounds, and flights per round, of a twin that is fitted for a detector; no source: two thirds of those of `fit`, for
+#: time
+ROUNDS, BATCH = 8, 160
+PLAIN = "paper-mixed"  #: scenario to train in if no twin can be fitted
 #: bar(stage) is a context manager; its value is called with (done, total, note)
 Bars = Callable[[str], AbstractContextManager[Callable[[int, int, str], None]]]
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class Calibration:
     """A fit: its target, its levers and their values (levers,), and the misfit of each round."""
 
-    aim: Target
+    target: Target
     levers: tuple[Lever, ...]
     values: np.ndarray
     history: list[dict[str, Any]]
@@ -60,52 +62,55 @@ def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps
     work: folder for the fit; the same call does not fit again. speed_mps: commanded speed of flights without one in
     their manifest.
     """
-    if len(paths) < recordings.FEWEST:
-        return Twin(scenario.load(BARE), vehicle, f"no twin: it needs {recordings.FEWEST} flights over a platform with "
+    least = recorded_flights.MIN_FLIGHTS
+    if len(paths) < least:
+        return Twin(scenario.load(PLAIN), vehicle, f"no twin: it needs {least} flights over a platform with "
                     f"acceleration, gyro, motors and down range, here are {len(paths)}; simulator as it is")
     with bar("reading again") as report:
-        recorded = recordings.recorded(paths, speed_mps=speed_mps,
-                                       progress=lambda done, total: report(done, total, ""))
+        recorded = recorded_flights.read(paths, speed_mps=speed_mps,
+                                         progress=lambda done, total: report(done, total, ""))
     out = work / f"twin_{key(recorded, vehicle, flights=BATCH, seed=seed)}"
     calibrate(recorded, vehicle, out, rounds=ROUNDS, flights=BATCH, seed=seed, bar=bar)
     return Twin(scenario.load(out / files.SCENARIO), vehicles.load(str(out / files.VEHICLE)),
                 f"twin fitted to {len(recorded.courses)} of them")
 
 
-def calibrate(recorded: Recorded, vehicle: Vehicle, out: Path, *, rounds: int, flights: int, seed: int, bar: Bars,
-              workers: int | None = None) -> Calibrated:
+def calibrate(recorded: RecordedFlights, vehicle: Vehicle, out: Path, *, rounds: int, flights: int, seed: int,
+              bar: Bars, workers: int | None = None) -> Calibration:
     """Fit a twin and write vehicle.toml, scenario.toml and fit.json to a folder. The same arguments give the same twin.
 
-    Finished rounds are in fit.json, so that the same call continues after a stop. Raises AirTouchError if fit.json is
-    a fit of other flights or settings.
+    rounds, flights: as of `fit.fit`. workers: threads, by default one for each core. Finished rounds are in fit.json,
+    so that the same call continues after a stop. Raises AirTouchError if fit.json is a fit of other flights or
+    settings.
     """
     make_folder(out)
     workers = workers or available_cores()
-    aim, levers, fit_key = _request(recorded, vehicle, flights, seed)
+    target, levers, fit_key = _request(recorded, vehicle, flights, seed)
     with bar("fitting") as report:
-        state = fit.fit(aim, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
-                        fixed=lever_set.FIXED, kept=out / FIT,
+        state = fit.fit(target, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
+                        fixed=lever_set.FIXED, state_file=out / FIT,
                         progress=lambda done, total, now: report(done, total, f"misfit {fit.total(now):.2f}"))
     if state.refined is None:
         with bar("edges") as report:
             state.refined = edge_fit.refine(
-                aim, vehicle, levers, fit.best(state), flights=edge_fit.share(flights), seed=seed, workers=workers,
-                fixed=lever_set.FIXED, progress=lambda done, total: report(done, total, "")).values
+                target, vehicle, levers, fit.best(state), flights=edge_fit.flights_for(flights), seed=seed,
+                workers=workers, fixed=lever_set.FIXED, progress=lambda done, total: report(done, total, "")).values
         fit.save(out / FIT, state, fit_key)
     files.write(out, vehicle, levers, state.refined, recorded.courses, lever_set.FIXED, force=True)
-    return Calibrated(aim, levers, state.refined, state.history)
+    return Calibration(target, levers, state.refined, state.history)
 
 
-def key(recorded: Recorded, vehicle: Vehicle, *, flights: int, seed: int) -> str:
+def key(recorded: RecordedFlights, vehicle: Vehicle, *, flights: int, seed: int) -> str:
     """Hash, of twelve digits, of the flights, the vehicle and the settings of a fit."""
     return _request(recorded, vehicle, flights, seed)[2]
 
 
-def _request(recorded: Recorded, vehicle: Vehicle, flights: int, seed: int) -> tuple[Target, tuple[Lever, ...], str]:
+def _request(recorded: RecordedFlights, vehicle: Vehicle, flights: int, seed: int,
+             ) -> tuple[Target, tuple[Lever, ...], str]:
     """Target, levers and key of the fit that these arguments ask for."""
-    aim = fit.target(recorded.courses, recorded.features)
+    target = fit.target_of(recorded.courses, recorded.features)
     levers = lever_set.default(vehicle, recorded.near)
-    return aim, levers, fit.key(aim, vehicle, levers, flights=flights, seed=seed, fixed=lever_set.FIXED)
+    return target, levers, fit.key(target, vehicle, levers, flights=flights, seed=seed, fixed=lever_set.FIXED)
 
 
 def in_words(misfit: dict[str, float]) -> str:

@@ -3,7 +3,7 @@
 The rounds of `fit` draw all levers at once, and few of the flights are high ones: their edges hardly enter. Here each
 lever is moved alone, with the same courses and random numbers, as many high flights as low ones. The difference of two
 such flights is what the lever does, nearly without noise (common random numbers; Glasserman, Monte Carlo Methods in
-Financial Engineering, 2003, chapter 7). Gauss-Newton steps follow, each kept only if the misfit falls.
+Financial Engineering, 2003, chapter 7). Gauss-Newton steps follow; a step counts only if the misfit falls.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,10 +22,11 @@ from airtouch.vehicle import Vehicle
 
 #: effects whose levers are fitted here; motors and their delay enter each response to an edge
 EFFECTS = ("ground_effect", "flow_scale", "flow_latency", "range_bias", "range_step", "motor_lag", "actuator_delay")
-FLIGHTS = 60  #: simulated flights of each comparison
-STEPS = 4  #: Gauss-Newton steps
-SHRINK = 0.5  #: factor of a step that raised the misfit
-FIRST = 500_000  #: number of the first flight; larger than that of any flight of the rounds
+FLIGHTS = 60  #: simulated flights of each comparison; no source: round number, 20 of each height class
+BATCH = 160  #: flights of a round to which FLIGHTS belongs, as `calibrate.BATCH`
+STEPS = 4  #: Gauss-Newton steps; no source: round number
+SHRINK = 0.5  #: factor of the steps after one that raised the misfit; no source: the usual bisection
+FIRST_NUMBER = 500_000  #: number of the first flight; larger than that of any flight of the rounds
 
 
 @dataclass(frozen=True)
@@ -36,54 +37,56 @@ class EdgeFit:
     misfit: list[float]
 
 
-def refine(aim: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, *, seed: int = 0,
+def refine(target: Target, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, *, seed: int = 0,
            fixed: Mapping[str, Any] | None = None, workers: int = 1, flights: int = FLIGHTS,
            progress: Callable[[int, int], None] = lambda *_: None) -> EdgeFit:
     """Fit the levers of EFFECTS to the recorded edges. The same arguments give the same result.
 
-    values: (levers,) to start from. The cost is that of `fit.best`, on `flights` flights that all comparisons share.
+    values: (levers,) to start from. fixed: effects without levers. progress: as progress(comparisons, all). The cost is
+    that of `fit.best`, on `flights` flights that all comparisons share.
     """
-    moved = [k for k, lever in enumerate(levers) if lever.of in EFFECTS]
-    edge_levers = [levers[k] for k in moved]
+    edge_indices = [k for k, lever in enumerate(levers) if lever.of in EFFECTS]
+    edge_levers = [levers[k] for k in edge_indices]
     steps = np.array([lever.step for lever in edge_levers])
-    of = balanced(aim.courses, flights, np.random.default_rng([seed, 17]))
-    total = 1 + len(moved) + STEPS
-    done = 0
+    chosen = balanced(target.courses, flights, np.random.default_rng([seed, 17]))
+    total = 1 + len(edge_indices) + STEPS
+    comparisons = 0
 
     def difference(trial: np.ndarray) -> np.ndarray:
         """Simulated minus recorded features (flights, features), in scatters."""
-        nonlocal done
-        flown = fly.flown_features([aim.courses[i] for i in of], vehicle, levers, np.tile(trial, (len(of), 1)), seed,
-                                   FIRST, fixed, workers)
-        progress(done := done + 1, total)
-        return np.clip((flown - aim.features[of]) / aim.scatter, -fit.CLIP, fit.CLIP)
+        nonlocal comparisons
+        simulated = fly.simulated_features([target.courses[i] for i in chosen], vehicle, levers,
+                                           np.tile(trial, (len(chosen), 1)), seed, FIRST_NUMBER, fixed, workers)
+        progress(comparisons := comparisons + 1, total)
+        return np.clip((simulated - target.features[chosen]) / target.scatter, -fit.CLIP, fit.CLIP)
 
     values = lever_set.clipped(levers, values)
     present = difference(values)
-    jacobian = np.column_stack([_mean(difference(_moved(values, k, levers[k])) - present) / _sign(values[k], levers[k])
-                                for k in moved])
-    recorded = np.maximum(np.isfinite(aim.features).sum(axis=0), 1)
+    jacobian = np.column_stack([
+        _mean(difference(_stepped(values, k, levers[k])) - present) / _sign(values[k], levers[k])
+        for k in edge_indices])
+    recorded = np.maximum(np.isfinite(target.features).sum(axis=0), 1)
     history = [_cost(_mean(present))]
-    share = 1.0
+    factor = 1.0
     for _ in range(STEPS):
         variance = _variance(present) + 1.0 / recorded
-        step = share * fit.least_squares_step(np.nan_to_num(jacobian), _mean(present), variance, edge_levers,
-                                              values[moved], steps)
+        step = factor * fit.least_squares_step(np.nan_to_num(jacobian), _mean(present), variance, edge_levers,
+                                               values[edge_indices], steps)
         trial = values.copy()
-        trial[moved] += steps * step
+        trial[edge_indices] += steps * step
         trial = lever_set.clipped(levers, trial)
         trial_difference = difference(trial)
         history.append(_cost(_mean(trial_difference)))
         if history[-1] < min(history[:-1]):
             values, present = trial, trial_difference
         else:
-            share *= SHRINK
+            factor *= SHRINK
     return EdgeFit(values, history)
 
 
-def share(batch: int) -> int:
-    """Flights of a comparison, in proportion to the `batch` flights of a round: FLIGHTS for 160."""
-    return FLIGHTS * batch // 160
+def flights_for(batch: int) -> int:
+    """Flights of a comparison, in proportion to the `batch` flights of a round: FLIGHTS for BATCH."""
+    return FLIGHTS * batch // BATCH
 
 
 def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) -> np.ndarray:
@@ -91,8 +94,8 @@ def balanced(courses: Sequence[Course], count: int, rng: np.random.Generator) ->
     height = [height_class(c.clearance_m) for c in courses]
     classes = [rng.permutation([i for i, h in enumerate(height) if h == name]) for name in CLASSES if name in height]
     classes = classes or [np.arange(len(courses))]
-    chosen = [(classes[n % len(classes)], n // len(classes)) for n in range(count)]
-    return np.array([group[n % len(group)] for group, n in chosen])
+    turns = [(classes[n % len(classes)], n // len(classes)) for n in range(count)]
+    return np.array([group[n % len(group)] for group, n in turns])
 
 
 def _sign(value: float, lever: Lever) -> float:
@@ -100,26 +103,26 @@ def _sign(value: float, lever: Lever) -> float:
     return 1.0 if value + lever.step <= lever.high else -1.0
 
 
-def _moved(values: np.ndarray, k: int, lever: Lever) -> np.ndarray:
-    """The values (levers,) with lever k moved by one step."""
+def _stepped(values: np.ndarray, k: int, lever: Lever) -> np.ndarray:
+    """The values (levers,) with lever k one step further."""
     out = values.copy()
     out[k] += _sign(values[k], lever) * lever.step
     return out
 
 
 def _mean(values: np.ndarray) -> np.ndarray:
-    """Mean (features,) over flights, NaN where fewer than `fit.FEWEST` have the feature."""
+    """Mean (features,) over flights, NaN where fewer than `fit.MIN_FLIGHTS` have the feature."""
     count = np.isfinite(values).sum(axis=0)
-    return np.where(count >= fit.FEWEST, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
+    return np.where(count >= fit.MIN_FLIGHTS, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
 
 
 def _variance(values: np.ndarray) -> np.ndarray:
     """Variance (features,) of `_mean`."""
     count = np.isfinite(values).sum(axis=0)
-    off = values - _mean(values)
-    return np.where(count >= fit.FEWEST, np.nansum(off * off, axis=0) / np.maximum(count, 1) ** 2, np.nan)
+    squares = np.nansum((values - _mean(values)) ** 2, axis=0)
+    return np.where(count >= fit.MIN_FLIGHTS, squares / np.maximum(count, 1) ** 2, np.nan)
 
 
-def _cost(gap: np.ndarray) -> float:
+def _cost(mean: np.ndarray) -> float:
     """Weighted sum of squared misfits of mean differences (features,)."""
-    return fit.total(fit.misfit(gap)) ** 2
+    return fit.total(fit.misfit(mean)) ** 2

@@ -18,26 +18,35 @@ from airtouch.twin.recorded.features import features, names
 from airtouch.vehicle import Vehicle
 
 
-def fly(chosen: Course, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, seed: int, number: int,
+def fly(recorded: Course, vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray, seed: int, number: int,
         fixed: Mapping[str, Any] | None = None) -> FlightLog | Diverged:
-    """The log of a recorded course, flown in the simulator with levers at values (levers,)."""
+    """The log of a recorded course, flown in the simulator with levers at values (levers,).
+
+    number: of the flight, which with `seed` draws its noise. fixed: effects without levers.
+    """
     effects = lever_set.table(levers, values, fixed)
-    scene = missions.one(chosen, effects, missions.NAME, **lever_set.mission(levers, values))
+    scene = missions.scenario_of(recorded, effects, missions.NAME, **lever_set.mission(levers, values))
     return flight.fly(scene, lever_set.craft(vehicle, levers, values), seed, number)
 
 
-def simulated_course(log: FlightLog, chosen: Course) -> Course:
-    """The course of a simulated flight, with the speed and angle that it was flown with."""
-    return course(log, chosen.speed_mps, chosen.angle_deg)
+def simulated_course(log: FlightLog, recorded: Course) -> Course:
+    """The course of a simulated flight, with speed and angle of the recorded one.
+
+    Raises AirTouchError for a log without platform or free air.
+    """
+    return course(log, recorded.speed_mps, recorded.angle_deg)
 
 
-def flown_features(courses: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray,
-                   seed: int, first: int = 0, fixed: Mapping[str, Any] | None = None, workers: int = 1) -> np.ndarray:
-    """Features (flights, features) of simulated flights; flight i flies courses[i] with the levers values[i].
+def simulated_features(courses: Sequence[Course], vehicle: Vehicle, levers: Sequence[Lever], values: np.ndarray,
+                       seed: int, first: int = 0, fixed: Mapping[str, Any] | None = None,
+                       workers: int = 1) -> np.ndarray:
+    """Features (flights, features) of simulated flights; flight i flies courses[i] with the levers at values[i].
 
-    The row of a flight that diverges is NaN.
+    values: (flights, levers). first: number of the first flight. workers: threads. The row of a flight that diverges,
+    or whose log shows no course, is NaN.
     """
     def features_of(i: int) -> np.ndarray:
+        """Features (features,) of flight i."""
         log = fly(courses[i], vehicle, levers, values[i], seed, first + i, fixed)
         if isinstance(log, Diverged):
             return np.full(len(names()), np.nan)

@@ -1,4 +1,10 @@
-"""Levers: the parameters of the simulator that a fit may change, with bounds and units."""
+"""Levers: the parameters of the simulator that a fit may change, with bounds and units.
+
+Where the numbers of a lever come from: the start is the vehicle's value or the effect's default, whose source
+host/docs/effects.md names; where it is neither, it was found on the authors' folds 0 to 2 (host/docs/looks.md,
+2026-11-22 and 2026-11-24). Bounds, steps and spreads have no source: round numbers, the bounds wide enough for another
+drone of this size.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,12 +22,17 @@ VEHICLE, MISSION = "vehicle", "mission"
 #: signs of rotors 1 to 4 in each direction of trim
 ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"  #: unit of a trim: fraction of a rotor's thrust
-#: kg m², of a Crazyflie's rotor and propeller: `tools/rotor_inertia.py` on imrclab's brushed_jana04
+#: kg m², of a Crazyflie's rotor and propeller: `python tools/rotor_inertia.py
+#: ../shared/flights/imrclab/brushed_jana04.csv.gz` prints 4.1e-8
 ROTOR_INERTIA = 4e-8
-#: corner frequency of the low-pass in the Crazyflie's firmware through which the logged acceleration passes
+#: Hz, corner of the low-pass in the Crazyflie's firmware through which the logged acceleration passes; fits gave 33 and
+#: 35 (host/docs/twin-findings.md, what tells the twin from the drone)
 ACC_LOWPASS_HZ = 30.0
-#: effects that every twin has: a log's rows are at any phase of the controllers' cycle, another one in each flight
+#: effects that every twin has: a log's rows are at any phase of the position controller's 10 ms, another one in each
+#: flight (host/docs/twin-findings.md, phase of the log)
 FIXED: dict[str, Any] = {"time_jitter": {"rms": 0.0, "behind": {"low": 0.0, "high": 0.01}}}
+#: error of the down range to start from where the flights do not tell it; found on folds 0 to 2
+DEFAULT_NEAR = NearRange(0.0, -0.045, 0.03, 0.035)
 
 
 @dataclass(frozen=True)
@@ -29,8 +40,9 @@ class Lever:
     """A parameter of the simulator.
 
     of: an effect, "vehicle", "mission" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
-    axis), or a direction of ROTOR_SIGNS. step: typical change in a round. spread: half width of the range
-    from which each flight draws it, None for one value in all flights.
+    axis), or a direction of ROTOR_SIGNS. start, low, high, step and spread in `unit`. step: typical change in a round.
+    spread: half width of the range from which each flight draws it, None for one value in all flights. Names and
+    order of the fields are part of `fit.key`: a change makes stored fits those of other settings.
     """
 
     of: str
@@ -54,7 +66,7 @@ def default(vehicle: Vehicle, near: NearRange | None = None) -> tuple[Lever, ...
     near: error of the recorded flights' down range near the platform.
     """
     return (*_of_vehicle(vehicle), *_of_free_air(), *_of_sensor_noise(vehicle), *_of_edges(),
-            *_of_flow_and_range(near or NearRange(0.0, -0.045, 0.03, 0.035)))
+            *_of_flow_and_range(near or DEFAULT_NEAR))
 
 
 def _of_vehicle(vehicle: Vehicle) -> tuple[Lever, ...]:
@@ -157,7 +169,7 @@ def clipped(levers: Sequence[Lever], values: np.ndarray) -> np.ndarray:
 
 
 def craft(vehicle: Vehicle, levers: Sequence[Lever], values: Sequence[float] | np.ndarray) -> Vehicle:
-    """The vehicle with its levers set."""
+    """The vehicle with its levers at values (levers,)."""
     changes: dict[str, Any] = {}
     for lever, value in zip(levers, values, strict=True):
         if lever.of != VEHICLE:
@@ -181,16 +193,17 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
           spread: bool = True) -> dict[str, Any]:
     """The table of a scenario's effects with the levers set. fixed: effects without levers.
 
-    spread: write levers with a spread as ranges. Raises AirTouchError for a lever of an unknown effect or parameter.
+    spread: write levers with a spread as ranges. The levers of "trim" become the effect `weak_motor`. Raises
+    AirTouchError for a lever of an unknown effect or parameter.
     """
     out: dict[str, Any] = {name: dict(settings) if isinstance(settings, Mapping) else list(settings)
                            for name, settings in (fixed or {}).items()}
     trims = np.zeros(4)
-    width = 0.0
+    trim_spread = 0.0
     for lever, value in zip(levers, values, strict=True):
         if lever.of == "trim":
             trims += np.array(ROTOR_SIGNS[lever.key]) * float(value)
-            width = max(width, lever.spread or 0.0)
+            trim_spread = max(trim_spread, lever.spread or 0.0)
         elif lever.of not in (VEHICLE, MISSION):
             out.setdefault(lever.of, {})[lever.key] = _node(lever, float(value), spread)
     for name, settings in out.items():
@@ -199,7 +212,7 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
             if set(setting) - valid:
                 raise AirTouchError(f"levers: {name} has no parameter {', '.join(sorted(set(setting) - valid))}")
     if any(lever.of == "trim" for lever in levers):
-        out["weak_motor"] = [{"rotor": i + 1, "thrust_loss": _range(-trims[i], width if spread else 0.0)}
+        out["weak_motor"] = [{"rotor": i + 1, "thrust_loss": _range(-trims[i], trim_spread if spread else 0.0)}
                              for i in range(4)]
     return out
 
@@ -209,9 +222,9 @@ def _node(lever: Lever, value: float, spread: bool) -> Any:
     return _range(value, lever.spread if spread and lever.spread else 0.0, lever.low, lever.high)
 
 
-def _range(middle: float, half: float, least: float = -1.0, most: float = 1.0) -> Any:
-    """A range of half width `half` within bounds, or the number alone where it has no width."""
-    middle = round(float(middle), 6)
-    if half <= 0.0:
-        return middle
-    return {"low": round(max(middle - half, least), 6), "high": round(min(middle + half, most), 6)}
+def _range(centre: float, half_width: float, low: float = -1.0, high: float = 1.0) -> Any:
+    """A range within bounds, or the centre alone where it has no width."""
+    centre = round(float(centre), 6)
+    if half_width <= 0.0:
+        return centre
+    return {"low": round(max(centre - half_width, low), 6), "high": round(min(centre + half_width, high), 6)}

@@ -20,27 +20,32 @@ from airtouch.logs.segments import LEVEL_PART, PLATFORM_STEP_M
 from airtouch.twin.recorded import pulses
 
 RATE_HZ = 100.0  #: Hz, of the logs that a twin is fitted to
-LEAST_FREE_S = 3.0  #: s, least free air before the platform; spectra need it
-LEAST_FREE_M = 0.25  #: m, down range above which there is no ground effect
-SETTLED_S = 1.0  #: s after the climb until level flight counts as free air
-STEP_S = 1.5  #: s, longest duration of a velocity step
-RISE_S = 0.35  #: s from a velocity step to half of its speed, Crazyflie with the firmware's gains
+MIN_FREE_S = 3.0  #: s, least free air before the platform: a block of the spectra (`features.LENGTH`)
+MIN_FREE_M = 0.25  #: m, down range above which there is no ground effect: five rotor diameters
+SETTLED_S = 1.0  #: s after the climb until level flight counts as free air; no source: round number
+STEP_S = 1.5  #: s, longest duration of a velocity step; no source: round number
+#: s from a velocity step to half of its speed, Crazyflie with the firmware's gains; no other source
+RISE_S = 0.35
+RATE_TOLERANCE = 0.02  #: relative difference from RATE_HZ that a log may have; no source: round number
+MEDIAN_ROWS = 5  #: samples of the median filter on the down range, against single wrong readings
 #: phases of a course, in order
 PHASES = ("hover", "cruise", "entry", "over", "exit", "after")
-AROUND_S = (0.5, 1.0)  #: s before and after an edge that belong to the edge's phase
+AROUND_S = (0.5, 1.0)  #: s before and after an edge that belong to the edge's phase; no source: round numbers
 
 
 @dataclass(frozen=True)
 class Course:
     """One flight. Times in s, heights in m as the down range shows them, samples of the log.
 
+    Names and order of the fields are part of `fit.key`: a change makes stored fits those of other flights.
+
     cruise_m: level height before the platform. clearance_m: median height over the platform. before_m, entered_m: just
     before and just after the entry. climb_s: from the motors' start to level flight; hover_s: to the velocity step;
     before_s: to the entry; over_s: to the exit; stop_s: to the end of the forward flight; after_s: from the exit to
     the landing. speed_mps: of the velocity step; speed_from: "stated",
     "velocity" or "acceleration". angle_deg: between path and the edge's normal, as stated. pulse_s: period of
-    velocity pulses in the hover, 0: none. top_m: height of the platform where other flights tell it (`near_range`), 0:
-    not known.
+    velocity pulses in the hover, 0: none. top_m: height of the platform where other flights show it (`near_range`), 0:
+    not known. start: the motors' start; level: start of level flight; step: the velocity step.
     """
 
     source: str
@@ -97,7 +102,7 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     """
     check(log)
     edges = platform_edges(log)
-    down = median_filter(_interpolated(log["zrange_m"]), 5)
+    down = median_filter(_interpolated(log["zrange_m"]), MEDIAN_ROWS)
     flying = airborne(log)
     entry = next((e for e in edges if e.kind == "entry"), None)
     leave = next((e for e in edges if entry and e.kind == "exit" and e.sample > entry.sample), None)
@@ -109,11 +114,11 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
     cruise = float(np.median(down[max(entry.sample - 150, start):entry.sample - 3]))
     level = start + int(np.argmax(down[start:entry.sample] > LEVEL_PART * cruise))
     free_s = (entry.sample - level) / RATE_HZ - SETTLED_S - AROUND_S[0]
-    if free_s < LEAST_FREE_S or cruise < LEAST_FREE_M:
+    if free_s < MIN_FREE_S or cruise < MIN_FREE_M:
         raise AirTouchError(f"{log.source}: {max(free_s, 0.0):.1f} s of level flight in free air before the "
-                            f"platform; hover {LEAST_FREE_S + 2:g} s at {LEAST_FREE_M:g} m or higher first")
-    behind = down[leave.sample + 10:last] < LEVEL_PART * cruise
-    landing = leave.sample + 10 + (int(np.argmax(behind)) if behind.any() else len(behind))
+                            f"platform; hover {MIN_FREE_S + 2:g} s at {MIN_FREE_M:g} m or higher first")
+    low = down[leave.sample + 10:last] < LEVEL_PART * cruise
+    landing = leave.sample + 10 + (int(np.argmax(low)) if low.any() else len(low))
     step, measured, source = _velocity_step(log, level, entry.sample)
     stop = _stop(log, step, leave.sample, landing)
     speed = speed_mps if speed_mps is not None else measured
@@ -138,7 +143,7 @@ def check(log: FlightLog) -> None:
     if not log.has("zrange_m") or not np.isfinite(log["zrange_m"]).any():
         raise AirTouchError(f"{log.source}: no down range in this log; log range.zrange (flow deck or Z-ranger) too")
     period = sample_period(log)
-    if abs(period - 1.0 / RATE_HZ) > 0.02 / RATE_HZ:
+    if abs(period - 1.0 / RATE_HZ) > RATE_TOLERANCE / RATE_HZ:
         raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, a twin needs 100 Hz: "
                             "airtouch logs convert --rate 100")
 
@@ -147,8 +152,8 @@ def one_vehicle(logs: Sequence[FlightLog]) -> str:
     """The vehicle of all the logs; "" if none names one. Raises AirTouchError for two different ones."""
     names = {str(log.meta["vehicle"]): log.source for log in logs if log.meta.get("vehicle")}
     if len(names) > 1:
-        flown = [f"{name} flew {source}" for name, source in list(names.items())[:2]]
-        raise AirTouchError(f"two vehicles: {', '.join(flown)}; fit one twin for each")
+        pairs = [f"{name} flew {source}" for name, source in list(names.items())[:2]]
+        raise AirTouchError(f"two vehicles: {', '.join(pairs)}; fit one twin for each")
     return next(iter(names), "")
 
 

@@ -14,24 +14,32 @@ from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, RATE_HZ, channels
 from airtouch.twin.recorded.course import Course
 
-#: bands of spectra in free air, and over the platform, where blocks are short, Hz
+#: bands of spectra in free air, Hz: half octaves, from what a block resolves to half of the rate; no other source
 BANDS_HZ = ((0.3, 1), (1, 2), (2, 4), (4, 6), (6, 9), (9, 13), (13, 22), (22, 35), (35, 50))
+#: bands of spectra over the platform, where blocks are short, Hz: about octaves; no other source
 OVER_BANDS_HZ = ((1.5, 4), (4, 9), (9, 20), (20, 45))
 #: channels whose coherency shows the loops
 PAIRS = ((ch.GYRO_X, ch.ROLL), (ch.GYRO_Y, ch.PITCH), (ch.GYRO_Z, ch.YAW), (ch.AZ, ch.MEAN),
          (ch.AX, ch.PITCH), (ch.AY, ch.ROLL), (ch.AX, ch.GYRO_Y), (ch.AY, ch.GYRO_X))
-CLASSES = {"low": (0.0, 0.045), "mid": (0.045, 0.065), "high": (0.065, 0.20)}  #: down range over the platform, m
-#: bins around an edge, s
+#: height class -> down range over the platform, m; bounds between the heights of the authors' manifest: low, h79
+#: (5 cm), h82 and h85 (7.5 and 8.5 cm)
+CLASSES = {"low": (0.0, 0.045), "mid": (0.045, 0.065), "high": (0.065, 0.20)}
+#: bins around an edge, s; no source: round numbers, narrow where the answer is
 BINS_S = ((-0.4, -0.2), (-0.2, 0.0), (0.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.7), (0.7, 1.0))
 BASELINE_S = (-1.0, -0.4)  #: s, relative to the entry, of the level that edge-locked means are taken against
-LENGTH, OVER_LENGTH = 256, 64  #: samples of a block of a spectrum, in free air and over the platform
+LENGTH, OVER_LENGTH = 256, 64  #: samples of a block of a spectrum, in free air and over the platform: 2.56 and 0.64 s
+OVER = slice(20, -10)  #: samples of flight over a platform, from the entry and to the exit: past the edges' answers
+AROUND = (50, 100)  #: samples before and after an edge in `edge_locked`
+MIN_VALID = 0.6  #: fraction of a bin's samples that must be there; no source: round number
+#: lower bounds of the scatter of edge-locked means, by channel in `channels.UNITS`; no source: round numbers
+EDGE_LEAST = (*[0.1] * 3, *[3.0] * 2, 1.5, *[500.0] * 3, 200.0, 0.1, 0.3)
 #: groups of features, each with its own misfit
 GROUPS = ("trim", "spectrum", "coherency", "over", "entry", "exit")
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A feature. group: one of GROUPS. least: lower bound of its scatter, in `unit`.
+    """A feature. group: one of GROUPS. least: lower bound of its scatter, in `unit`; no source: round numbers.
 
     paired: it depends on the course, so that `least` is its scatter however much the courses differ.
     """
@@ -59,14 +67,16 @@ def names() -> tuple[Feature, ...]:
             for i, k in PAIRS for a, b in BANDS_HZ for part in ("re", "im")]
     out += [Feature(f"{c} {NAMES[k]} {a:g}-{b:g} Hz", "over", "dB", 1.5)
             for c in CLASSES for k in range(ch.DOWN) for a, b in OVER_BANDS_HZ]
-    least = [0.1] * 3 + [3.0] * 2 + [1.5] + [500.0] * 3 + [200.0, 0.1, 0.3]
-    out += [Feature(f"{c} {NAMES[k]} {a:+g}..{b:+g} s", edge, ch.UNITS[k], least[k])
+    out += [Feature(f"{c} {NAMES[k]} {a:+g}..{b:+g} s", edge, ch.UNITS[k], EDGE_LEAST[k])
             for edge in ("entry", "exit") for c in CLASSES for k in range(12) for a, b in BINS_S]
     return tuple(out)
 
 
 def features(log: FlightLog, course: Course) -> np.ndarray:
-    """The features of a flight over one platform, (len(names()),)."""
+    """The features of a 100 Hz log of a flight over one platform, (len(names()),), in the units of `names`.
+
+    NaN for features that the flight lacks. Raises AirTouchError for columns that the log lacks.
+    """
     x = channels(log)
     free = x[course.free]
     parts = [_trims(log, free, course), *_free_spectra(free), _over(x, course)]
@@ -74,12 +84,16 @@ def features(log: FlightLog, course: Course) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = 50, behind: int = 100) -> np.ndarray:
-    """Channels around an edge, (before + behind, 12), less their level before the entry (except the down range)."""
+def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = AROUND[0],
+                after: int = AROUND[1]) -> np.ndarray:
+    """Channels around an edge, (before + after, 12), less their level before the entry (except the down range).
+
+    x: (n, 12) channels. edge: sample. NaN before the log begins, after the landing, and after the exit around an entry.
+    """
     level = x[course.entry + int(BASELINE_S[0] * RATE_HZ):course.entry + int(BASELINE_S[1] * RATE_HZ)].mean(axis=0)
     level[ch.DOWN] = 0.0
-    out = np.full((before + behind, 12), np.nan)
-    start, stop = max(edge - before, 0), min(edge + behind, len(x), course.landing)
+    out = np.full((before + after, 12), np.nan)
+    start, stop = max(edge - before, 0), min(edge + after, len(x), course.landing)
     if edge == course.entry:
         stop = min(stop, course.exit)
     out[start - edge + before:stop - edge + before] = x[start:stop] - level
@@ -133,7 +147,8 @@ def _free_spectra(free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _calm(blocks: np.ndarray) -> np.ndarray:
     """The half of the blocks (blocks, frequencies, channels) with the least roll and pitch rate: without set-points.
 
-    A hover of the authors is steered by hand, in steps and pulses that no twin repeats.
+    A hover of the authors is steered by hand, in steps and pulses that no twin repeats (host/docs/twin-findings.md,
+    what tells the twin from the drone).
     """
     activity = (np.abs(blocks[:, :, [ch.GYRO_X, ch.GYRO_Y]]) ** 2).sum(axis=(1, 2))
     return blocks[np.argsort(activity)[:(len(blocks) + 1) // 2]]
@@ -143,7 +158,7 @@ def _over(x: np.ndarray, course: Course) -> np.ndarray:
     """The features of group "over", NaN in all height classes but the flight's."""
     out = np.full((len(CLASSES), ch.DOWN, len(OVER_BANDS_HZ)), np.nan)
     name = height_class(course.clearance_m)
-    blocks = _blocks(x[course.entry + 20:course.exit - 10, :ch.DOWN], OVER_LENGTH, OVER_LENGTH // 2)
+    blocks = _blocks(x[course.entry + OVER.start:course.exit + OVER.stop, :ch.DOWN], OVER_LENGTH, OVER_LENGTH // 2)
     if name and blocks is not None:
         power = (np.abs(blocks) ** 2).mean(axis=0)
         out[list(CLASSES).index(name)] = np.array([_decibel(power[b].mean(axis=0))
@@ -157,10 +172,9 @@ def _edge(x: np.ndarray, course: Course, edge: int) -> np.ndarray:
     name = height_class(course.clearance_m)
     if name:
         locked = edge_locked(x, course, edge)
-        centre = 50  # samples before the edge in `edge_locked`
         for i, (a, b) in enumerate(BINS_S):
-            part = locked[centre + round(a * RATE_HZ):centre + round(b * RATE_HZ)]
-            if np.isfinite(part[:, 0]).mean() > 0.6:
+            part = locked[AROUND[0] + round(a * RATE_HZ):AROUND[0] + round(b * RATE_HZ)]
+            if np.isfinite(part[:, 0]).mean() > MIN_VALID:
                 out[list(CLASSES).index(name), :, i] = np.nanmean(part, axis=0)
     return out.ravel()
 

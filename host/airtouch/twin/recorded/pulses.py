@@ -11,32 +11,33 @@ from airtouch.reference.finite import hold_finite
 
 PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: sign of motors 1 to 4 in the pitch command
 PERIODS_S = np.arange(0.30, 1.0, 0.002)  #: s, periods that are tried; the authors' is 0.52 s
-LEAST_PULSES = 4  #: periods that a hover must hold
+MIN_PULSES = 4  #: periods that a hover must hold; no source: least for a scatter
 #: standard errors of the mean jump; of the authors' flights (folds 0 to 2) those with pulses have 7.5 or more, all at
 #: 0.52 s, the others 6.5 or less
-CLEAR = 7.0
-CLIP = 10.0  #: robust standard deviations, to which larger jumps (set-point steps) are clipped
+THRESHOLD = 7.0
+CLIP = 10.0  #: robust standard deviations, to which larger jumps (set-point steps) are clipped; no source: round number
+NORMAL = 1.4826  #: standard deviation of a normal variable over its median absolute deviation
 RATE_HZ = 100.0  #: Hz, of the log
 
 
 def period(log: FlightLog, start: int, stop: int) -> float:
     """Period in s of the pulses between two samples of a 100 Hz log; 0 without pulses."""
-    if stop - start < LEAST_PULSES * PERIODS_S[0] * RATE_HZ:
+    if stop - start < MIN_PULSES * PERIODS_S[0] * RATE_HZ:
         return 0.0
     jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ PITCH)
-    size = 1.4826 * np.median(np.abs(jumps - np.median(jumps)))
+    size = NORMAL * np.median(np.abs(jumps - np.median(jumps)))
     if size <= 0.0:
         return 0.0
     jumps = np.clip(jumps / size, -CLIP, CLIP)
     sample = np.arange(len(jumps))
-    spread, best, best_s = jumps.std(), CLEAR, 0.0
+    deviation, best, best_s = jumps.std(), THRESHOLD, 0.0
     for seconds in PERIODS_S:
         samples = seconds * RATE_HZ
-        if len(jumps) < LEAST_PULSES * samples:
+        if len(jumps) < MIN_PULSES * samples:
             break
         phase = (sample % samples).astype(int)
         mean = np.bincount(phase, jumps)[:int(samples)] / np.bincount(phase)[:int(samples)]
-        score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / spread
+        score = np.abs(mean).max() * np.sqrt(len(jumps) / samples) / deviation
         if score > best:
             best, best_s = score, float(seconds)
     return round(best_s, 3)

@@ -1,0 +1,31 @@
+"""Models and scores in files: an adaptation that was stopped goes on with what it has finished."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from airtouch.detector import best
+from airtouch.detector.best.model import BestModel
+from airtouch.detector.evaluation.score import FlightScore
+from airtouch.logs.files import write_bytes
+
+
+def model(path: Path, make: Callable[[], BestModel]) -> BestModel:
+    """The model in a file (.npz); without the file it is made and saved there.
+
+    Raises AirTouchError for a file that is no model.
+    """
+    if path.is_file():
+        return best.load(path)
+    new = make()
+    new.save(path, force=True)
+    return new
+
+
+def scores(path: Path, make: Callable[[], list[FlightScore]]) -> list[FlightScore]:
+    """The scores in a file (JSON); without the file they are made and saved there."""
+    if path.is_file():
+        return [FlightScore.from_dict(s) for s in json.loads(path.read_text())]
+    new = make()
+    write_bytes(json.dumps([s.as_dict() for s in new], allow_nan=False).encode(), path, force=True)
+    return new
