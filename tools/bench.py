@@ -27,7 +27,7 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 from airtouch.reference.networks.int8_network import quantise
 
-PAIRS = 7  #: alternating timings of both, of which the median ratio is reported
+PAIRS = 7  #: alternating timings of both, of which the median ratio is reported; no source: round number
 
 
 def seconds(work: Callable[[], object]) -> float:
@@ -45,7 +45,7 @@ def compare(ours: Callable[[], object], peer: Callable[[], object]) -> tuple[flo
             statistics.median(b / a for a, b in pairs))
 
 
-def flights(limit: int) -> list[FlightLog]:
+def load_flights(limit: int) -> list[FlightLog]:
     """Recorded flights where there are any, else simulated ones."""
     folder = find_flights()
     if folder is not None:
@@ -64,17 +64,17 @@ def scipy_band_power(x: np.ndarray) -> np.ndarray:
     return np.moveaxis(power[chosen].sum(axis=0) * transform.delta_f, -1, 0)
 
 
-def bench_band_power(table: Table, some: list[FlightLog]) -> None:
+def bench_band_power(table: Table, flights: list[FlightLog]) -> None:
     """FC-FE of nine channels, a flight."""
-    inputs = [nine_channels(log) for log in some]
+    inputs = [nine_channels(log) for log in flights]
     ours = kernels.band_power(inputs[0])[DEFAULT.band_window - 1:]
     peer = scipy_band_power(inputs[0].astype(np.float64))
     error = np.abs(ours - peer).max(axis=0) / np.abs(peer).max(axis=0)
     assert error.max() < 1e-3, f"the two do not compute the same: {error}"
     a, b, ratio = compare(lambda: [kernels.band_power(x) for x in inputs],
                           lambda: [scipy_band_power(x) for x in inputs])
-    row(table, "band power, 9 channels, a flight", a / len(some), b / len(some), ratio,
-        "scipy.signal.ShortTimeFFT", f"n = {len(some)} flights")
+    row(table, "band power, 9 channels, a flight", a / len(flights), b / len(flights), ratio,
+        "scipy.signal.ShortTimeFFT", f"n = {len(flights)} flights")
 
 
 def _each(act: Callable[..., object], inputs: Iterable, *further: object) -> None:
@@ -83,27 +83,27 @@ def _each(act: Callable[..., object], inputs: Iterable, *further: object) -> Non
         act(x, *further)
 
 
-def bench_pipelines(table: Table, some: list[FlightLog]) -> None:
+def bench_pipelines(table: Table, flights: list[FlightLog]) -> None:
     """Whole detectors against real time."""
-    flown = sum(len(log) for log in some) / 100
+    duration_s = sum(len(log) for log in flights) / 100
     for name, detector in (("paper", paper), ("best", best)):
         model = detector.load(None)
-        detector.run(some[0], model)
-        spent = statistics.median(seconds(partial(_each, detector.run, some, model)) for _ in range(3))
-        table.add_row(f"{name} detector, a flight", f"{1e3 * spent / len(some):.2f} ms", "", f"{flown / spent:.0f}x",
-                      "real time", f"n = {len(some)} flights, {flown:.0f} s")
+        detector.run(flights[0], model)
+        spent = statistics.median(seconds(partial(_each, detector.run, flights, model)) for _ in range(3))
+        table.add_row(f"{name} detector, a flight", f"{1e3 * spent / len(flights):.2f} ms", "",
+                      f"{duration_s / spent:.0f}x", "real time", f"n = {len(flights)} flights, {duration_s:.0f} s")
 
 
-def bench_inference(table: Table, some: list[FlightLog]) -> None:
+def bench_inference(table: Table, flights: list[FlightLog]) -> None:
     """int8 networks, one window: both ours against tflite-micro and LiteRT on the same file."""
     model = paper.load(None)
-    fused = [flight_features(log).fused for log in some]
+    fused = [flight_features(log).fused for log in flights]
     windows = np.concatenate([f[np.isfinite(f).all(axis=1)][:1000].reshape(-1, 100, 3) for f in fused])[:200]
     first = model.int8.layers[0]
     q = quantise(np.stack([kernels.z_score_window(w) for w in windows]), first.input_scale, first.input_zero_point)
     row_of_peers(table, "paper network, a window", lambda: run_int8(model.int8, q), model.tflite, q[..., None])
     stream = best.load(None)
-    channels = channels_of(some[0])[0]
+    channels = channels_of(flights[0])[0]
     layer = stream.int8.layers[0]
     quantised = quantise(channels, layer.input_scale, layer.input_zero_point)
     length = stream.recipe.receptive_samples
@@ -132,6 +132,7 @@ def micro(content: bytes) -> Callable | None:
     interpreter = runtime.Interpreter.from_bytes(content, arena_size=1 << 20)
 
     def invoke(x: np.ndarray) -> np.ndarray:
+        """The output of one window."""
         interpreter.set_input(x, 0)
         interpreter.invoke()
         return interpreter.get_output(0)
@@ -150,6 +151,7 @@ def litert(content: bytes) -> Callable | None:
     source, result = interpreter.get_input_details()[0]["index"], interpreter.get_output_details()[0]["index"]
 
     def invoke(x: np.ndarray) -> np.ndarray:
+        """The output of one window."""
         interpreter.set_tensor(source, x)
         interpreter.invoke()
         return interpreter.get_tensor(result)
@@ -157,11 +159,11 @@ def litert(content: bytes) -> Callable | None:
     return invoke
 
 
-def bench_training(table: Table, some: list[FlightLog]) -> None:
+def bench_training(table: Table, flights: list[FlightLog]) -> None:
     """Training of the shipped models' size, once."""
     for name, detector in (("paper", paper), ("best", best)):
-        spent = seconds(partial(detector.fit, some, seed=0))
-        table.add_row(f"training {name}", f"{spent:.0f} s", "", "", "", f"n = {len(some)} flights")
+        spent = seconds(partial(detector.fit, flights, seed=0))
+        table.add_row(f"training {name}", f"{spent:.0f} s", "", "", "", f"n = {len(flights)} flights")
 
 
 def row(table: Table, name: str, ours: float, peer: float, ratio: float, what: str, note: str) -> None:
@@ -175,15 +177,15 @@ def main() -> None:
     parser.add_argument("--flights", type=int, default=20, help="how many (default 20)")
     parser.add_argument("--train", action="store_true", help="time the training on all of them as well")
     options = parser.parse_args()
-    some = flights(options.flights)
+    flights = load_flights(options.flights)
     table = Table(title=f"Benchmarks, median of {PAIRS} pairs, one thread", title_justify="left")
     for name in ("what", "ours", "peer", "faster", "peer is", ""):
         table.add_column(name)
-    bench_band_power(table, some)
-    bench_pipelines(table, some)
-    bench_inference(table, some)
+    bench_band_power(table, flights)
+    bench_pipelines(table, flights)
+    bench_inference(table, flights)
     if options.train:
-        bench_training(table, flights(1000))
+        bench_training(table, load_flights(1000))
     Console(width=130).print(table)
 
 

@@ -77,8 +77,8 @@ def crazyflow_rates(python: str | None) -> dict[str, list[float]]:
     if python is None and importlib.util.find_spec("crazyflow") is None:
         return {}
     command = [python or sys.executable, str(Path(__file__).with_name("bench_crazyflow.py")), "--rounds", "1"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else {}
+    run = subprocess.run(command, capture_output=True, text=True)
+    return json.loads(run.stdout.splitlines()[-1]) if run.returncode == 0 else {}
 
 
 def main() -> None:

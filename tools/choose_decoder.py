@@ -26,8 +26,8 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.reference.edge_decoder import DecoderConfig
 
-MISS_M = 0.3  #: what a missed edge costs, as if it were found so far off
-FALSE_M = 0.02  #: what one false edge a minute costs, metres of mean error
+MISS_M = 0.3  #: m, cost of a missed edge: an error of this size; no source: round number, 1 s at 0.3 m/s
+FALSE_M = 0.02  #: m of mean error, cost of one false edge a minute; no source: round number
 
 
 class Flight:
@@ -50,24 +50,24 @@ def flights_of(folder: Path, out: Path, silent: tuple[str, ...] = ()) -> list[Fl
     entries = [json.loads(path.read_text()) for path in sorted(out.glob("best_fold*.json"))]
     if len({entry["fold"] for entry in entries}) != len(entries):
         raise SystemExit(f"{out}: folds of more than one cross-validation; give a folder with one")
-    found = []
+    flights = []
     for entry in track(entries, "logits"):
         model = best.load(out / entry["model"])
         for name in (score["file"] for score in entry["per_flight"]):
             file = files[name]
-            found.append(Flight(file, entry["fold"], model, silent))
-    return found
+            flights.append(Flight(file, entry["fold"], model, silent))
+    return flights
 
 
 def outcomes(flights: list[Flight], config: DecoderConfig) -> list[tuple[np.ndarray, int]]:
-    """For each flight the delays of the edges found, seconds, and how many detections were false."""
-    found = []
+    """For each flight the delays of the detected edges, s, and the number of false detections."""
+    out = []
     for flight in flights:
         at = np.flatnonzero(kernels.edge_decoder(flight.logits, flight.airborne, config)) * STRIDE
         pairs = match(flight.edges, list(at), TOLERANCE_S / SAMPLE_PERIOD_S)
         delays = np.array([(at[j] - flight.edges[i]) * SAMPLE_PERIOD_S for i, j in pairs])
-        found.append((delays, len(at) - len(pairs)))
-    return found
+        out.append((delays, len(at) - len(pairs)))
+    return out
 
 
 def score(flight: Flight, config: DecoderConfig, lag: float) -> FlightScore:
@@ -102,15 +102,15 @@ def cost(flights: list[Flight], outcomes_of: list[tuple[np.ndarray, int]]) -> fl
 
 def candidates(count: int, rng: np.random.Generator, hold: int) -> list[DecoderConfig]:
     """Random settings, drawn without a look at any flight."""
-    found = []
+    out = []
     for _ in range(count):
         scores = {"entry_score": rng.uniform(-1, 4), "exit_score": rng.uniform(-1, 4),
                   "late_entry": rng.uniform(-0.5, 4.5), "late_exit": rng.uniform(-4.5, 0)}
-        found.append(DecoderConfig(**{name: round(float(value), 2) for name, value in scores.items()}, arm_steps=100,
-                                   over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
-                                   smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
-                                   dwell_steps=int(rng.choice([20, 30, 40])), look_back=50, hold_steps=hold))
-    return found
+        out.append(DecoderConfig(**{name: round(float(value), 2) for name, value in scores.items()}, arm_steps=100,
+                                 over_share=float(rng.choice([0.15, 0.3, 0.5, 0.7])),
+                                 smooth_gain=float(rng.choice([0.05, 0.08, 0.12, 0.2])),
+                                 dwell_steps=int(rng.choice([20, 30, 40])), look_back=50, hold_steps=hold))
+    return out
 
 
 def main() -> None:
@@ -125,21 +125,21 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the honest figure here, for tools/sensor_figures.py")
     options = parser.parse_args()
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
-    tried = candidates(options.count, np.random.default_rng(0), options.hold)
-    found = [outcomes(flights, config) for config in track(tried, "settings")]
+    settings = candidates(options.count, np.random.default_rng(0), options.hold)
+    results = [outcomes(flights, config) for config in track(settings, "settings")]
     show("as shipped", flights, outcomes(flights, best.DECODER))
     show("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
-    winner = int(np.argmin([cost(flights, f) for f in found]))
-    show("one setting, best over all folds", flights, found[winner])
-    print(json.dumps(asdict(tried[winner])))
+    winner = int(np.argmin([cost(flights, f) for f in results]))
+    show("one setting, best over all folds", flights, results[winner])
+    print(json.dumps(asdict(settings[winner])))
     nested: list[FlightScore] = []
     for fold in {flight.fold for flight in flights}:
         others = [k for k, flight in enumerate(flights) if flight.fold != fold]
-        some = [flights[k] for k in others]
-        choice = int(np.argmin([cost(some, [f[k] for k in others]) for f in found]))
-        lag = lag_of([found[choice][k] for k in others])
-        nested += [score(flight, tried[choice], lag) for flight in flights if flight.fold == fold]
-    result = evaluate.as_json("best", nested, [], lag_of(found[winner]), asdict(tried[winner]))
+        rest = [flights[k] for k in others]
+        choice = int(np.argmin([cost(rest, [f[k] for k in others]) for f in results]))
+        lag = lag_of([results[choice][k] for k in others])
+        nested += [score(flight, settings[choice], lag) for flight in flights if flight.fold == fold]
+    result = evaluate.as_json("best", nested, [], lag_of(results[winner]), asdict(settings[winner]))
     show_scores.print_table(show_scores.console(), {"best": result, **result["by_height"]},
                             "each fold with the settings best on the others")
     if options.json:

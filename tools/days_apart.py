@@ -23,26 +23,27 @@ from airtouch.twin.comparison.two_sample import MIN_FLIGHTS, two_sample, windows
 from airtouch.twin.recorded.channels import channels
 from airtouch.twin.recorded.course import PHASES, Course, course
 
-SPEED_MPS = 0.3  #: of flights whose manifest says none
-Read = tuple[np.ndarray, Course, int]
+SPEED_MPS = 0.3  #: m/s, of flights whose manifest states none: what most of the authors' flew at
+#: channels (n, 12), course and number of a flight
+FlightData = tuple[np.ndarray, Course, int]
 
 
-def read(folders: Sequence[Path]) -> dict[str, list[Read]]:
+def read(folders: Sequence[Path]) -> dict[str, list[FlightData]]:
     """Day -> (channels, course, number) of each of its flights that has a course."""
     listed = dataset.collect(folders, None)
     readable, _ = crossval.readable_flights(listed, best.SPARE_SENSORS)
-    days: dict[str, list[Read]] = {}
+    days: dict[str, list[FlightData]] = {}
     for number, file in enumerate(f for f in listed if f.path in readable):
         log = readable[file.path]
         try:
-            flown = course(log, file.condition.speed_mps or SPEED_MPS)
+            path = course(log, file.condition.speed_mps or SPEED_MPS)
         except AirTouchError:
             continue
-        days.setdefault(str(file.condition.day), []).append((channels(log), flown, number))
+        days.setdefault(str(file.condition.day), []).append((channels(log), path, number))
     return days
 
 
-def line(title: str, one: Sequence[Read], other: Sequence[Read]) -> str:
+def line(title: str, one: Sequence[FlightData], other: Sequence[FlightData]) -> str:
     """A row of the table."""
     aurocs = {a.phase: f"{a.value:.2f} ({a.low:.2f} to {a.high:.2f})" for a in two_sample(windows(one), windows(other))}
     return f"| {title} | {len(one)} / {len(other)} | {' | '.join(aurocs.get(p, '-') for p in PHASES)} |"

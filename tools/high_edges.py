@@ -37,51 +37,53 @@ from airtouch.twin.recorded.course import Course, course
 from airtouch.twin.recorded.features import CLASSES, height_class
 
 CHANNELS = NAMES[:-1]  #: without the empty one
-SPLIT_HZ = 3.0  #: corner of the high-pass whose output is compared
+SPLIT_HZ = 3.0  #: Hz, corner of the high-pass whose output is compared; no source: round number
 SETTLED, BEFORE = slice(30, -10), slice(-300, -40)  #: samples: over a platform from the entry on; before the entry
-AHEAD = 40  #: samples before the entry in which the platform acts already
-HOVER_S = 2.0  #: shortest hover of a flight in tables 2 and 3
+AHEAD = 40  #: samples before the entry in which the platform acts already; as `overlay.BEFORE_S`
+HOVER_S = 2.0  #: s, shortest hover of a flight in tables 2 and 3; no source: round number
 #: parts of a flight that are replaced by a hover
 REPLACED = ("as flown", "before: hover", "platform: hover", "both: hover")
+#: names of overlay.COLUMNS
 COLUMNS = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "m1", "m2", "m3", "m4")
-RESPONSES = 60  #: simulated responses to a platform
+RESPONSES = 60  #: simulated responses to a platform; no source: 20 of each height class
+SPEED_MPS = 0.3  #: m/s, speed of a course where only its samples are used; no effect on them
 Groups = dict[str, list[tuple[FlightLog, Course]]]  #: class of height -> its flights
 
 
-def over(model: BestModel, values: np.ndarray, flown: Course) -> float:
+def over(model: BestModel, values: np.ndarray, path: Course) -> float:
     """Median "over" logit over the platform. values: (n, 12) channels."""
-    steps = slice((flown.entry + SETTLED.start) // STRIDE, (flown.exit + SETTLED.stop) // STRIDE)
+    steps = slice((path.entry + SETTLED.start) // STRIDE, (path.exit + SETTLED.stop) // STRIDE)
     return float(np.median(float_logits(model.weights, model.recipe.graph, values)[steps, 0]))
 
 
-def muted(log: FlightLog, flown: Course, model: BestModel) -> np.ndarray:
+def muted(log: FlightLog, path: Course, model: BestModel) -> np.ndarray:
     """(1 + channels,): median "over" logit over the platform, and its changes with each channel held at 0."""
     x, _ = channels_of(log, model.recipe.motion)
-    whole = over(model, x, flown)
-    return np.array([whole, *(over(model, np.where(np.arange(x.shape[1]) == i, 0.0, x), flown) - whole
+    whole = over(model, x, path)
+    return np.array([whole, *(over(model, np.where(np.arange(x.shape[1]) == i, 0.0, x), path) - whole
                               for i in range(len(CHANNELS)))])
 
 
-def hovering(values: np.ndarray, flown: Course, before: bool, platform: bool) -> np.ndarray:
+def hovering(values: np.ndarray, path: Course, before: bool, platform: bool) -> np.ndarray:
     """Channels (n, k) with the air before the entry, the platform, or both replaced by the flight's own hover.
 
     It ends before the entry as it was flown; from there on, and earlier than it is long, it is repeated there and back,
     so that it has no jumps. Its mean is that of the last second before the entry.
     """
-    out, start, middle = values.copy(), flown.phases()["hover"].start, flown.entry - AHEAD
-    hover = values[flown.phases()["hover"]]
+    out, start, middle = values.copy(), path.phases()["hover"].start, path.entry - AHEAD
+    hover = values[path.phases()["hover"]]
     hover = hover - hover.mean(axis=0) + values[middle - RATE_HZ:middle].mean(axis=0)
     there_and_back = np.vstack([hover[::-1], hover])
-    for wanted, first, last in ((before, start, middle), (platform, middle, flown.exit)):
-        if wanted:
+    for replaced, first, last in ((before, start, middle), (platform, middle, path.exit)):
+        if replaced:
             out[first:last] = there_and_back[np.arange(first - middle, last - middle) % len(there_and_back)]
     return out
 
 
-def approach(log: FlightLog, flown: Course, model: BestModel) -> np.ndarray:
+def approach(log: FlightLog, path: Course, model: BestModel) -> np.ndarray:
     """Median "over" logit over the platform, (4,), for each of REPLACED."""
     x, _ = channels_of(log, model.recipe.motion)
-    return np.array([over(model, hovering(x, flown, before, platform), flown)
+    return np.array([over(model, hovering(x, path, before, platform), path)
                      for platform in (False, True) for before in (False, True)])
 
 
@@ -90,10 +92,10 @@ def fast(values: np.ndarray) -> np.ndarray:
     return sosfiltfilt(butter(2, SPLIT_HZ, "high", fs=RATE_HZ, output="sos"), values, axis=0)
 
 
-def calm(log: FlightLog, flown: Course) -> tuple[np.ndarray, np.ndarray]:
+def calm(log: FlightLog, path: Course) -> tuple[np.ndarray, np.ndarray]:
     """Standard deviations (channels,) in hover and in the last second before the entry."""
     x = channels_of(log)[0][:, :len(CHANNELS)]
-    return x[flown.phases()["hover"]].std(axis=0), x[flown.entry - RATE_HZ:flown.entry - RATE_HZ // 10].std(axis=0)
+    return x[path.phases()["hover"]].std(axis=0), x[path.entry - RATE_HZ:path.entry - RATE_HZ // 10].std(axis=0)
 
 
 def shaking(values: np.ndarray, entry: int, leave: int) -> tuple[np.ndarray, np.ndarray]:
@@ -119,7 +121,7 @@ def head(first: str, names: Sequence[str]) -> str:
 
 
 def main() -> None:
-    """The tables, by class of height."""
+    """Print the tables, by class of height."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--fold", type=int, action="append", help="only flights of this fold; may be repeated")
@@ -129,14 +131,14 @@ def main() -> None:
     models = [best.load(path) for path in options.model]
     groups = by_height([f for f in dataset.collect(options.folders)
                         if not options.fold or f.condition.fold in options.fold])
-    hovers = {name: [(log, flown) for log, flown in group if length(flown.phases()["hover"]) > HOVER_S * RATE_HZ]
+    hovers = {name: [(log, path) for log, path in group if length(path.phases()["hover"]) > HOVER_S * RATE_HZ]
               for name, group in groups.items()}
     if models:
         print_logits(head("over logit; muted", ["whole", *CHANNELS]), groups, models, muted)
         print_logits(head("over logit; replaced", REPLACED), hovers, models, approach)
     print(head("standard deviation, usual swings", CHANNELS))
     for name, group in hovers.items():
-        pairs = [calm(log, flown) for log, flown in group]
+        pairs = [calm(log, path) for log, path in group]
         for title, part in zip(("in hover", "before the entry"), zip(*pairs, strict=True), strict=False):
             print(row(f"{name}, {title}", len(part), np.median(part, axis=0).tolist(), "{:.2f}"), flush=True)
     if options.twin:
@@ -151,34 +153,34 @@ def by_height(listed: Sequence[dataset.FlightFile]) -> Groups:
     groups: Groups = {name: [] for name in CLASSES}
     for flight in usable:
         try:
-            flown = course(flight.log, 0.3)
+            path = course(flight.log, SPEED_MPS)
         except AirTouchError as error:
             raise SystemExit(str(error)) from None
-        name = height_class(flown.clearance_m)
+        name = height_class(path.clearance_m)
         if name:
-            groups[name].append((flight.log, flown))
+            groups[name].append((flight.log, path))
     return groups
 
 
 def print_logits(title: str, groups: Groups, models: Sequence[BestModel],
                  logits: Callable[[FlightLog, Course, BestModel], np.ndarray]) -> None:
-    """A table of median logits: each flight by the models that were not trained on it."""
+    """Print a table of median logits: each flight by the models that were not trained on it."""
     print(title)
     for name, group in groups.items():
-        found = [logits(log, flown, model) for log, flown in group for model in models
-                 if not training_set.contains(model.metadata, log)]
-        if found:
-            print(row(name, len(found), np.median(found, axis=0).tolist(), "{:+.1f}"), flush=True)
+        values = [logits(log, path, model) for log, path in group for model in models
+                  if not training_set.contains(model.metadata, log)]
+        if values:
+            print(row(name, len(values), np.median(values, axis=0).tolist(), "{:+.1f}"), flush=True)
 
 
 def print_responses(groups: Groups, twin: Path) -> None:
-    """The table of what a platform adds above SPLIT_HZ, recorded and by the twin's responses."""
+    """Print what a platform adds above SPLIT_HZ, recorded and by the twin's responses."""
     craft = vehicle.load(str(twin / files.VEHICLE))
     responses = overlay.simulate_responses(scenario.load(twin / files.SCENARIO), craft, RESPONSES)
     print(head("above 3 Hz, over the platform / before", COLUMNS))
     for name, group in groups.items():
-        pairs = [shaking(overlay.values_of(log), flown.entry, flown.exit) for log, flown in group
-                 if flown.entry > -BEFORE.start]
+        pairs = [shaking(overlay.values_of(log), path.entry, path.exit) for log, path in group
+                 if path.entry > -BEFORE.start]
         added = [shaking(r.values, *(e.sample for e in r.edges))[1] for r in responses
                  if height_class(r.edges[0].height_after_m) == name]
         if pairs and added:

@@ -45,7 +45,8 @@ from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
 from airtouch.twin import adapt, cache, files
 
-COMMAND = "tools/labelled_flights.py"
+COMMAND = "tools/labelled_flights.py"  #: in the metadata of models
+COUNTS = (2, 5, 10, 20)  #: labelled flights by default, the rows of host/docs/twin.md
 FIRST_HALF = 3  #: folds below this one are one half, the others the other
 
 
@@ -69,15 +70,15 @@ def merged(scores: Iterable[FlightScore]) -> list[FlightScore]:
     flights: dict[str, list[FlightScore]] = {}
     for score in scores:
         flights.setdefault(score.file, []).append(score)
-    return [_merged(name, some) for name, some in flights.items()]
+    return [_merge(name, draws) for name, draws in flights.items()]
 
 
-def _merged(name: str, some: Sequence[FlightScore]) -> FlightScore:
-    """The scores of several flights as one, under a new name."""
-    a, b, c, d = (sum(s.windows[i] for s in some) for i in range(4))
-    return FlightScore(name, some[0].condition, tuple(e for s in some for e in s.edges),
-                       tuple(e for s in some for e in s.false or ()), sum(s.detections for s in some),
-                       sum(s.airborne_s for s in some), (a, b, c, d), np.sum([s.bins for s in some], axis=0))
+def _merge(name: str, scores: Sequence[FlightScore]) -> FlightScore:
+    """The scores of several draws of one flight as one."""
+    a, b, c, d = (sum(s.windows[i] for s in scores) for i in range(4))
+    return FlightScore(name, scores[0].condition, tuple(e for s in scores for e in s.edges),
+                       tuple(e for s in scores for e in s.false or ()), sum(s.detections for s in scores),
+                       sum(s.airborne_s for s in scores), (a, b, c, d), np.sum([s.bins for s in scores], axis=0))
 
 
 def scored(model: BestModel, held: Sequence[FlightFile], readable: dict[Path, FlightLog]) -> list[FlightScore]:
@@ -106,45 +107,50 @@ def recorded_beside(folders: Sequence[Path], speed: float | None,
     return adapt.SimulatedFlights([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
 
 
-def named(asked: Sequence[Any]) -> str:
-    """Short hash of what a training depends on, for a file's name."""
-    return hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:12]
+def digest(settings: Sequence[Any]) -> str:
+    """Short hash of the settings of a training, for a file's name."""
+    return hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:12]
 
 
 def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[FlightFile],
          pool: Sequence[adapt.Flight], readable: dict[Path, FlightLog], start: BestModel | None,
-         flown: adapt.SimulatedFlights | None, options: argparse.Namespace) -> list[FlightScore]:
-    """One training and its scores, or what an earlier run found."""
+         beside: adapt.SimulatedFlights | None, options: argparse.Namespace) -> list[FlightScore]:
+    """Scores of one training on the held-out flights, from the file of an earlier run if there is one.
+
+    row: "start", "labelled", "unlabelled" or "alone". beside: flights to learn with the sample.
+    """
     steps = {"start": 0, "labelled": options.steps, "unlabelled": options.steps, "alone": options.alone_steps}[row]
-    asked = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
-             [f.path.name for f in held], [f.log.source for f in pool]]
-    if flown and row in ("labelled", "unlabelled"):
-        asked += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
-                  [training_set.flight_hash(log) for log in flown.logs]]
+    settings = [row, count, draw, seed, group, steps, start.digest if start and row != "alone" else "",
+                [f.path.name for f in held], [f.log.source for f in pool]]
+    if beside and row in ("labelled", "unlabelled"):
+        settings += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
+                     [training_set.flight_hash(log) for log in beside.logs]]
     rounds = [adapt.ROUNDS] if row == "unlabelled" else []
-    path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{named([*asked, *rounds])}.json"
+    path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{digest([*settings, *rounds])}.json"
     if path.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
-    some = drawn(pool, count, draw)
+    sample = drawn(pool, count, draw)
 
     def labelled() -> BestModel:
-        if start is not None and flown:
-            return adapt.together(start if options.beside else None, start, some, flown, seed, None, COMMAND)
-        return best.fit([f.log for f in some], seed=seed, start=start, steps=options.steps, command=COMMAND)
+        """A detector of the sample, of the flights beside it, and of the model to start from."""
+        if start is not None and beside:
+            return adapt.together(start if options.beside else None, start, sample, beside, seed, None, COMMAND)
+        return best.fit([f.log for f in sample], seed=seed, start=start, steps=options.steps, command=COMMAND)
 
     if row == "start":
         if start is None:
             raise AirTouchError("no model to start from: give --start")
         model = start
     elif row == "alone":
-        model = best.fit([f.log for f in some], seed=seed, steps=steps, command=COMMAND)
+        model = best.fit([f.log for f in sample], seed=seed, steps=steps, command=COMMAND)
     else:
-        file = f"labelled_{count}_draw{draw}_seed{seed}_{named(asked[1:])}.npz"
+        file = f"labelled_{count}_draw{draw}_seed{seed}_{digest(settings[1:])}.npz"
         model = cache.model(options.out / file, labelled)
-    if row == "unlabelled" and flown:
-        names = {f.log.source for f in some}
-        others = [adapt.without_range(f) for f in pool if f.log.source not in names]
-        model = adapt.self_trained(start if options.beside else None, model, some, others, flown, seed, None, COMMAND)
+    if row == "unlabelled" and beside:
+        names = {f.log.source for f in sample}
+        unlabelled = [adapt.without_range(f) for f in pool if f.log.source not in names]
+        model = adapt.self_trained(start if options.beside else None, model, sample, unlabelled, beside, seed, None,
+                                   COMMAND)
     scores = scored(model, held, readable)
     write_bytes(json.dumps([s.as_dict() for s in scores]).encode(), path, force=True)
     return scores
@@ -158,7 +164,7 @@ def missed_by_height(scores: Sequence[FlightScore]) -> str:
             count = counts.setdefault(score.condition.height, [0, 0])
             count[0] += sum(edge.error_s is None for edge in score.edges)
             count[1] += len(score.edges)
-    return ", ".join(f"{height} {missed}/{every}" for height, (missed, every) in sorted(counts.items())) or "-"
+    return ", ".join(f"{height} {missed}/{edges}" for height, (missed, edges) in sorted(counts.items())) or "-"
 
 
 def false_by_place(scores: Sequence[FlightScore]) -> str:
@@ -166,23 +172,25 @@ def false_by_place(scores: Sequence[FlightScore]) -> str:
     counts = [0, 0, 0]
     for score in scores:
         places = [edge.true_sample for edge in score.edges]
-        for at in score.false or ():
-            counts[int(at >= min(places, default=at + 1)) + int(at >= max(places, default=at + 1))] += 1
+        for sample in score.false or ():
+            counts[int(sample >= min(places, default=sample + 1))
+                   + int(sample >= max(places, default=sample + 1))] += 1
     return " / ".join(map(str, counts))
 
 
 def line(title: str, scores: Sequence[FlightScore], draws: int) -> str:
     """One row of the table."""
-    found: dict[str, Any] = summarise(merged(scores))
+    figures: dict[str, Any] = summarise(merged(scores))
 
     def text(name: str, scale: float, digits: int) -> str:
-        if found[name] is None:
+        """A figure times `scale` with its interval."""
+        if figures[name] is None:
             return "-"
-        ends = found["intervals"][name] or (np.nan, np.nan)
-        value, low, high = (f"{scale * x:.{digits}f}" for x in (found[name], *ends))
+        ends = figures["intervals"][name] or (np.nan, np.nan)
+        value, low, high = (f"{scale * x:.{digits}f}" for x in (figures[name], *ends))
         return f"{value} [{low}, {high}]"
 
-    cells = (title, str(draws), f"{found['flights']} / {found['edges'] // draws}", text("mean_abs_error_m", 1, 3),
+    cells = (title, str(draws), f"{figures['flights']} / {figures['edges'] // draws}", text("mean_abs_error_m", 1, 3),
              text("mean_abs_error_s", 1, 2), text("missed", 100, 1), text("false_per_minute", 1, 2),
              missed_by_height(scores), false_by_place(scores))
     return f"| {' | '.join(cells)} |"
@@ -228,7 +236,7 @@ def check(options: argparse.Namespace, groups: Sequence[str]) -> None:
 
 
 def main() -> None:
-    """Each row as soon as its last draw is done."""
+    """Print each row as soon as its last draw is done."""
     options = arguments()
     options.out.mkdir(parents=True, exist_ok=True)
     listed = dataset.collect(options.folders, options.speed)
@@ -241,31 +249,32 @@ def main() -> None:
     starts = dict(zip(groups, models if len(models) > 1 else models * len(groups), strict=False))
     twins = dict(zip(groups, options.twin if len(options.twin) > 1 else options.twin * len(groups), strict=False))
     pools = {g: [adapt.Flight(f, readable[f.path]) for f in listed if group_of(f, options.by) != g] for g in groups}
-    flown = {g: simulated(twins[g], pools[g]) for g in twins}
+    beside = {g: simulated(twins[g], pools[g]) for g in twins}
     if options.beside:
-        flown = dict.fromkeys(groups, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
+        beside = dict.fromkeys(groups, recorded_beside(options.beside, options.speed, list(chain(*pools.values()))))
 
     def row(title: str, kind: str, count: int, draws: Sequence[tuple[int, int]]) -> None:
+        """Print the row of a kind of training, over pairs of draw and seed."""
         scores: list[FlightScore] = []
         for draw, seed in draws:
             for group in groups:
                 held = [f for f in listed if group_of(f, options.by) == group]
                 scores += cell(kind, count, draw, seed, group, held, pools[group], readable, starts.get(group),
-                               flown.get(group), options)
+                               beside.get(group), options)
         print(line(title, scores, len(draws)), flush=True)
 
     print("| | draws | flights / edges | error, m | error, s | missed, % | false a minute | missed by height "
           "| false before / over / behind |\n|---|---|---|---|---|---|---|---|---|", flush=True)
-    every = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
+    draws = [(draw, seed) for draw in range(options.draws) for seed in range(options.seeds)]
     if starts:
         row("as it is", "start", 0, [(0, 0)])
-    for count in options.labelled or (2, 5, 10, 20):
+    for count in options.labelled or COUNTS:
         if starts:
-            row(f"and {count} labelled", "labelled", count, every)
+            row(f"and {count} labelled", "labelled", count, draws)
         if options.unlabelled:
-            row(f"and {count} labelled, the others without labels", "unlabelled", count, every)
+            row(f"and {count} labelled, the others without labels", "unlabelled", count, draws)
         if options.alone_steps:
-            row(f"{count} labelled alone", "alone", count, every)
+            row(f"{count} labelled alone", "alone", count, draws)
 
 
 if __name__ == "__main__":
