@@ -15,12 +15,13 @@ from pathlib import Path
 
 from tools import stack
 
-ROOT = Path(__file__).resolve().parents[1]
-BUILT = ROOT / "build" / "firmware"
+ROOT = Path(__file__).resolve().parents[1]  #: of the checkout
+OUT = ROOT / "build" / "firmware"  #: of `make firmware`
 #: configuration of firmware/app, platform, further arguments of `make firmware`
 IMAGES = (("app-config", "cf2", ()), ("app-config-tap", "cf2", ()), ("app-config-gap8", "cf2", ()),
           ("app-config", "cf21bl", ("NETWORKS=no",)))
-MEMORIES = ("Flash", "RAM", "CCM")
+MEMORIES = ("Flash", "RAM", "CCM")  #: as the firmware's makefile names them
+#: a line of its report: memory, bytes used, bytes that there are
 REPORT = re.compile(r"(Flash|RAM|CCM)\s*\|\s*(\d+)/(\d+)")
 
 
@@ -48,7 +49,7 @@ def row(what: str, sizes: Sizes, stock: Sizes | None = None, deepest: int | None
     return f"| {what} | {used} | {added} | {free} | {'' if deepest is None else deepest} |"
 
 
-def made(*command: object) -> str:
+def build_output(*command: object) -> str:
     """Standard output of a build that must succeed without a warning."""
     print(*command, file=sys.stderr)
     run = subprocess.run([str(c) for c in command], cwd=ROOT, capture_output=True, text=True)
@@ -60,14 +61,14 @@ def made(*command: object) -> str:
 def plain(base: Path, platform: str) -> Sizes:
     """The firmware as it is."""
     out = ROOT / "build" / "stock" / platform
-    made("make", "-C", base, f"KBUILD_OUTPUT={out}", f"{platform}_defconfig")
-    return parse(made("make", "-C", base, f"KBUILD_OUTPUT={out}"))
+    build_output("make", "-C", base, f"KBUILD_OUTPUT={out}", f"{platform}_defconfig")
+    return parse(build_output("make", "-C", base, f"KBUILD_OUTPUT={out}"))
 
 
 def networks() -> int:
     """Bytes of flash that the two networks take in the last build."""
-    objects = sorted((BUILT / "gap8/model").glob("*.o"))
-    lines = made("arm-none-eabi-size", *objects).splitlines()[1:]
+    objects = sorted((OUT / "gap8/model").glob("*.o"))
+    lines = build_output("arm-none-eabi-size", *objects).splitlines()[1:]
     return sum(int(text) + int(data) for text, data, *_ in (line.split() for line in lines))
 
 
@@ -79,9 +80,9 @@ def main(base: Path) -> None:
         stock = plain(base, platform)
         print(row(f"{platform}, stock", stock), flush=True)
         for config, _, further in (image for image in IMAGES if image[1] == platform):
-            text = made("make", "firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}", f"PLATFORM={platform}",
-                        *further)
-            deepest, _, _ = stack.deepest(BUILT, "appMain")
+            text = build_output("make", "firmware", f"CRAZYFLIE_BASE={base}", f"CONFIG={config}",
+                                f"PLATFORM={platform}", *further)
+            deepest, _, _ = stack.deepest(OUT, "appMain")
             print(row(f"{platform}, `{config}`", parse(text), stock, deepest), flush=True)
     print(f"\n{networks() / 1000:.1f} kB of the flash are the two networks.")
 

@@ -30,6 +30,7 @@ from airtouch.report.figures import error_distribution, flight
 from airtouch.report.map_figure import edge_map as draw_map
 
 COLOURS = 96  #: of a picture's palette, so that it is a third of its size
+#: names of Chromium's programs
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -41,17 +42,17 @@ def main() -> int:
     parser.add_argument("--demo", type=Path, default=Path("out/demo/report.html"), help="what `airtouch demo` wrote")
     parser.add_argument("--out", type=Path, default=Path("host/docs/img"), help="folder")
     options = parser.parse_args()
-    made = {"virtual-flight": virtual_flight(), "zig-zag-map": zig_zag_map(), "virtual-errors": virtual_errors()}
+    pictures = {"virtual-flight": virtual_flight(), "zig-zag-map": zig_zag_map(), "virtual-errors": virtual_errors()}
     lacking = []
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     for name, page, width, height in (("gap-report", options.gap, 1280, 1250),
                                       ("gap-report-phone", options.gap, 390, 1000),
                                       ("demo-report", options.demo, 1280, 1000)):
         if browser and page.exists():
-            made[name] = photograph(browser, page, width, height)
+            pictures[name] = photograph(browser, page, width, height)
         else:
             lacking.append(f"{name}.png: {'no ' + page.as_posix() if browser else 'no Chromium'}")
-    for name, picture in made.items():
+    for name, picture in pictures.items():
         small = smaller(picture)
         write_bytes(small, options.out / f"{name}.png", force=True)
         print(f"{options.out / name}.png: {len(small) / 1000:.0f} kB")
@@ -71,10 +72,10 @@ def zig_zag_map() -> bytes:
     """PNG of the map of one zig-zag over a table."""
     (log,) = at.simulate(mission.scene_of("zig-zag"), seed=1)
     model = best.load(None)
-    found = best.run(log, model).edges
-    made = edge_map.edge_map(log, found, lag_s=best.lag_s(model),
+    edges = best.run(log, model).edges
+    edge_points = edge_map.edge_map(log, edges, lag_s=best.lag_s(model),
                              sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
-    return draw_map(made, f"zig-zag: {len(made.points)} edges felt")
+    return draw_map(edge_points, f"zig-zag: {len(edge_points.points)} edges felt")
 
 
 def virtual_errors(count: int = 20) -> bytes:
@@ -86,7 +87,7 @@ def virtual_errors(count: int = 20) -> bytes:
         scores[name] = [evaluate_flight(FlightFile(Path(log.source),
                                                    Condition(speed_mps=log.meta["condition"]["speed"])),
                                         log, module, model).score for log in flights]
-    return error_distribution({name: hit_curve(some) for name, some in scores.items()})
+    return error_distribution({name: hit_curve(flight_scores) for name, flight_scores in scores.items()})
 
 
 def photograph(browser: str, page: Path, width: int, height: int) -> bytes:

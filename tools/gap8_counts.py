@@ -19,10 +19,13 @@ from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 from tools.emulator.xpulp import BARRIER, Cycles, XpulpMachine
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[1]  #: of the checkout
+#: folders of the C
 KERNELS, FIRMWARE = ROOT / "gap8" / "kernels", ROOT / "firmware" / "kernels"
 STATE_BYTES = 4096      #: room for a rolling network's or a stream's struct
+#: names of `tools.emulator.cores`
 RV32IMC, XPULP = "rv32imc", "rv32im-xpulp"
+#: sources of a network over whole windows, and of each kind of network
 _WINDOWED = ("conv_int8", "dense_int8", "max_pool_int8", "network_int8", "sparse_dense_int8")
 _KERNELS = {"window": _WINDOWED, "rolling": (*_WINDOWED, "rolling_int8", "fixed_scale"),
             "stream": ("stream_int8", "dense_int8", "sparse_dense_int8")}
@@ -105,8 +108,10 @@ def stream(chip: Chip, quantised: np.ndarray, outputs: int = 3) -> Run:
 
 
 def team_cycles(chip: Chip, window: np.ndarray, cores: int, outputs: int = 2) -> tuple[Cycles, np.ndarray]:
-    """One window (inputs,) int8 on so many XPULP cores:
-    cycles by the model of tools/emulator/xpulp.py, and each core's output."""
+    """One window (inputs,) int8 on so many XPULP cores: cycles, and each core's output (cores, outputs) int8.
+
+    Cycles are those of the model in tools/emulator/xpulp.py.
+    """
     machine = XpulpMachine(chip.elf)
     x, arena = machine.allocate(window.size), _arena(machine, "networkInt8ArenaBytes", chip)
     machine.write(x, np.ascontiguousarray(window, np.int8).tobytes())
@@ -119,10 +124,12 @@ def team_cycles(chip: Chip, window: np.ndarray, cores: int, outputs: int = 2) ->
 
 
 def _arena(machine: Machine, size: str, chip: Chip, *arguments: int) -> int:
+    """Address of an arena for the network, whose bytes the C function `size` gives."""
     return machine.allocate(machine.call(size, machine.address(chip.symbol), *arguments).value)
 
 
 def _steps(machine: Machine, quantised: np.ndarray, outputs: int, function: str, *arguments: int) -> Run:
+    """Call a C function with each sample (n, columns) int8 after the other arguments."""
     x = machine.allocate(quantised.shape[1])
     machine.paint_stack()
     rows, counts = [], []

@@ -3,8 +3,7 @@
     python tools/gap8_figures.py [FLIGHTS] [--out out/gap8] [--counts]
 
 Costs come from emulators, seconds. Accuracy and edge error come from five folds by flight; folds that are done are kept
-in
---out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
+in --out and not trained again (about seven minutes a row on two cores). --counts leaves them out.
 """
 
 import json
@@ -35,7 +34,8 @@ from airtouch.logs.files import write_bytes
 from airtouch.reference.networks.int8_network import multiplications, rolling_multiplications
 from tools import gap8_counts
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[1]  #: of the checkout
+RESAMPLES = 2000  #: bootstrap samples over flights; no source: round number
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,7 @@ class Row:
     shipped: bool = True
 
 
+#: networks of the table
 ROWS = (Row("`paper`, no zeros", "paper", {"sparsity": 0.0}, shipped=False),
         Row("`paper`, 80 % zeros (shipped)", "paper"),
         Row("`paper`, 90 % zeros", "paper", {"sparsity": 0.9}, shipped=False),
@@ -55,6 +56,7 @@ ROWS = (Row("`paper`, no zeros", "paper", {"sparsity": 0.0}, shipped=False),
         Row("`best`, 50 % zeros", "best"))
 #: What the paper states (sections 5.3 and 7): 14,375 bytes, 1.10 ms an inference; its split of windows leaks.
 PAPER = "| paper's own, as published | 14,375 | | | 0.27 M | | | 1.10 ms at 175 MHz = 193 k | | | | |"
+#: heads of the table's columns
 COLUMNS = ("network",
            "parameters, bytes",
            "flash, bytes",
@@ -67,6 +69,7 @@ COLUMNS = ("network",
            "edge error, float / int8, mm",
            "int8 more than float on edges that both find, mm",
            "missed, float / int8, %")
+#: the table's first two lines
 HEAD = f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|"
 
 
@@ -105,6 +108,7 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
     detector: Any = registry.get(row.detector)  # which has run_float as well
 
     def tell(line: str) -> None:
+        """Print a line about the row to standard error."""
         click.echo(f"{row.name}: {line}", err=True)
 
     scores, folds, _ = crossval.crossval(row.detector, files, out, options=row.options, tell=tell)
@@ -123,14 +127,16 @@ def worth(row: Row, files: list[FlightFile], out: Path) -> tuple[dict[str, Any],
 
 
 def more_error(scores: list[FlightScore], exact: list[FlightScore]) -> tuple[float, float, float, int]:
-    """By how much |error| of the first is larger on edges that both find, metres: mean, its 95 % interval by
-    resampling flights, and how many edges."""
+    """How much larger |error| of the first is on edges that both detect, m: mean, its 95 % interval, number of edges.
+
+    The interval is by bootstrap over flights.
+    """
     other = {score.file: score for score in exact}
     flights = [[abs(a.error_m) - abs(b.error_m) for a, b in zip(score.edges, other[score.file].edges, strict=True)
                 if a.error_m is not None and b.error_m is not None] for score in scores]
     sums, counts = np.array([sum(f) for f in flights]), np.array([len(f) for f in flights])
-    drawn = np.random.default_rng(0).integers(len(flights), size=(2000, len(flights)))
-    means = sums[drawn].sum(axis=1) / np.maximum(counts[drawn].sum(axis=1), 1)
+    samples = np.random.default_rng(0).integers(len(flights), size=(RESAMPLES, len(flights)))
+    means = sums[samples].sum(axis=1) / np.maximum(counts[samples].sum(axis=1), 1)
     low, high = np.quantile(means, [0.025, 0.975])
     return sums.sum() / max(counts.sum(), 1), low, high, int(counts.sum())
 

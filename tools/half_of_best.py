@@ -15,8 +15,8 @@ from airtouch import logs
 from airtouch.detector import best
 from airtouch.logs.flight_log import ACC_WORLD, FlightLog
 
-FOLDS = ("0", "1", "2")
-CLOSE = 10  #: samples of 100 Hz within which an edge counts as the same
+FOLDS = ("0", "1", "2")  #: of the manifest, on which numbers may be chosen
+CLOSE = 10  #: samples of 100 Hz within which an edge counts as the same; no source: round number
 
 
 def later(log: FlightLog) -> FlightLog:
@@ -37,7 +37,7 @@ def same(one: list, other: list, shift: int = 0) -> bool:
 
 
 def main(folder: Path) -> None:
-    """Read, detect twice, print."""
+    """Read, detect twice, and print how often the edges are the same."""
     with open(folder / "manifest.csv") as file:
         chosen = [row["file"] for row in csv.DictReader(file) if row["use"] == "clean" and row["fold"] in FOLDS]
     halves, headings = [], []

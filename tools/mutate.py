@@ -21,9 +21,9 @@ from pathlib import Path
 
 from airtouch.gap.sealed.blind_score import wilson
 
-ROOT = Path(__file__).parents[1]
-BUILD = ROOT / "build" / "mutate"
-LEAST = 0.85  #: of the mutants that are to be noticed
+ROOT = Path(__file__).parents[1]  #: of the checkout
+BUILD = ROOT / "build" / "mutate"  #: where mutated copies lie
+LEAST = 0.85  #: share of the mutants that tests must notice; no source: round number
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Group:
     tests: tuple[str, ...]
 
 
+#: name -> modules and their tests
 GROUPS = {
     "reference": Group(tuple(f"reference/{name}.py" for name in (
         "band_power", "cross_spectrum", "disturbance_force", "edge_decoder", "edge_pipeline", "feature_window",
@@ -46,6 +47,7 @@ GROUPS = {
 }
 #: mutmut's exit codes, by what they say
 KILLED, SURVIVED, UNSEEN, LATE = (1, 3), (0,), (5, 33), (24, 36, 152, 255, -24)
+#: what is added to pyproject.toml in a copy
 CONFIG = """
 [tool.mutmut]
 source_paths = ["src"]
@@ -73,7 +75,7 @@ def staged(name: str, force: bool) -> Path:
 
 
 def run_mutmut(place: Path, *mutants: str) -> None:
-    """The named mutants, or all; those that are done are not run again."""
+    """Run the named mutants, or all; those that are done are not run again."""
     flights = os.environ.get("AIRTOUCH_FLIGHTS", str(ROOT.parent / "shared" / "flights"))
     subprocess.run([sys.executable, "-m", "mutmut", "run", "--max-children", "1", *mutants], cwd=place,
                    env=os.environ | {"AIRTOUCH_FLIGHTS": flights})
@@ -88,14 +90,14 @@ def results(place: Path) -> dict[str, int | None]:
 
 
 def table(codes: dict[str, int | None]) -> float:
-    """Prints a line for each module and one for all; the share noticed."""
+    """Print a line for each module and one for all. Returns the share of all that is noticed."""
     by_module: dict[str, Counter] = {}
     for mutant, code in codes.items():
         if code is not None:
             module = mutant.rsplit(".", 1)[0].removeprefix("airtouch.")
-            said = "noticed" if code in KILLED + LATE else "unnoticed" if code in SURVIVED else \
+            outcome = "noticed" if code in KILLED + LATE else "unnoticed" if code in SURVIVED else \
                 "reached by no test" if code in UNSEEN else f"exit code {code}"
-            by_module.setdefault(module, Counter())[said] += 1
+            by_module.setdefault(module, Counter())[outcome] += 1
     total = Counter()
     for count in by_module.values():
         total += count
@@ -113,7 +115,7 @@ def table(codes: dict[str, int | None]) -> float:
 
 
 def show(place: Path, codes: dict[str, int | None]) -> None:
-    """Prints the mutants that no test noticed."""
+    """Print the mutants that no test noticed."""
     for mutant, code in codes.items():
         if code in SURVIVED + UNSEEN:
             subprocess.run([sys.executable, "-m", "mutmut", "show", mutant], cwd=place)

@@ -22,11 +22,13 @@ from airtouch.logs.files import write_bytes
 from airtouch.reference.motion_channels import NAMES
 from airtouch.report.figures import FOUND, MUTED, OTHER, TRUE, png, reliability, style
 
-SHOWN = ("motor mean", "gyro x", "ax")  #: channels drawn
+CHANNELS = ("motor mean", "gyro x", "ax")  #: that are drawn
+OFFSET = 5  #: usual swings between two channels
+MARGIN_S = (6, 5)  #: s before the first edge and after the last
 
 
 def main() -> None:
-    """Draw and write."""
+    """Draw both pictures and write them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--models", type=Path, default=Path("out/crossval"), help="where crossval kept its models")
     parser.add_argument("--flight", default="imu_data_0126-1916.csv.gz", help="a flight of fold 0")
@@ -46,13 +48,13 @@ def draw(log, model, name: str) -> bytes:
     trace, truth = best.run(log, model), logs.true_edges(log)
     x = channels_of(log)[0]
     t = np.arange(len(log)) * 0.01
-    first, last = t[truth[0].sample] - 6, t[truth[-1].sample] + 5
+    first, last = t[truth[0].sample] - MARGIN_S[0], t[truth[-1].sample] + MARGIN_S[1]
     with style():
         figure = Figure(figsize=(8.0, 4.6), layout="constrained")
         axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.3, 1, 0.7))
-        for i, channel in enumerate(SHOWN):
-            axes[0].plot(t, x[:, NAMES.index(channel)] + 5 * (len(SHOWN) - 1 - i), lw=0.7, color=MUTED)
-        axes[0].set_yticks([5 * (len(SHOWN) - 1 - i) for i in range(len(SHOWN))], SHOWN)
+        for i, channel in enumerate(CHANNELS):
+            axes[0].plot(t, x[:, NAMES.index(channel)] + OFFSET * (len(CHANNELS) - 1 - i), lw=0.7, color=MUTED)
+        axes[0].set_yticks([OFFSET * (len(CHANNELS) - 1 - i) for i in range(len(CHANNELS))], CHANNELS)
         axes[0].set_title(f"{name}: what the drone feels, in units of its usual swing", loc="left")
         axes[1].plot(t, trace.probability, color=FOUND, lw=1)
         axes[1].set(ylim=(-0.05, 1.25), yticks=(0, 1), ylabel="P(over)")

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[1]  #: of the checkout
 #: words of a test file that uses threads, sockets or processes
 CONCURRENT = re.compile(r"\b(threading|socket|Popen|multiprocessing|dask|simulated_link|sitl|cflib)\b")
 
@@ -26,8 +26,8 @@ CONCURRENT = re.compile(r"\b(threading|socket|Popen|multiprocessing|dask|simulat
 class Repeat:
     """A pytest plugin: every test so many times, counted, failures kept in a folder."""
 
-    def __init__(self, times: int, kept: Path) -> None:
-        self.times, self.kept = times, kept
+    def __init__(self, times: int, folder: Path) -> None:
+        self.times, self.folder = times, folder
         self.passed, self.failed, self.skipped = Counter(), Counter(), Counter()
         self.started: dict[str, float] = {}
 
@@ -47,7 +47,7 @@ class Repeat:
         self.started.setdefault(name, time.monotonic() - report.duration)
         if report.failed:
             self.failed[name] += 1
-            path = self.kept / f"{re.sub(r'[^A-Za-z0-9]+', '_', report.nodeid)[-150:]}.txt"
+            path = self.folder / f"{re.sub(r'[^A-Za-z0-9]+', '_', report.nodeid)[-150:]}.txt"
             path.write_text(f"{report.nodeid}, {report.when}\n{report.longreprtext}\n"
                             + "\n".join(f"--- {title}\n{text}" for title, text in report.sections))
             print(f"FAILED {report.nodeid}: {path.relative_to(ROOT)}", flush=True)
@@ -72,13 +72,13 @@ def main() -> int:
     parser.add_argument("tests", nargs="*", help="files or folders; by default those of threads, sockets, processes")
     parser.add_argument("--times", type=int, default=50, help="repetitions of each test (50)")
     parser.add_argument("-k", default="", help="only tests that match, as pytest's -k")
-    wanted = parser.parse_args()
-    kept = ROOT / "build" / "repeat"
-    kept.mkdir(parents=True, exist_ok=True)
-    plugin = Repeat(wanted.times, kept)
+    args = parser.parse_args()
+    folder = ROOT / "build" / "repeat"
+    folder.mkdir(parents=True, exist_ok=True)
+    plugin = Repeat(args.times, folder)
     quiet = ["-p", "no:terminal", "-o", "addopts=--strict-markers --import-mode=importlib", "-p", "no:cacheprovider"]
-    options = [*quiet, *(["-k", wanted.k] if wanted.k else [])]
-    code = pytest.main([*options, *(wanted.tests or concurrent_tests())], plugins=[plugin])
+    options = [*quiet, *(["-k", args.k] if args.k else [])]
+    code = pytest.main([*options, *(args.tests or concurrent_tests())], plugins=[plugin])
     print(f"{len(plugin.passed | plugin.failed)} tests: {plugin.passed.total()} passed, {plugin.failed.total()} "
           "failed, "
           f"{plugin.skipped.total()} skipped")

@@ -24,11 +24,12 @@ from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation.body.rigid_body import SPIN
 from airtouch.vehicle import Vehicle
 
-RPM = tuple(f"rpm_{i}" for i in range(1, 5))
+RPM = tuple(f"rpm_{i}" for i in range(1, 5))  #: columns of the rotor speeds, 1/min
 BAND_HZ = (1.0, 12.0)  #: below it the yaw controller hardly commands, above it the gyro's low-pass begins
-BLOCK_S = 4.0  #: s of a block of a spectrum
-EDGE_S = 1.0  #: left out after take-off and before landing
-DRAWS = 200  #: bootstrap samples over blocks
+BLOCK_S = 4.0  #: s of a block of a spectrum; no source: round number
+MIN_BLOCKS = 4  #: that a flight must hold; no source: least for a bootstrap
+EDGE_S = 1.0  #: s left out after take-off and before landing; no source: round number
+DRAWS = 200  #: bootstrap samples over blocks; no source: round number
 
 
 def spectra(log: FlightLog, arm_pwm: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -44,7 +45,7 @@ def spectra(log: FlightLog, arm_pwm: float) -> tuple[np.ndarray, np.ndarray, flo
     inside = slice(flying[0] + edge, flying[-1] - edge) if len(flying) else slice(0, 0)
     signals = np.column_stack([pwm @ signs, speed @ signs, log["gyro_z_radps"]])[inside]
     starts = range(0, len(signals) - length + 1, length // 2)
-    if len(starts) < 4:
+    if len(starts) < MIN_BLOCKS:
         raise AirTouchError(f"{log.source}: less than {2.5 * BLOCK_S:g} s in the air; give a longer flight")
     f = np.fft.rfftfreq(length, period)
     inner = (f >= BAND_HZ[0]) & (f <= BAND_HZ[1])
@@ -62,9 +63,10 @@ def fit(f: np.ndarray, blocks: np.ndarray, with_inertia: bool = True) -> tuple[n
     scale = np.sqrt(np.mean(np.abs(blocks[:, 1]) ** 2, axis=0))  # each frequency counts alike
 
     def residual(x: np.ndarray) -> np.ndarray:
+        """Residuals (2 k,), real and imaginary, over `scale`, with steady gain, I / Jz and delay x."""
         modelled = (x[0] + 2j * np.pi * f * x[1] * with_inertia) * np.exp(-2j * np.pi * f * x[2]) * difference
-        rest = (yaw - modelled) / scale
-        return np.concatenate([rest.real, rest.imag])
+        error = (yaw - modelled) / scale
+        return np.concatenate([error.real, error.imag])
 
     solution = least_squares(residual, [1e-2, 1e-3, 0.005], x_scale=[1e-2, 1e-3, 5e-3])
     return solution.x, 1.0 - float((residual(solution.x) ** 2).sum() / (np.abs(yaw / scale) ** 2).sum())
@@ -75,8 +77,8 @@ def report(log: FlightLog, craft: Vehicle) -> str:
     f, blocks, speed = spectra(log, craft.arm_pwm)
     (gain, ratio, delay), share = fit(f, blocks)
     rng = np.random.default_rng(0)
-    drawn = np.array([fit(f, blocks[rng.integers(len(blocks), size=len(blocks))])[0] for _ in range(DRAWS)])
-    low, high = np.percentile(drawn, [5, 95], axis=0)
+    samples = np.array([fit(f, blocks[rng.integers(len(blocks), size=len(blocks))])[0] for _ in range(DRAWS)])
+    low, high = np.percentile(samples, [5, 95], axis=0)
     jz = craft.inertia_kg_m2[2]
     lever = jz * speed / (2.0 * craft.mass_kg * craft.gravity_mps2 / 4.0)  # of torque over thrust to the steady gain
     return (f"{Path(log.source).name}: I/Jz {ratio:.2e} ({low[1]:.2e} to {high[1]:.2e}), I {ratio * jz:.1e} kg m² for "
@@ -86,7 +88,7 @@ def report(log: FlightLog, craft: Vehicle) -> str:
 
 
 def main() -> None:
-    """One line a flight."""
+    """Print a line for each flight."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("flights", type=Path, nargs="+")
     parser.add_argument("--vehicle", default="crazyflie-2.1", help="name or file: mass and Jz (default %(default)s)")

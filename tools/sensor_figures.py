@@ -19,7 +19,8 @@ from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 
-FILE = Path(__file__).parents[1] / "host" / "airtouch" / "models" / "best_sensors.json"
+FILE = Path(__file__).parents[1] / "host" / "airtouch" / "models" / "best_sensors.json"  #: where the figures go
+#: figures that the notes use, by their names in a score's JSON
 FIGURES = ("edges", "missed", "false_per_minute", "mean_abs_error_s")
 
 

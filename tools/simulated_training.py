@@ -24,7 +24,7 @@ from airtouch.detector.evaluation.summary import summarise
 from airtouch.logs.files import write_bytes
 from airtouch.simulation import scenario
 
-ALL = "none"
+ALL = "none"  #: of --without: no effect is off
 
 
 def sources() -> str:
@@ -44,24 +44,24 @@ def effects_of(name: str) -> list[str]:
 
 def row(detector: str, without: str, options: argparse.Namespace,
         files: list[dataset.FlightFile]) -> dict[str, Any]:
-    """Train and test one, or read what an earlier run found."""
+    """Figures of one training on the recorded flights, from the file of an earlier run if there is one."""
     own = {"epochs": options.epochs} if detector == "paper" else {"steps": options.steps}
     own = {name: value for name, value in own.items() if value is not None}
-    asked = {"detector": detector, "without": without, "scenario": options.scenario,
-             "flights": options.flights, "seed": options.seed, **own, "tested": [f.path.name for f in files]}
-    key = hashlib.sha256((json.dumps(asked) + sources()).encode()).hexdigest()[:12]
+    settings = {"detector": detector, "without": without, "scenario": options.scenario,
+                "flights": options.flights, "seed": options.seed, **own, "tested": [f.path.name for f in files]}
+    key = hashlib.sha256((json.dumps(settings) + sources()).encode()).hexdigest()[:12]
     path = options.out / f"{detector}_without_{without}_{key}.json"
     if path.is_file():
         return json.loads(path.read_text())
     started = time.monotonic()
-    flown, what = simulated.training_flights(options.flights, options.scenario, seed=options.seed,
-                                             without=() if without == ALL else (without,))
+    flights, description = simulated.training_flights(options.flights, options.scenario, seed=options.seed,
+                                                      without=() if without == ALL else (without,))
     module = registry.get(detector)
-    model = module.fit(flown, seed=options.seed, command="tools/simulated_training.py", **own)
+    model = module.fit(flights, seed=options.seed, command="tools/simulated_training.py", **own)
     scores, left_out = evaluate.evaluate(files, module, model)
     if left_out:
         raise SystemExit(f"not scored: {left_out[0][1]}")
-    figures = {**summarise(scores), "trained": what, "lag_s": module.lag_s(model), "options": own,
+    figures = {**summarise(scores), "trained": description, "lag_s": module.lag_s(model), "options": own,
              "seconds": round(time.monotonic() - started)}
     write_bytes(json.dumps(figures, indent=1).encode(), path, force=True)
     return figures
@@ -70,20 +70,21 @@ def row(detector: str, without: str, options: argparse.Namespace,
 def line(detector: str, without: str, result: dict[str, Any]) -> str:
     """One line of a Markdown table, 95 % intervals by flight."""
     def cell(name: str, scale: float, digits: int, unit: str = "") -> str:
+        """A figure times `scale` with unit and interval."""
         interval = result["intervals"].get(name)
         if result[name] is None:
             return "-"
         value, *ends = (f"{scale * x:.{digits}f}" for x in (result[name], *(interval or ())))
         return f"{value}{unit}" + (f" ({ends[0]} to {ends[1]})" if ends else "")
 
-    what = "all on" if without == ALL else f"`{without}` off"
-    cells = (f"{detector}, {what}", cell("mean_abs_error_m", 1, 3, " m"), cell("missed", 100, 1, " %"),
+    setting = "all on" if without == ALL else f"`{without}` off"
+    cells = (f"{detector}, {setting}", cell("mean_abs_error_m", 1, 3, " m"), cell("missed", 100, 1, " %"),
              cell("false_per_minute", 1, 1), cell("balanced_accuracy", 100, 0, " %"), f"{result['lag_s']:.2f} s")
     return f"| {' | '.join(cells)} |"
 
 
 def main() -> None:
-    """Each row as it is done."""
+    """Print each row as it is done."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/simulated"), help="finished rows are kept here")
     parser.add_argument("--scenario", default=simulated.SCENARIO, help="default paper-mixed")

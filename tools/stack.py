@@ -12,6 +12,7 @@ import re
 from functools import cache
 from pathlib import Path
 
+#: lines of a call graph: function and bytes of its frame; caller and callee
 NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?(\d+) bytes \((\w+)')
 EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 
@@ -30,6 +31,7 @@ def deepest(folder: Path, entry: str) -> tuple[int, list[str], set[str]]:
 
     @cache
     def depth(name: str) -> tuple[int, tuple[str, ...]]:
+        """Bytes of the deepest chain from a function on, and its functions."""
         if name == "assertFail":
             return 0, (name,)
         if name not in frames:

@@ -26,20 +26,21 @@ from airtouch.simulation import scenario
 from airtouch.twin import adapt, files
 from airtouch.twin.recorded.missions import shorten
 
-COMMAND = "tools/train_without_acceleration.py"
-LACKED = ("acceleration",)
+COMMAND = "tools/train_without_acceleration.py"  #: in the model's metadata
+ABSENT = ("acceleration",)  #: sensors that the detector does without
 
 
 def fit(flights: Sequence[adapt.Flight], twin: Path, air: Sequence[FlightLog], least: float, seed: int) -> BestModel:
     """The detector; its lag is that of the recorded flights. air: flights of any vehicle without edges."""
     scene, craft = scenario.load(twin / files.SCENARIO), vehicle.load(str(twin / files.VEHICLE))
-    flown, _ = adapt.simulated_flights(flights, shorten(scene, least, seed), craft, seed, None)
-    recorded, simulated = ([sensors.without(log, LACKED) for log in logs]
-                           for logs in ([f.log for f in flights], flown.logs))
+    twin_flights, _ = adapt.simulated_flights(flights, shorten(scene, least, seed), craft, seed, None)
+    recorded, simulated = ([sensors.without(log, ABSENT) for log in logs]
+                           for logs in ([f.log for f in flights], twin_flights.logs))
     own = [None] * len(recorded)
     weights = [len(simulated) / len(recorded)] * len(recorded) + [1.0] * len(simulated)
-    return best.fit([*recorded, *simulated], seed, pseudo_labels=[*own, *flown.edges], emphasis=weights, free_air=air,
-                    decoder=adapt.DECODER, steps=adapt.STEPS["scratch"], command=COMMAND, lag_of=(recorded, own))
+    return best.fit([*recorded, *simulated], seed, pseudo_labels=[*own, *twin_flights.edges], emphasis=weights,
+                    free_air=air, decoder=adapt.DECODER, steps=adapt.STEPS["scratch"], command=COMMAND,
+                    lag_of=(recorded, own))
 
 
 def main() -> None:

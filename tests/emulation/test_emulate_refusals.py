@@ -163,7 +163,7 @@ def test_a_kept_flight_that_is_damaged_is_named(tmp_path):
 
 
 def test_an_image_that_was_not_built_is_asked_for(monkeypatch, tmp_path):
-    monkeypatch.setattr(build, "BUILT", tmp_path)
+    monkeypatch.setattr(build, "FIRMWARE", tmp_path)
     with pytest.raises(AirTouchError, match="no image is built yet: leave out --built"):
         build.link()
     (tmp_path / "image").write_text("build/firmware/cf2.bin\n")

@@ -69,7 +69,7 @@ def test_the_deck_frames_takes_turns_and_answers():
     wire.handlers["U"](whole[5:] + bytes([xor]))
     assert deck.sent == [reset] and wire.said == [CLEAR], "it may go on; the answer waits for its turn"
     wire.handlers["U"](CLEAR)
-    reply, = deck.taken()
+    reply, = deck.step_packets()
     assert wire.said[-1] == frame(reply) and frame(reply)[2:4] == bytes([1 | 4 << 3 | 1 << 6, 5])
     core.receive(reply)
     core.step([0.0, 0.0, 9.8], [0.0, 0.0, 0.0], [40_000.0] * 4)

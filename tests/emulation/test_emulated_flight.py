@@ -89,8 +89,8 @@ def test_set_points_are_packets_in_the_drones_own_axes():
 
 
 def test_a_command_that_differs_is_counted():
-    one = flight.Flown(pwm=np.full((100, 4), 40_000, np.uint16))
-    other = flight.Flown(pwm=one.pwm.copy())
+    one = flight.EmulatedFlight(pwm=np.full((100, 4), 40_000, np.uint16))
+    other = flight.EmulatedFlight(pwm=one.pwm.copy())
     assert compare.differing(one, other)[0] == 0
     other.pwm[60, 2] += 3
     assert compare.differing(one, other) == (1, 100, 60, 3)
@@ -168,7 +168,7 @@ def test_flights_that_were_kept_are_not_flown_again(monkeypatch, tmp_path, capsy
         flown.append(seed)
         table = np.zeros((3, flight.COLUMNS))
         table[:, flight.T] = 5.0
-        return flight.Flown(table=table, edges=[(5.0, "entry", 0.1)])
+        return flight.EmulatedFlight(table=table, edges=[(5.0, "entry", 0.1)])
 
     monkeypatch.setattr(height, "fly", fly)
     elf = tmp_path / "board.elf"
@@ -210,27 +210,27 @@ def test_loops_apart_by_an_offset_and_by_other_noise():
     table[:, flight.T] = 0.01 * np.arange(-10, 110)
     table[:, flight.TRUE_X + 2] = 0.3
     table[:, flight.MOTOR] = 1000.0 * (-1.0) ** np.arange(120)
-    pair = side_by_side.together(flight.Flown(table=table), own, 0.2, 0.5)
+    pair = side_by_side.together(flight.EmulatedFlight(table=table), own, 0.2, 0.5)
     assert [len(part) for part in pair] == [30, 30] and pair[0][0, flight.T] == pytest.approx(0.2)
     other = own[:30].copy()
     other[:, log_row.PWM] = 5.0
-    rows = {row.channel: row for row in side_by_side.apart([pair, (pair[0], other)])}
+    rows = {row.channel: row for row in side_by_side.differences([pair, (pair[0], other)])}
     assert (rows["z, m"].loops, rows["z, m"].emulated, rows["z, m"].draws) == pytest.approx((0.3, 0.0, 0.0))
     assert rows["motor 1, PWM"].emulated == pytest.approx(1000.0) and rows["motor 1, PWM"].draws == pytest.approx(5.0)
-    assert rows["motor 2, PWM"].loops == 0.0 and np.isnan(side_by_side.apart([pair])[0].draws)
-    rows = {row.channel: row for row in side_by_side.apart([pair], [other])}
+    assert rows["motor 2, PWM"].loops == 0.0 and np.isnan(side_by_side.differences([pair])[0].draws)
+    rows = {row.channel: row for row in side_by_side.differences([pair], [other])}
     assert rows["motor 1, PWM"].draws == pytest.approx(5.0) and rows["motor 1, PWM"].own == 0.0
 
 
 def test_traces_are_written_side_by_side_and_not_over_others(tmp_path):
     own = np.zeros((50, log_row.COLUMNS))
     table = np.ones((50, flight.COLUMNS))
-    side_by_side.write_traces(tmp_path / "traces.csv", flight.Flown(table=table), own)
+    side_by_side.write_traces(tmp_path / "traces.csv", flight.EmulatedFlight(table=table), own)
     head, *rows = (tmp_path / "traces.csv").read_text().splitlines()
     assert head.startswith("t_s,x m emulated,x m own,") and len(rows) == 50
     assert rows[0].split(",")[:3] == ["1", "1", "0"] and len(head.split(",")) == len(rows[0].split(","))
     with pytest.raises(AirTouchError, match="exists already; use --force"):
-        side_by_side.write_traces(tmp_path / "traces.csv", flight.Flown(table=table), own)
+        side_by_side.write_traces(tmp_path / "traces.csv", flight.EmulatedFlight(table=table), own)
 
 
 @pytest.mark.slow
@@ -243,14 +243,14 @@ def test_the_firmware_flies_and_the_app_changes_no_command(image):
     assert np.abs(hover[:, 3] - 0.5).max() < 0.12 and np.abs(hover[:, 1:3]).max() < 0.3
     assert compare.differing(on, off)[:2] == (0, len(off.pwm)) and len(on.pwm) == len(off.pwm)
     assert (on.pwm == again.pwm).all() and on.pwm.max() > 20_000
-    assert on.late == 0 and min(on.left.values()) > 0
+    assert on.late == 0 and min(on.free_words.values()) > 0
 
 
 @pytest.mark.slow
 def test_the_height_is_kept_over_a_platform_where_it_is_asked_for(image):
     case = height.CASES[0]
-    low, high = height.kept(flight.fly(image, height.mission(case), compare.vehicle(), 1,
+    low, high = height.height_range(flight.fly(image, height.mission(case), compare.vehicle(), 1,
                                        parameters={"atHeight.enable": 1}))
     assert 0.7 < low < high < 0.95
     stock = flight.fly(image, height.mission(case), compare.vehicle(), 1)
-    assert height.kept(stock)[1] > 1.2, "the shipped firmware climbs"
+    assert height.height_range(stock)[1] > 1.2, "the shipped firmware climbs"

@@ -30,4 +30,4 @@ def test_a_build_without_sizes_ends_it():
 
 def test_a_build_with_a_warning_ends_it():
     with pytest.raises(SystemExit, match="warning: x"):
-        firmware_sizes.made("sh", "-c", "echo 'a.c:1: warning: x' >&2")
+        firmware_sizes.build_output("sh", "-c", "echo 'a.c:1: warning: x' >&2")

@@ -30,6 +30,7 @@ from tools.emulate.compare import report
 from tools.emulate.replay import VEHICLES, Replay, replay, rows
 
 RECORDED = "airtouch/imu_data_02*h79*"  #: low and high entries of one day
+#: what is said where the checkout is not given
 NO_BASE = f"say where the firmware's sources are: make emulate CRAZYFLIE_BASE=~/crazyflie-firmware; {build.CLONE}"
 #: step -> parameters: three that are taken over, one out of range, the other detector and back
 CHANGES: dict[int, dict[str, float]] = {
@@ -91,30 +92,30 @@ class Parser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
-    """What the command takes. An option that is not given is None or False, so that `given` can refuse it where it
+    """What the command takes. An option that is not given is None or False, so that `fits` can refuse it where it
     has no part."""
-    found = Parser(prog="python -m tools.emulate", description=__doc__,
-                   formatter_class=argparse.RawDescriptionHelpFormatter)
-    found.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
-    found.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
-    what = found.add_mutually_exclusive_group()
+    arguments = Parser(prog="python -m tools.emulate", description=__doc__,
+                       formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("base", type=Path, help="checkout of bitcraze/crazyflie-firmware")
+    arguments.add_argument("flights", nargs="*", type=Path, help="flight logs; recorded ones if left out")
+    what = arguments.add_mutually_exclusive_group()
     what.add_argument("--fly", action="store_true", help="closed loop with the simulator instead: the app on and off")
     what.add_argument("--height", action="store_true",
                       help="closed loop over edges of every kind: the height kept or not")
     what.add_argument("--gap8", action="store_true",
                       help="a recorded flight with the AI-deck's driver, the network on the GAP8, and faults")
-    found.add_argument("--steps", type=number(1), help="of each recorded flight (2400)")
-    found.add_argument("--begin", type=number(0), help="first row of each recorded flight (0)")
-    found.add_argument("--seeds", type=number(1), help="of --fly and --height: draws of the noise (1)")
-    found.add_argument("--traces", type=Path, help="of --fly: CSV for the first flight and the simulator's own")
-    found.add_argument("--force", action="store_true", help="of --traces: overwrite the file")
-    found.add_argument("--only", help="of --height: cases whose names begin so")
-    found.add_argument("--keep", type=Path, help="of --height: folder of its flights; those that are there are not "
-                                                 "flown again, unless the image or the mission has changed")
-    found.add_argument("--built", action="store_true", help="take what `make firmware` built last")
-    found.add_argument("--config", help="of firmware/app: app-config-tap and the like")
-    found.add_argument("--platform", choices=VEHICLES, help="of the firmware (cf2)")
-    return found
+    arguments.add_argument("--steps", type=number(1), help="of each recorded flight (2400)")
+    arguments.add_argument("--begin", type=number(0), help="first row of each recorded flight (0)")
+    arguments.add_argument("--seeds", type=number(1), help="of --fly and --height: draws of the noise (1)")
+    arguments.add_argument("--traces", type=Path, help="of --fly: CSV for the first flight and the simulator's own")
+    arguments.add_argument("--force", action="store_true", help="of --traces: overwrite the file")
+    arguments.add_argument("--only", help="of --height: cases whose names begin so")
+    arguments.add_argument("--keep", type=Path, help="of --height: folder of its flights; those that are there are not "
+                                                     "flown again, unless the image or the mission has changed")
+    arguments.add_argument("--built", action="store_true", help="take what `make firmware` built last")
+    arguments.add_argument("--config", help="of firmware/app: app-config-tap and the like")
+    arguments.add_argument("--platform", choices=VEHICLES, help="of the firmware (cf2)")
+    return arguments
 
 
 def fits(options: argparse.Namespace) -> None:
@@ -144,7 +145,7 @@ def fits(options: argparse.Namespace) -> None:
             raise AirTouchError(f"--{name} needs app-config-{name}: leave out --config {options.config}")
 
 
-def given(options: argparse.Namespace) -> list[FlightLog]:
+def flights_of(options: argparse.Namespace) -> list[FlightLog]:
     """The flights of the command line from --begin on. AirTouchError, before anything is built, for what cannot be
     run."""
     fits(options)
@@ -165,19 +166,19 @@ def replayed(elf: Path, logs: Sequence[FlightLog], steps: int) -> int:
     different = 0
     for i, log in enumerate(logs):
         changes: dict[int, dict[str, float]] = CHANGES if i == len(logs) - 1 else {}
-        begun = time.monotonic()
-        found = replay(elf, log, steps, changes, VEHICLES[build.platform()])
+        start_s = time.monotonic()
+        result = replay(elf, log, steps, changes, VEHICLES[build.platform()])
         name = Path(str(log.meta.get("source", "simulated"))).name + (", parameters changed in flight" if changes
                                                                       else "")
-        show(name, time.monotonic() - begun, found)
-        different += found.different
+        show(name, time.monotonic() - start_s, result)
+        different += result.different
     return different
 
 
 def main(arguments: list[str]) -> int:
     """Build, run, print. 1 where a step differs."""
     options = parser().parse_intermixed_args(arguments)
-    logs = given(options)
+    logs = flights_of(options)
     build.tools()
     if not options.built:
         config = "app-config-height" if options.height else "app-config-gap8" if options.gap8 else "app-config"

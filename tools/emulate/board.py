@@ -21,6 +21,7 @@ from tools.emulator.elf import Elf
 SHIFT = 3  #: an instruction takes 2^3 ns: 125 million a second, as 168 MHz at 1.34 cycles each
 PER_US = 1000 >> SHIFT  #: instructions a microsecond of the firmware's clock
 PATIENCE_S = 120.0  #: of ours, for one frame
+#: modes: the app's samples from the desktop; sensors from the desktop, motors to it
 REPLAY, FLY = b"R", b"F"
 FLOAT, SIGNED = 7, (4, 5, 6)  #: types of the firmware's log
 
@@ -153,8 +154,8 @@ class Board:
 
     def _ended(self) -> str:
         """The exit code of the board and the end of its output, in words."""
-        said = self._qemu.communicate()[0].decode(errors="replace")
-        return f"has stopped with code {self._qemu.returncode}. {said[-1000:]}"
+        output = self._qemu.communicate()[0].decode(errors="replace")
+        return f"has stopped with code {self._qemu.returncode}. {output[-1000:]}"
 
     def values(self, report: bytes) -> dict[str, float]:
         """A report: `ms` of its clock, `latency` of the stabilizer's worst step since the last one, and the names'."""

@@ -15,10 +15,11 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 
-ROOT = Path(__file__).resolve().parents[2]
-BUILT = ROOT / "build" / "firmware"
-OUT = ROOT / "build" / "emulate"
+ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
+FIRMWARE = ROOT / "build" / "firmware"  #: what `make firmware` built
+OUT = ROOT / "build" / "emulate"  #: the board's objects and the image
 RELEASE = "2026.08"  #: the one that the board was written for
+#: how to get the firmware's sources
 CLONE = (f"git clone --recursive --branch {RELEASE} https://github.com/bitcraze/crazyflie-firmware "
          "~/crazyflie-firmware")
 #: functions of drivers, whose place the board's take
@@ -37,6 +38,7 @@ WRAPPED = (
 #: functions of hardware that is not there, which do nothing and return 0
 LEFT_OUT = ("i2cdevInit", "i2cdevRead", "i2cdevReadReg8", "i2cdevReadReg16", "i2cdevWrite", "i2cdevWriteReg8",
             "i2cdevWriteReg16", "usblinkInit", "adcInit", "buzzerInit", "watchdogInit")
+#: the compiler's flags of the STM32F405
 CORE = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 #: platform -> what the factory writes into the processor for it, by which the firmware knows its board
 DEVICES = {"cf2": "0;CF21", "cf21bl": "0;C21B"}
@@ -62,11 +64,12 @@ def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf
     """`make firmware` of this checkout; what it printed. Another platform than cf2 gets FR-CFAR alone."""
     if not (base / "tools/make/oot.mk").is_file():
         raise AirTouchError(f"{base} is no checkout of bitcraze/crazyflie-firmware (no tools/make/oot.mk): {CLONE}")
-    found = release(base) if (base / ".git").exists() else "unknown"
-    if found == "unknown":
+    checkout = release(base) if (base / ".git").exists() else "unknown"
+    if checkout == "unknown":
         raise AirTouchError(f"{base} does not say which release it is, and the board is written for {RELEASE}: {CLONE}")
-    if not re.fullmatch(rf"{RELEASE}(-\d+-g[0-9a-f]+)?", found):
-        raise AirTouchError(f"{base} is {found}, the board is written for {RELEASE}: git -C {base} checkout {RELEASE}")
+    if not re.fullmatch(rf"{RELEASE}(-\d+-g[0-9a-f]+)?", checkout):
+        raise AirTouchError(f"{base} is {checkout}, the board is written for {RELEASE}: git -C {base} checkout "
+                            f"{RELEASE}")
     if sys.stderr.isatty():
         print(f"compiling the firmware, {platform} with {config}: a minute", file=sys.stderr)
     networks = "" if platform == "cf2" else "no"
@@ -75,16 +78,17 @@ def compile_firmware(base: Path, config: str = "app-config", platform: str = "cf
                          capture_output=True, text=True)
     if run.returncode:
         lines = run.stderr.splitlines()
-        said = [line.removeprefix("make firmware: ") for line in lines if line.startswith("make firmware: ")]
+        reasons = [line.removeprefix("make firmware: ") for line in lines if line.startswith("make firmware: ")]
         wrong = [line for line in lines if "error" in line.lower()] or lines or ["it did not say why"]
-        raise AirTouchError(said[0] if said else f"the firmware does not compile: {wrong[0]}; for all of it: make "
-                                                 f"firmware CRAZYFLIE_BASE={base} CONFIG={config} PLATFORM={platform}")
+        raise AirTouchError(reasons[0] if reasons else
+                            f"the firmware does not compile: {wrong[0]}; for all of it: make firmware "
+                            f"CRAZYFLIE_BASE={base} CONFIG={config} PLATFORM={platform}")
     return run.stdout
 
 
 def platform() -> str:
     """The platform of the last `make firmware`."""
-    image = BUILT / "image"
+    image = FIRMWARE / "image"
     if not image.is_file():
         raise AirTouchError("no image is built yet: leave out --built")
     return Path(image.read_text().strip()).stem.split("-")[0]
@@ -92,16 +96,16 @@ def platform() -> str:
 
 def _flags() -> tuple[list[str], Path]:
     """How the firmware compiled the app, less what belongs to that file; the checkout."""
-    command = (BUILT / "firmware/app/src/.airtouch_app.o.cmd").read_text().splitlines()[0].split(":=", 1)[1].split()
-    kept = [word for word in command[1:] if re.match(r"-[IDmf]", word) and "KBUILD_" not in word]
-    base = next(word[2:] for word in kept if word.endswith("/src/config"))
-    return kept, Path(base).parents[1]
+    command = (FIRMWARE / "firmware/app/src/.airtouch_app.o.cmd").read_text().splitlines()[0].split(":=", 1)[1].split()
+    flags = [word for word in command[1:] if re.match(r"-[IDmf]", word) and "KBUILD_" not in word]
+    base = next(word[2:] for word in flags if word.endswith("/src/config"))
+    return flags, Path(base).parents[1]
 
 
 def _objects() -> list[Path]:
     """The objects of the firmware's last link, each for itself: what was joined to built-in.o on the way is taken
     apart, since a name that is defined in the same object cannot be replaced."""
-    where = BUILT / "firmware/app/build"
+    where = FIRMWARE / "firmware/app/build"
 
     def parts(path: Path) -> list[Path]:
         """The object files that were linked into one, from the build's command files."""
@@ -118,7 +122,7 @@ def _objects() -> list[Path]:
 def link(needs: str = "") -> Path:
     """The image, from the last `make firmware`. AirTouchError where that lacks an object of the app that is needed."""
     device = f'-DDEVICE="{DEVICES[platform()]}"'
-    if needs and not (BUILT / f"firmware/app/src/{needs}.o").is_file():
+    if needs and not (FIRMWARE / f"firmware/app/src/{needs}.o").is_file():
         raise AirTouchError(f"the image that was built last is without {needs}.c: leave out --built")
     flags, base = _flags()
     OUT.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ from airtouch.simulation.flight_plan.world import top_at
 from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.vehicle import Vehicle
 from tools.emulate import side_by_side
-from tools.emulate.flight import BOOT_S, TRUE_X, Flown, T, fly
+from tools.emulate.flight import BOOT_S, TRUE_X, EmulatedFlight, T, fly
 from tools.emulate.plant import STEP_S
 from tools.emulate.replay import VEHICLES
 
@@ -20,6 +20,7 @@ DRAWS = 3  #: seeds of the own loop whose flights are held against each other
 AIRBORNE_S = 2.5  #: of there-and-back: the take-off has ended
 #: of there-and-back: end of the take-off's swing, seconds of the landing at the end
 SETTLED_S, LAND_S = 4.5, 3.5
+#: the mission there and back
 SCENARIO = Path(__file__).with_name("there-and-back.toml")
 
 
@@ -28,27 +29,27 @@ def vehicle(platform: str = "cf2") -> Vehicle:
     return replace(vehicles.load(VEHICLES[platform]), range_module="firmware")
 
 
-def crossings(flown: Scenario, seed: int, flight: int, table: np.ndarray) -> list[tuple[float, str]]:
+def crossings(plan: Scenario, seed: int, flight: int, table: np.ndarray) -> list[tuple[float, str]]:
     """(s, kind) at which the drone crossed the platform's edges in truth."""
-    ground = draw_flight(flown, seed, flight).world
+    ground = draw_flight(plan, seed, flight).world
     over = np.array([top_at(ground, x, y) > 0.01 for x, y in table[:, 1:3]])
     at = np.flatnonzero(np.diff(over.astype(int)))
     return [(float(table[i + 1, 0]), "entry" if over[i + 1] else "exit") for i in at]
 
 
-def first_edge(flown: Scenario, seed: int, table: np.ndarray) -> float:
+def first_edge(plan: Scenario, seed: int, table: np.ndarray) -> float:
     """Second at which the drone crossed its first edge in truth; infinite where it crossed none."""
-    edges = crossings(flown, seed, 0, table)
+    edges = crossings(plan, seed, 0, table)
     return edges[0][0] if edges else np.inf
 
 
-def cruise(one: Flown) -> np.ndarray:
+def cruise(one: EmulatedFlight) -> np.ndarray:
     """Rows between take-off and landing; to the end where it did not end well."""
     t = one.table[:, T]
     return one.table[(t >= SETTLED_S) & (t < (t[-1] - LAND_S if one.ending == "ok" else np.inf))]
 
 
-def kept(one: Flown) -> tuple[float, float]:
+def height_range(one: EmulatedFlight) -> tuple[float, float]:
     """Least and greatest true height over the floor between take-off and landing, m."""
     heights = cruise(one)[:, TRUE_X + 2]
     return (float(heights.min()), float(heights.max())) if len(heights) else (np.nan, np.nan)
@@ -59,7 +60,7 @@ def words(edges: Sequence[tuple[float, str]]) -> str:
     return " ".join(f"{kind}@{t:.2f}" for t, kind in edges) or "none"
 
 
-def differing(one: Flown, other: Flown) -> tuple[int, int, int, int]:
+def differing(one: EmulatedFlight, other: EmulatedFlight) -> tuple[int, int, int, int]:
     """Motor commands that differ, of how many, the first, and the most by which that one does."""
     n = min(len(one.pwm), len(other.pwm))
     gap = np.abs(one.pwm[:n].astype(int) - other.pwm[:n]).max(axis=1)
@@ -72,10 +73,10 @@ class Mission:
     """There-and-back of one seed: with the app and without, then both with a clock of whole milliseconds."""
 
     seed: int
-    on: Flown
-    off: Flown
-    coarse_on: Flown
-    coarse_off: Flown
+    on: EmulatedFlight
+    off: EmulatedFlight
+    coarse_on: EmulatedFlight
+    coarse_off: EmulatedFlight
     own: np.ndarray  #: side_by_side.own_loop
 
     def same(self) -> bool:
@@ -84,7 +85,7 @@ class Mission:
                 and len(self.coarse_on.pwm) == len(self.coarse_off.pwm))
 
 
-def flown(elf: Path, drone: Vehicle, seed: int) -> Mission:
+def fly_mission(elf: Path, drone: Vehicle, seed: int) -> Mission:
     """Fly there and back."""
     plan = scenario.load(SCENARIO)
     on, off, coarse_on, coarse_off = (fly(elf, plan, drone, seed, app=app, whole_milliseconds=coarse)
@@ -104,7 +105,7 @@ def show(one: Mission) -> None:
     print(f"stabilizer, sensor to motors: worst {one.on.latency_us} us with the app, {one.off.latency_us} us without, "
           f"median {np.median(one.on.latencies_us):.0f} us; app: late {one.on.late}, longest step {one.on.load_us} us")
     for what, two in (("with the app", one.on), ("the same, whole milliseconds", one.coarse_on)):
-        low, high = kept(two)
+        low, high = height_range(two)
         true = crossings(plan, one.seed, 0, two.table)
         print(f"{what}: {low:.2f} to {high:.2f} m over the floor; edges crossed {words(true)}, felt "
               f"{words([(t, kind) for t, kind, _ in two.edges])} (s)", flush=True)
@@ -124,11 +125,11 @@ def show_side_by_side(missions: Sequence[Mission], drone: Vehicle) -> None:
     for seed in range(len(missions) + 1, DRAWS + 1):
         own = side_by_side.own_loop(plan, drone, seed)
         until_s = first_edge(plan, seed, side_by_side.places(own))
-        others.append(side_by_side.together(Flown(table=missions[0].on.table), own, AIRBORNE_S, until_s)[1])
+        others.append(side_by_side.together(EmulatedFlight(table=missions[0].on.table), own, AIRBORNE_S, until_s)[1])
     print(f"beside the simulator's own loop, {seconds:.1f} s of {len(pairs)} flights from {AIRBORNE_S} s to the first "
           f"edge, rms:\n  channel             between the loops, same noise"
           "   own loop, other noise   scatter: emulated   own")
-    for row in side_by_side.apart(pairs, others):
+    for row in side_by_side.differences(pairs, others):
         print(f"  {row.channel:20}{row.loops:12.3g}{row.draws:36.3g}{row.emulated:20.3g}{row.own:12.3g}")
 
 
@@ -139,7 +140,7 @@ def report(elf: Path, platform: str = "cf2", seeds: int = 1, traces: Path | None
     """
     missions = []
     for seed in range(1, seeds + 1):
-        missions.append(flown(elf, vehicle(platform), seed))
+        missions.append(fly_mission(elf, vehicle(platform), seed))
         show(missions[-1])
     show_side_by_side(missions, vehicle(platform))
     if traces:

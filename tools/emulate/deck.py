@@ -44,7 +44,7 @@ def frame(packet: bytes) -> bytes:
 class Deck:
     """`Deck(board, faults)` answers what the board sends; `turn(step)` is called before each step of the app.
 
-    sent: packets of the app that came over the UART. `taken()`: what a step of the app that has ended was given.
+    sent: packets of the app that came over the UART. `step_packets()`: what a step of the app that has ended was given.
     """
 
     board: Board
@@ -73,7 +73,7 @@ class Deck:
         self._flush()
         self._begins = False
 
-    def taken(self) -> list[bytes]:
+    def step_packets(self) -> list[bytes]:
         """The packets that the step which has just ended was given."""
         now, self._arrived, self._next = self._arrived, self._next, []
         return now

@@ -29,25 +29,30 @@ NO_RANGE_MM = 8190  #: what a VL53L1 says where it sees nothing
 RADIO_RAW, BATTERY_STATE, COMMANDER, STOP, HOVER = 0x00, 0x13, 7, 0, 5  #: syslink and CRTP
 ARM = b"\x01\x01"  #: the supervisor's command that arms, which platforms with brushless motors wait for
 ARM_S = 1.0  #: before the mission begins
+#: CRTP port and channel of the supervisor; platforms that need no command
 SUPERVISOR, SUPERVISOR_COMMAND, ARMS_ITSELF = 9, 1, ("cf2", "")
+#: CRTP port and channel of parameters by name; types of the firmware
 PARAM, BY_NAME, UINT8, FLOAT = 2, 3, 0x08, 0x06
+#: log variables
 MOTORS = tuple(f"motor.m{i}" for i in range(1, 5))
 ESTIMATE = tuple(f"stateEstimate.{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw"))
 IMU = tuple(f"{sensor}.{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
 IMU_UNITS = np.repeat([9.81, np.deg2rad(1.0)], 3)  #: m/s^2 and rad/s in those of IMU
+#: log variables of each report
 WATCHED = (*MOTORS, *ESTIMATE, "range.zrange", "pm.vbat", "airtouch.steps", "airtouch.edges", "airtouch.edge",
            "airtouch.late", "airtouch.loadMax", "airtouch.health", "supervisor.info", *IMU)
-#: first columns of Flown.table; those that begin with TRUE are the simulator's
+#: first columns of EmulatedFlight.table; those that begin with TRUE are the simulator's
 T, TRUE_X, MOTOR, X, DOWN, TOP, TRUE_VELOCITY, TRUE_ANGLES, ACC, GYRO, COLUMNS = 0, 1, 4, 8, 17, 18, 19, 22, 25, 28, 31
 
 
 @dataclass
-class Flown:
+class EmulatedFlight:
     """A flight in emulation: rows at 100 Hz and what happened.
 
     table (rows, 31): t_s (mission), true x, y, z (m), four motors, the nine of ESTIMATE, down range (m), height of
     what is below it (m), true velocity (m/s), true roll, pitch and yaw (rad), acc (m/s^2) and gyro (rad/s) as logged.
-    pwm: (n, 4) motors every 2 ms, from the first tick on. edges: (s of the mission, kind, true x).
+    pwm: (n, 4) motors every 2 ms, from the first tick on. edges: (s of the mission, kind, true x). free_words: stack
+    that each task never used.
     """
 
     table: np.ndarray = field(default_factory=lambda: np.zeros((0, COLUMNS)))
@@ -57,7 +62,7 @@ class Flown:
     latencies_us: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint32))
     late: int = 0
     load_us: int = 0
-    left: dict[str, int] = field(default_factory=dict)
+    free_words: dict[str, int] = field(default_factory=dict)
     ending: str = "ok"
     console: str = ""
 
@@ -122,7 +127,7 @@ class _Radio:
 
 
 def log_row(now_s: float, plant: Plant, values: Mapping[str, float]) -> list[float]:
-    """A row of Flown.table. values: of WATCHED."""
+    """A row of EmulatedFlight.table. values: of WATCHED."""
     return [now_s, *plant.place, *(values[name] for name in MOTORS), *(values[name] for name in ESTIMATE),
             values["range.zrange"] / 1000.0, plant.top, *plant.velocity, *plant.angles,
             *(IMU_UNITS * [values[name] for name in IMU])]
@@ -130,7 +135,7 @@ def log_row(now_s: float, plant: Plant, values: Mapping[str, float]) -> list[flo
 
 def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: int = 0, *, app: bool = True,
         whole_milliseconds: bool = False, parameters: Mapping[str, float] | None = None,
-        blind_s: Sequence[tuple[float, float]] = ()) -> Flown:
+        blind_s: Sequence[tuple[float, float]] = ()) -> EmulatedFlight:
     """One flight of a scenario by the emulated firmware.
 
     app, whole_milliseconds: Board. parameters: set by radio before take-off. blind_s: seconds of the mission in which
@@ -138,7 +143,7 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
     """
     plan = draw_flight(scenario, seed, flight)
     plant = Plant(plan, vehicle, seed, flight, choose(plan))
-    flown, rows, pwm, latencies = Flown(), [], [], []
+    result, rows, pwm, latencies = EmulatedFlight(), [], [], []
     rest, wait, edges = np.zeros(2), int(BOOT_S / at.STEP_S), 0
     at_rest(plant, True)
     with Board(elf, FLY, WATCHED, app=app, whole_milliseconds=whole_milliseconds) as board:
@@ -154,7 +159,7 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
                 at_rest(plant, False)
             ending = plant.step(motors)
             if ending != loop.OK:
-                flown.ending = f"{loop.ENDINGS[ending]} after {now:.2f} s"
+                result.ending = f"{loop.ENDINGS[ending]} after {now:.2f} s"
                 break
             if any(begin <= now < end for begin, end in blind_s):
                 plant.readings[at.RANGE] = np.nan
@@ -164,18 +169,18 @@ def fly(elf: Path, scenario: Scenario, vehicle: Vehicle, seed: int = 0, flight: 
                 rows.append(log_row(now, plant, values))
             if values["airtouch.edges"] > edges:
                 edges = int(values["airtouch.edges"])
-                flown.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))
+                result.edges.append((now, EDGES[int(values["airtouch.edge"])], float(plant.place[0])))
             board.go()
-        flown.late, flown.load_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
-        if flown.ending == "ok":
+        result.late, result.load_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
+        if result.ending == "ok":
             board.hear("M")
-            flown.left = board.end()
-        flown.console = board.console
-    flown.table, flown.pwm, flown.latencies_us = np.array(rows), np.array(pwm, np.uint16), np.array(latencies)
-    flown.latency_us = int(flown.latencies_us.max(initial=0))
-    if "Self test passed!" not in flown.console:
-        raise AirTouchError("the firmware's self-test failed; the console said:\n" + flown.console[-1000:])
-    return flown
+            result.free_words = board.end()
+        result.console = board.console
+    result.table, result.pwm, result.latencies_us = np.array(rows), np.array(pwm, np.uint16), np.array(latencies)
+    result.latency_us = int(result.latencies_us.max(initial=0))
+    if "Self test passed!" not in result.console:
+        raise AirTouchError("the firmware's self-test failed; the console said:\n" + result.console[-1000:])
+    return result
 
 
 def at_rest(plant: Plant, begins: bool) -> None:

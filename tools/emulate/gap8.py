@@ -19,8 +19,10 @@ from tools.emulate.board import REPLAY, Board
 from tools.emulate.deck import Deck, Faults
 from tools.emulate.replay import FED, VEHICLE, Replay, compare, desktop_values, rows, sample, stack
 
+#: parameter of the detector whose network is on the GAP8
 DETECTOR = DETECTORS.index("best-gap8")
 NONCE = slice(8, 12)  #: of the first packet, a RESET (edge_link.h)
+#: what goes wrong in each flight
 CASES = {
     "a GAP8 that answers": Faults(),
     "answers 8 steps late": Faults(late=8),
@@ -31,7 +33,9 @@ CASES = {
     "an AI-deck that never answers": Faults(there=False),
 }
 
+#: a wrong byte on the UART, which CPX asserts against
 WRONG_BYTE = Faults(wrong_byte=100)
+#: counters of the log that are printed
 COUNTERS = ("answers", "lag", "lost", "dropped", "timeouts", "resets")
 
 
@@ -59,7 +63,7 @@ class _Step:
 
 def replay(elf: Path, log: FlightLog, steps: int, faults: Faults) -> Linked:
     """Fly a recorded flight through the emulated firmware with the network on the GAP8."""
-    table, made, result = rows(log)[:steps], [], Linked()
+    table, board_steps, result = rows(log)[:steps], [], Linked()
     board = Board(elf, REPLAY, [f"airtouch.{name}" for name in LOGS], ai_deck=True)
     deck = Deck(board, faults)
     with board:
@@ -72,10 +76,10 @@ def replay(elf: Path, log: FlightLog, steps: int, faults: Faults) -> Linked:
             board.say("V", row.tobytes())
             board.go()
             values = board.values(board.hear("S"))
-            made.append(_Step(row, values, deck.taken()))
+            board_steps.append(_Step(row, values, deck.step_packets()))
         board.hear("A")
         free_words = board.end()
-    _follow(result, made, deck.sent)
+    _follow(result, board_steps, deck.sent)
     result.late, result.longest_us = int(values["airtouch.late"]), int(values["airtouch.loadMax"])
     result.console, (result.stack_bytes, result.least_left) = board.console, stack(free_words)
     result.link = LINK[int(values["airtouch.link"])]
@@ -84,15 +88,15 @@ def replay(elf: Path, log: FlightLog, steps: int, faults: Faults) -> Linked:
     return result
 
 
-def _follow(result: Linked, made: list[_Step], sent: list[bytes]) -> None:
+def _follow(result: Linked, board_steps: list[_Step], sent: list[bytes]) -> None:
     """Make the same steps on the desktop, and compare them and the packets.
 
     The board's nonce is in its first packet; that CPX's queue took no packet shows in the next step's `dropped`.
     """
     nonce = struct.unpack("<I", sent[0][NONCE])[0] if sent else 1
-    core, wanted = AppCore(have_gap8=True, nonce=nonce, vehicle=vehicles.load(VEHICLE)), []
+    core, expected = AppCore(have_gap8=True, nonce=nonce, vehicle=vehicles.load(VEHICLE)), []
     core.set_params(detector=DETECTOR)
-    for i, step in enumerate(made):
+    for i, step in enumerate(board_steps):
         for packet in step.packets:
             core.receive(packet)
         acc, gyro, pwm, volts, attitude = sample(step.row)
@@ -100,28 +104,28 @@ def _follow(result: Linked, made: list[_Step], sent: list[bytes]) -> None:
         if kind != EDGES[0]:
             result.edges.append((i, kind))
         compare(result, i, step.values, desktop_values(core))
-        after = made[min(i + 1, len(made) - 1)].values
-        wanted += core.packets(accepted=after["airtouch.dropped"] == step.values["airtouch.dropped"])
+        after = board_steps[min(i + 1, len(board_steps) - 1)].values
+        expected += core.packets(accepted=after["airtouch.dropped"] == step.values["airtouch.dropped"])
     result.packets = len(sent)
-    result.other_packets = sum(one != other for one, other in zip(sent, wanted, strict=False))
-    result.kept_packets = len(wanted) - len(sent)
+    result.other_packets = sum(one != other for one, other in zip(sent, expected, strict=False))
+    result.kept_packets = len(expected) - len(sent)
 
 
 def report(elf: Path, log: FlightLog, steps: int) -> bool:
     """Fly every case, print; whether no step and no packet differed, and the wrong byte was told."""
     well = True
     for what, faults in CASES.items():
-        found = replay(elf, log, steps, faults)
-        well = well and not found.different and not found.other_packets
-        task, words = found.least_left
-        print(f"{what}: {found.steps} steps, {found.different} differ, {found.packets} packets, {found.other_packets} "
-              f"differ, {found.kept_packets} still in queues; edges "
-              f"{' '.join(f'{kind}@{step}' for step, kind in found.edges) or 'none'}\n  link {found.link}, health: "
-              f"{', '.join(found.health) or 'good'}; " + ", ".join(f"{k} {v}" for k, v in found.counters.items())
-              + f"\n  late {found.late}, longest step {found.longest_us} us; app's stack {found.stack_bytes} of 1600 "
-              f"bytes, least left of any task {4 * words} ({task})", flush=True)
-        if found.first:
-            print(f"  first difference: {found.first}")
+        result = replay(elf, log, steps, faults)
+        well = well and not result.different and not result.other_packets
+        task, words = result.least_left
+        print(f"{what}: {result.steps} steps, {result.different} differ, {result.packets} packets, "
+              f"{result.other_packets} differ, {result.kept_packets} still in queues; edges "
+              f"{' '.join(f'{kind}@{step}' for step, kind in result.edges) or 'none'}\n  link {result.link}, health: "
+              f"{', '.join(result.health) or 'good'}; " + ", ".join(f"{k} {v}" for k, v in result.counters.items())
+              + f"\n  late {result.late}, longest step {result.longest_us} us; app's stack {result.stack_bytes} of "
+              f"1600 bytes, least left of any task {4 * words} ({task})", flush=True)
+        if result.first:
+            print(f"  first difference: {result.first}")
     try:
         replay(elf, log, steps, WRONG_BYTE)
     except AirTouchError as error:

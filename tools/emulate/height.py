@@ -14,13 +14,15 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.simulation import scenario
 from airtouch.simulation.scenario import Scenario
-from tools.emulate.compare import SCENARIO, crossings, cruise, kept, vehicle, words
+from tools.emulate.compare import SCENARIO, crossings, cruise, height_range, vehicle, words
 from tools.emulate.flight import TRUE_X, X, fly
 
 #: of there-and-back: height; how far it flies to land on the platform
 CRUISE_M, LAND_AT_M = 0.8, 1.5
+#: names of a flight without and with the height over a platform
 SETTINGS = ("as it ships", "atHeight.enable 1")
 MOST_DELAY_S = 2.5  #: a report further than this from every crossing of its kind is false
+#: a platform in a scenario file
 _PLATFORM = """[[platform]]
 shape = "rectangle"
 size_m = [{size}, 4.0]
@@ -50,7 +52,8 @@ def stairs(begin: float, end: float, top: float, count: int) -> tuple[tuple[floa
     return (*up, (end, end + far, top), *down)
 
 
-PLATFORM = ((0.575, 1.325, 0.76),)
+PLATFORM = ((0.575, 1.325, 0.76),)  #: surfaces of the platform of there-and-back
+#: missions that are flown
 CASES = (
     Case("platform 0.76 m high", PLATFORM),
     Case("platform 0.30 m high", ((0.575, 1.325, 0.30),)),
@@ -89,8 +92,8 @@ def delays(crossed: Sequence[tuple[float, str]], reported: Sequence[tuple[float,
     """Seconds by which reports follow their crossings (s, kind): of the same kind, one to one, within MOST_DELAY_S."""
     late = []
     for kind in ("entry", "exit"):
-        true, said = ([t for t, k in edges if k == kind] for edges in (crossed, reported))
-        late += [said[j] - true[i] for i, j in match(true, said, MOST_DELAY_S)]
+        true, felt = ([t for t, k in edges if k == kind] for edges in (crossed, reported))
+        late += [felt[j] - true[i] for i, j in match(true, felt, MOST_DELAY_S)]
     return np.array(late)
 
 
@@ -141,11 +144,11 @@ def _leg(elf: Path, case: Case, seed: int, on: int, platform: str, folder: Path 
         except (ValueError, TypeError):
             raise AirTouchError(f"{path} is damaged: delete it, and it is flown again") from None
     else:
-        flown = mission(case)
-        one = fly(elf, flown, vehicle(platform), seed, parameters={"atHeight.enable": on}, blind_s=case.blind_s)
-        low, high = kept(one)
+        plan = mission(case)
+        one = fly(elf, plan, vehicle(platform), seed, parameters={"atHeight.enable": on}, blind_s=case.blind_s)
+        low, high = height_range(one)
         last = cruise(one)[-1] if len(cruise(one)) else one.table[-1]
-        leg = Leg(one.ending, low, high, crossings(flown, seed, 0, one.table) if case.edges else [],
+        leg = Leg(one.ending, low, high, crossings(plan, seed, 0, one.table) if case.edges else [],
                   [(t, kind) for t, kind, _ in one.edges], float(last[TRUE_X]), float(last[X]),
                   one.latency_us)
         if path:

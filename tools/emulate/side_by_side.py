@@ -15,10 +15,10 @@ from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
 from airtouch.vehicle import Vehicle
 from tools.emulate import flight
-from tools.emulate.flight import BOOT_S, REST, Flown
+from tools.emulate.flight import BOOT_S, REST, EmulatedFlight
 
 ROWS_S = 100  #: rows a second
-#: channel -> first column in Flown.table, and in the simulator's log
+#: channel -> first column in EmulatedFlight.table, and in the simulator's log
 COLUMNS: Mapping[str, tuple[int, int]] = {
     **{f"{axis}, m": (flight.TRUE_X + i, log_row.POSITION + i) for i, axis in enumerate("xyz")},
     **{f"velocity {axis}, m/s": (flight.TRUE_VELOCITY + i, log_row.VELOCITY + i) for i, axis in enumerate("xyz")},
@@ -31,13 +31,13 @@ COLUMNS: Mapping[str, tuple[int, int]] = {
 }
 
 
-def own_loop(flown: Scenario, vehicle: Vehicle, seed: int, number: int = 0) -> np.ndarray:
+def own_loop(scenario: Scenario, vehicle: Vehicle, seed: int, number: int = 0) -> np.ndarray:
     """(rows, 33) of the simulator's log: the flight that `flight.fly` flies, by the simulator's own firmware.
 
     It stands on the floor as long before the mission, with the IMU as quiet, so that both draw the same noise. Rows
     begin with the mission and end where it does not go well.
     """
-    plan = draw_flight(flown, seed, number)
+    plan = draw_flight(scenario, seed, number)
     stepper = Stepper(plan, vehicle, seed, number, choose(plan))
     stepper.plant["flow_share"] = 1.0  # as plant.Plant
     stepper.begin(plan.setpoints[0])
@@ -54,14 +54,14 @@ def own_loop(flown: Scenario, vehicle: Vehicle, seed: int, number: int = 0) -> n
 
 
 def places(own: np.ndarray) -> np.ndarray:
-    """(rows, 4): second of the mission, x, y, z, as the first columns of Flown.table."""
+    """(rows, 4): second of the mission, x, y, z, as the first columns of EmulatedFlight.table."""
     return np.column_stack([own[:, log_row.T] - BOOT_S, own[:, log_row.POSITION:log_row.POSITION + 3]])
 
 
 Pair = tuple[np.ndarray, np.ndarray]  #: rows of the emulated flight, and the same rows of the simulator's own
 
 
-def together(one: Flown, own: np.ndarray, begin_s: float = 0.0, until_s: float = np.inf) -> Pair:
+def together(one: EmulatedFlight, own: np.ndarray, begin_s: float = 0.0, until_s: float = np.inf) -> Pair:
     """Rows of both from begin_s of the mission to until_s, as long as both fly."""
     table = one.table[one.table[:, flight.T] >= 0.0]
     rows = slice(round(begin_s * ROWS_S), round(min(until_s * ROWS_S, len(table), len(own))))
@@ -74,7 +74,7 @@ def rms(parts: Sequence[np.ndarray]) -> float:
 
 
 @dataclass(frozen=True)
-class Apart:
+class Difference:
     """A channel, rms: between the two loops under the same noise; between the own loop's flights under other noise;
     scatter of each loop's flights about their means."""
 
@@ -85,23 +85,23 @@ class Apart:
     own: float
 
 
-def apart(pairs: Sequence[Pair], others: Sequence[np.ndarray] = ()) -> list[Apart]:
-    """How far the loops are apart, for each of COLUMNS.
+def differences(pairs: Sequence[Pair], others: Sequence[np.ndarray] = ()) -> list[Difference]:
+    """Differences of the loops, for each of COLUMNS.
 
     others: more flights of the own loop under other noise, from the same second on. draws is NaN for one flight alone.
     """
     out = []
     for name, (a, b) in COLUMNS.items():
         emulated, own = [table[:, a] for table, _ in pairs], [table[:, b] for _, table in pairs]
-        drawn = own + [table[:, b] for table in others]
-        draws = [x[:min(len(x), len(y))] - y[:min(len(x), len(y))] for x, y in combinations(drawn, 2)]
-        out.append(Apart(name, rms([x - y for x, y in zip(emulated, own, strict=True)]),
-                           rms(draws) if draws else np.nan,
-                           rms([x - x.mean() for x in emulated]), rms([x - x.mean() for x in own])))
+        flights = own + [table[:, b] for table in others]
+        draws = [x[:min(len(x), len(y))] - y[:min(len(x), len(y))] for x, y in combinations(flights, 2)]
+        out.append(Difference(name, rms([x - y for x, y in zip(emulated, own, strict=True)]),
+                              rms(draws) if draws else np.nan,
+                              rms([x - x.mean() for x in emulated]), rms([x - x.mean() for x in own])))
     return out
 
 
-def write_traces(path: Path, one: Flown, own: np.ndarray, force: bool = False) -> None:
+def write_traces(path: Path, one: EmulatedFlight, own: np.ndarray, force: bool = False) -> None:
     """Both flights as CSV: t_s, and each channel as the emulated firmware and as the simulator's own loop has it."""
     table = one.table[one.table[:, flight.T] >= 0.0]
     n = min(len(table), len(own))

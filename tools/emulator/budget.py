@@ -7,7 +7,7 @@ from pathlib import Path
 from tools.emulator.build import ROOT
 from tools.emulator.flight_code import Cost
 
-PATH = ROOT / "tests" / "emulation" / "budget.toml"
+PATH = ROOT / "tests" / "emulation" / "budget.toml"  #: file of the limits
 
 
 def load(core: str, path: Path = PATH) -> dict[str, Cost]:

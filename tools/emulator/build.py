@@ -21,13 +21,14 @@ from airtouch.errors import AirTouchError
 from tools.emulator.cores import CORES, Core
 from tools.emulator.elf import Elf
 
-ROOT = Path(__file__).resolve().parents[2]
-CACHE = ROOT / "build" / "emulator"
-LIBC = Path(__file__).resolve().parent / "libc"
+ROOT = Path(__file__).resolve().parents[2]  #: of the checkout
+CACHE = ROOT / "build" / "emulator"  #: where programs lie, each in a folder named by its digest
+LIBC = Path(__file__).resolve().parent / "libc"  #: as much of a C library as zig lacks for these cores
 
 #: As the desktop library is compiled: without contraction a multiply-add rounds twice on both.
 FLAGS = ("-std=c11", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Wdouble-promotion", "-Werror",
          "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-fomit-frame-pointer", "-g0")
+#: zig's own, to compile as the distribution's GCC does
 _ZIG_FLAGS = ("-fhosted", "-fno-sanitize=undefined", "-fno-stack-protector")
 
 
@@ -41,8 +42,8 @@ class Program:
 
 def compilers(core: str) -> list[str]:
     """What can compile for this core here: "zig", "gcc", both or none."""
-    found = ["zig"] if importlib.util.find_spec("ziglang") else []
-    return found + (["gcc"] if shutil.which(CORES[core].gcc) else [])
+    zig = ["zig"] if importlib.util.find_spec("ziglang") else []
+    return zig + (["gcc"] if shutil.which(CORES[core].gcc) else [])
 
 
 def build(
@@ -79,8 +80,8 @@ def compile_objects(sources: Sequence[Path], core: str, folder: Path, *, include
     objects = [folder / f"{Path(source).stem}.o" for source in sources]
     if len(set(objects)) < len(objects):
         raise AirTouchError("two sources have the same file name")
-    for source, made in zip(sources, objects, strict=True):
-        _run([*command, *FLAGS, *(f"-I{path}" for path in include), *flags, "-c", source, "-o", made],
+    for source, target_file in zip(sources, objects, strict=True):
+        _run([*command, *FLAGS, *(f"-I{path}" for path in include), *flags, "-c", source, "-o", target_file],
              _environment(cache))
     return objects
 
@@ -97,13 +98,13 @@ def _core(name: str) -> Core:
     return CORES[name]
 
 
-def _compiler(core: str, asked: str | None) -> str:
-    """The compiler to use: the one that is asked for, else that of AIRTOUCH_CROSS, else the first available."""
-    there = compilers(core)
-    asked = asked or os.environ.get("AIRTOUCH_CROSS") or (there[0] if there else "zig")
-    if asked not in there:
-        raise AirTouchError(f"no {asked} compiler for {core}: `pip install ziglang`, or install {CORES[core].gcc}")
-    return asked
+def _compiler(core: str, name: str | None) -> str:
+    """The compiler of this name, else that of AIRTOUCH_CROSS, else the first available."""
+    available = compilers(core)
+    name = name or os.environ.get("AIRTOUCH_CROSS") or (available[0] if available else "zig")
+    if name not in available:
+        raise AirTouchError(f"no {name} compiler for {core}: `pip install ziglang`, or install {CORES[core].gcc}")
+    return name
 
 
 def _commands(core: Core, compiler: str) -> tuple[list[str], list[str]]:
@@ -147,9 +148,9 @@ def _make(folder: Path, core: Core, compiler: str, flags: list[str], sources: li
         for source, target in zip([*sources, *extra], objects, strict=True):
             _run([*compile_, *flags, "-c", source, "-o", target], environment)
         libraries = [] if compiler == "zig" else ["-lm", "-lc", "-lgcc"]
-        kept = [f"-Wl,-u,{name}" for path in objects[:len(sources)]
-                for name, symbol in Elf(path).symbols.items() if symbol.is_global]
-        _run([*link, "-Wl,-e,0", "-T", LIBC / f"{core.name}.ld", *kept, *objects, *libraries,
+        roots = [f"-Wl,-u,{name}" for path in objects[:len(sources)]
+                 for name, symbol in Elf(path).symbols.items() if symbol.is_global]
+        _run([*link, "-Wl,-e,0", "-T", LIBC / f"{core.name}.ld", *roots, *objects, *libraries,
               "-o", new / "program.elf"], environment)
         try:
             new.rename(folder)

@@ -27,6 +27,7 @@ CHANNELS, POINTS = 9, 256  #: transforms of a step, and their length
 #: files of CMSIS-DSP that a real FFT needs
 _TRANSFORM = ("arm_rfft_fast_f32", "arm_rfft_fast_init_f32", "arm_cfft_f32", "arm_cfft_init_f32",
               "arm_cfft_radix8_f32", "arm_bitreversal2")
+#: CMSIS-DSP's files of the transform
 _SOURCES = (*(f"Source/TransformFunctions/{name}.c" for name in _TRANSFORM),
             "Source/CommonTables/arm_common_tables.c", "Source/CommonTables/arm_const_structs.c")
 _PROBE = """

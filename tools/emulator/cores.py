@@ -22,6 +22,7 @@ CORTEX_M4 = Core(
     ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp"),
     has_fpu=True, registers=4)
 
+#: GAP8's fabric controller and cluster without their extensions
 RV32IMC = Core(
     "rv32imc", "riscv64-unknown-elf-gcc",
     ("-march=rv32imc_zicsr", "-mabi=ilp32", "-msmall-data-limit=0"),
@@ -36,4 +37,5 @@ RV32IM_XPULP = Core(
      "-msmall-data-limit=0"),
     has_fpu=False, registers=8)
 
+#: cores by name
 CORES = {core.name: core for core in (CORTEX_M4, RV32IMC, RV32IM_XPULP)}

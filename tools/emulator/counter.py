@@ -46,10 +46,12 @@ class InstructionCounter:
 
     @property
     def count(self) -> int:
+        """Instructions since `start`."""
         return int(self._numbers[_COUNT])
 
     @property
     def stopped(self) -> bool:
+        """Whether the limit ended the run."""
         return bool(self._numbers[_STOPPED])
 
 
@@ -68,11 +70,11 @@ def _hook() -> Any:
             return  # the address that calls return to
         known = table[_TABLE + halfwords + first]
         if known >> np.uint64(32) != np.uint64(size):
-            at, end, found = first, min(first + (np.int64(size) >> 1), halfwords), 0
+            at, end, instructions = first, min(first + (np.int64(size) >> 1), halfwords), 0
             while at < end:
                 at += np.int64(table[_TABLE + at])
-                found += 1
-            known = (np.uint64(size) << np.uint64(32)) | np.uint64(found)
+                instructions += 1
+            known = (np.uint64(size) << np.uint64(32)) | np.uint64(instructions)
             table[_TABLE + halfwords + first] = known
         head[_COUNT] += known & np.uint64(0xFFFFFFFF)
         if head[_COUNT] > head[_LIMIT]:

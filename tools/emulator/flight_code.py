@@ -15,12 +15,16 @@ from tools.emulator.build import ROOT, Program, build
 from tools.emulator.elf import Elf
 from tools.emulator.machine import Machine
 
+#: folders of the C
 FIRMWARE, GAP8, MODEL = ROOT / "firmware" / "kernels", ROOT / "gap8" / "kernels", ROOT / "gap8" / "model"
 _NETWORK = [GAP8 / f"{name}.c" for name in ("stream_int8", "dense_int8", "sparse_dense_int8")]
+#: files that are compiled
 SOURCES = [*sorted(FIRMWARE.glob("*.c")), *_NETWORK, MODEL / "airtouch_stream.c",
            Path(__file__).with_name("flight_code.c")]
+#: folders of headers
 INCLUDE = [FIRMWARE, GAP8, MODEL]
 
+#: edgeSample_t, and what a step of the pipeline and of the stream's detector gives
 SAMPLE = np.dtype([("acc", "<f4", 3), ("gyro", "<f4", 3), ("pwm", "<f4", 4), ("vbat", "<f4"),
                    ("thrust_axis", "<f4", 3), ("probability", "<f4")])
 EVENT = _event_dtype()
@@ -40,9 +44,11 @@ class Kernel:
     state: tuple[str, ...] = ()
 
 
-_FLOAT = np.dtype("<f4")
+_FLOAT = np.dtype("<f4")  #: one number
+#: sources of what several kernels hold
 _BAND, _FORCE = ("band_power",), ("disturbance_force",)
 _NET = ("stream_int8", "dense_int8", "sparse_dense_int8", "airtouch_stream")
+#: kernels by name
 KERNELS = {
     "band_power": Kernel("stepBandPower", np.dtype(("<f4", 9)), np.dtype(("<f4", 9)), _BAND,
                          ("bandPowerState", "bandPowerStorage")),

@@ -48,6 +48,7 @@ class _Registers:
     counter: int
 
 
+#: of the two instruction sets, by their calling conventions (AAPCS32 with float registers; ilp32)
 _ARM = _Registers(tuple(getattr(arm, f"UC_ARM_REG_R{i}") for i in range(4)),
                   tuple(getattr(arm, f"UC_ARM_REG_S{i}") for i in range(16)),
                   arm.UC_ARM_REG_SP, arm.UC_ARM_REG_LR, arm.UC_ARM_REG_PC)
@@ -190,6 +191,7 @@ class Machine:
         return (len(stack) - (len(stack) - len(stack.lstrip(bytes([PAINT]))))) // 4 * 4
 
     def _note_fault(self, uc: Uc, access: int, address: int, size: int, value: int, data: object) -> bool:
+        """Note a forbidden access in words, and stop."""
         kinds = {uc_const.UC_MEM_WRITE_UNMAPPED: "write to nowhere", uc_const.UC_MEM_READ_UNMAPPED: "read from nowhere",
                  uc_const.UC_MEM_WRITE_PROT: "write to constants", uc_const.UC_MEM_FETCH_UNMAPPED: "jump to nowhere",
                  uc_const.UC_MEM_FETCH_PROT: "jump into data"}
@@ -201,4 +203,5 @@ class Machine:
         return False
 
     def _place(self) -> str:
+        """The function in which the program counter is."""
         return self.elf.where(self._uc.reg_read(self._registers.counter) & ~1)

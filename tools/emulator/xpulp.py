@@ -86,6 +86,7 @@ class XpulpMachine(Machine):
         return Cycles(total, looped, instructions, values)
 
     def _start(self, name: str, arguments: Sequence[int], core: int) -> tuple[object, int]:
+        """The registers of a core that begins a call, and the call's address."""
         for register, value in zip(_X[10:18], arguments, strict=False):
             self._uc.reg_write(register, value & 0xFFFF_FFFF)
         self._uc.reg_write(riscv.UC_RISCV_REG_SP, STACK_TOP - core * _CORE_STACK - 16)
@@ -93,6 +94,7 @@ class XpulpMachine(Machine):
         return self._uc.context_save(), self.address(name)
 
     def _forget(self) -> None:
+        """Count from zero."""
         self._cycles = self._saved = self._instructions = 0
         self._loaded = 0             # register that the last instruction loaded
         self._branch = -1            # where the last instruction was a branch, its index
@@ -169,34 +171,41 @@ class XpulpMachine(Machine):
         return result is not None
 
     def _load(self, address: int, rd: int, width: int) -> bool:
+        """Load into a register; width: funct3 of the load. True: done."""
         size, signed = _SIZES[width]
         value = int.from_bytes(self.read(address & 0xFFFF_FFFF, size), "little", signed=signed)
         self._uc.reg_write(_X[rd], value & 0xFFFF_FFFF)
         return True
 
     def _store(self, address: int, rs2: int, size: int) -> bool:
+        """Store a register's low bytes. True: done."""
         value = self._uc.reg_read(_X[rs2]) & ((1 << (8 * size)) - 1)
         self.write(address & 0xFFFF_FFFF, value.to_bytes(size, "little"))
         return True
 
 
+#: funct3 of a load -> bytes, and whether they are signed
 _SIZES = {0: (1, True), 1: (2, True), 2: (4, False), 4: (1, False), 5: (2, False)}
 
 
 def _signed(value: int, bits: int) -> int:
+    """The low bits as a signed number."""
     value &= (1 << bits) - 1
     return value - (1 << bits) if value >> (bits - 1) else value
 
 
 def _bytes(word: int) -> list[int]:
+    """The four signed bytes of a word, the lowest first."""
     return [_signed(word >> (8 * i), 8) for i in range(4)]
 
 
 def _word(values: Sequence[int]) -> int:
+    """The word of four bytes, the lowest first."""
     return sum((value & 0xFF) << (8 * i) for i, value in enumerate(values))
 
 
 def _simd(funct7: int, a: int, b: int, d: int) -> int | None:
+    """The result of a SIMD instruction on words a and b, and d of the target; None for an unknown one."""
     if funct7 == 0x54:  # cv.sdotsp.b
         return (d + sum(x * y for x, y in zip(_bytes(a), _bytes(b), strict=True))) & 0xFFFF_FFFF
     if funct7 == 0x18:  # cv.max.b
@@ -209,7 +218,10 @@ def _simd(funct7: int, a: int, b: int, d: int) -> int | None:
 
 
 def _alu(funct7: int, a: int, b: int, rs2: int, d: int) -> int | None:
-    """rs2 is an immediate in some; results need not be masked."""
+    """The result of an ALU or multiply-accumulate instruction, not masked; None for an unknown one.
+
+    rs2: number of the second register, in some instructions an immediate.
+    """
     left, right = _signed(a, 32), _signed(b, 32)
     simple = {0x28: lambda: abs(left), 0x29: lambda: left <= right, 0x2A: lambda: a <= b,
               0x2B: lambda: min(left, right), 0x2C: lambda: min(a, b), 0x2D: lambda: max(left, right),
@@ -248,7 +260,7 @@ def _decode(word: int) -> tuple[int, int, int, bool]:
 
 def _innermost(words: Sequence[int]) -> dict[int, tuple[int]]:
     """Branches back over code without another branch or jump: index of the branch -> where it goes."""
-    found = {}
+    targets = {}
     for at, word in enumerate(words):
         if word & 0x7F != _BRANCH:
             continue
@@ -256,5 +268,5 @@ def _innermost(words: Sequence[int]) -> dict[int, tuple[int]]:
                          13)
         target = at + offset // 4
         if offset < 0 and not any(w & 0x7F in (_BRANCH, *_JUMPS) for w in words[target:at]):
-            found[at] = (target,)
-    return found
+            targets[at] = (target,)
+    return targets

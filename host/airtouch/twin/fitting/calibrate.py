@@ -25,7 +25,7 @@ from airtouch.vehicle import Vehicle
 FIT = "fit.json"  #: file with the state of a fit
 #: rounds, and flights per round, of a twin that is fitted for a detector; no source: two thirds of those of `fit`, for
 #: time
-ROUNDS, BATCH = 8, 160
+ROUNDS, BATCH = 8, edge_fit.BATCH
 PLAIN = "paper-mixed"  #: scenario to train in if no twin can be fitted
 #: bar(stage) is a context manager; its value is called with (done, total, note)
 Bars = Callable[[str], AbstractContextManager[Callable[[int, int, str], None]]]

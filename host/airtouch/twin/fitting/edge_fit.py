@@ -23,7 +23,7 @@ from airtouch.vehicle import Vehicle
 #: effects whose levers are fitted here; motors and their delay enter each response to an edge
 EFFECTS = ("ground_effect", "flow_scale", "flow_latency", "range_bias", "range_step", "motor_lag", "actuator_delay")
 FLIGHTS = 60  #: simulated flights of each comparison; no source: round number, 20 of each height class
-BATCH = 160  #: flights of a round to which FLIGHTS belongs, as `calibrate.BATCH`
+BATCH = 160  #: flights of a round to which FLIGHTS belongs
 STEPS = 4  #: Gauss-Newton steps; no source: round number
 SHRINK = 0.5  #: factor of the steps after one that raised the misfit; no source: the usual bisection
 FIRST_NUMBER = 500_000  #: number of the first flight; larger than that of any flight of the rounds
