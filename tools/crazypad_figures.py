@@ -65,27 +65,27 @@ def forgiven(table: list[dict]) -> float:
     return balanced([c for c in table if not excused(c)] + [{**c, **ROTOR_DAMAGE} for c in table if excused(c)])
 
 
-def named(table: list[dict]) -> float:
+def exact_rotors(table: list[dict]) -> float:
     """Share of rotor-damage flights for which exactly the damaged rotors are named."""
     hit = [answer(c)[1] == rotors(c["condition"]) for c in table if rotors(c["condition"])]
     return float(np.mean(hit)) if hit else float("nan")
 
 
-def some_named(table: list[dict]) -> float:
+def only_damaged_rotors(table: list[dict]) -> float:
     """Share of rotor-damage flights for which a damaged rotor and no sound one is named."""
     hit = [bool(answer(c)[1]) and set(answer(c)[1]) <= set(rotors(c["condition"]))
            for c in table if rotors(c["condition"])]
     return float(np.mean(hit)) if hit else float("nan")
 
 
-def large_named(table: list[dict]) -> float:
-    """`named` of the flights with at least LEAST_MM gone of a rotor."""
-    return named([c for c in table if large(c["condition"])])
+def large_exact_rotors(table: list[dict]) -> float:
+    """`exact_rotors` of the flights with at least LEAST_MM gone of a rotor."""
+    return exact_rotors([c for c in table if large(c["condition"])])
 
 
-def some_large_named(table: list[dict]) -> float:
-    """`some_named` of the flights with at least LEAST_MM gone of a rotor."""
-    return some_named([c for c in table if large(c["condition"])])
+def large_only_damaged_rotors(table: list[dict]) -> float:
+    """`only_damaged_rotors` of the flights with at least LEAST_MM gone of a rotor."""
+    return only_damaged_rotors([c for c in table if large(c["condition"])])
 
 
 def severity(table: list[dict]) -> float:
@@ -99,9 +99,9 @@ FEWEST = 6  #: flights from which the severity of a drone's rotor is printed: tw
 FIGURES: dict[str, Callable[[list[dict]], float]] = {
     "balanced accuracy of the family": balanced,
     f"the same, a cut under {LEAST_MM} mm may be normal": forgiven,
-    "damaged rotors named exactly": named, "only damaged rotors named": some_named,
-    f"exactly, of at least {LEAST_MM} mm off a rotor": large_named,
-    f"only damaged, of at least {LEAST_MM} mm off a rotor": some_large_named,
+    "damaged rotors named exactly": exact_rotors, "only damaged rotors named": only_damaged_rotors,
+    f"exactly, of at least {LEAST_MM} mm off a rotor": large_exact_rotors,
+    f"only damaged, of at least {LEAST_MM} mm off a rotor": large_only_damaged_rotors,
     "severity, Spearman": severity}
 
 

@@ -29,15 +29,15 @@ from pathlib import Path
 
 from fuzz_build import BUILD, FUZZ, LONG, ROOT, build, engine, product_sources, targets
 
-SEEDS = FUZZ / "seeds"
+SEEDS = FUZZ / "seeds"  # archives of inputs, one for each target, in git
 # Little is kept of freed memory, and nothing of who took it: a fifth of the time of targets with packets. A replay
 # says it.
 OPTIONS = {"UBSAN_OPTIONS": "print_stacktrace=1",
            "ASAN_OPTIONS": "quarantine_size_mb=2:thread_local_quarantine_size_kb=64:malloc_context_size=0"}
-LONGEST = 2048  # bytes of an input
+LONGEST = 2048  # bytes of an input; no source: round number, a few packets or some ten samples
 TIMEOUT = 20  # seconds that one input may take before it counts as hanging; the slowest takes a few milliseconds
-BATCH = 50_000  # inputs that are run with one seed, and counted together
-SEED_BYTES = 9_000  # kept of a target, at most, with what the archive needs for each input
+BATCH = 50_000  # inputs that are run with one seed, and counted together; no source: round number, minutes of work
+SEED_BYTES = 9_000  # of a target's seeds in git, at most, with what the archive needs for each; no source: for size
 ENTRY_BYTES = 110  # of the archive
 
 
@@ -73,23 +73,23 @@ def run(name: str, program: Path, runs: int, seed: int = 1, folder: Path | None 
     before = set(findings.iterdir())
     log = folder / "logs" / f"{name}.txt"
     log.parent.mkdir(parents=True, exist_ok=True)
-    held = corpus(name, folder)
-    known = sum(1 for _ in held.iterdir())
+    inputs = corpus(name, folder)
+    known = sum(1 for _ in inputs.iterdir())
     command: list[str | Path] = [
         program, f"-runs={runs + known}", f"-seed={seed}", f"-max_len={LONGEST}", f"-timeout={TIMEOUT}",
-        "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", held]
+        "-rss_limit_mb=4096", "-print_final_stats=1", f"-artifact_prefix={findings}/", inputs]
     used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     with log.open("w") as to:
-        done = subprocess.run(command, stdout=to, stderr=to, env=os.environ | OPTIONS)
+        process = subprocess.run(command, stdout=to, stderr=to, env=os.environ | OPTIONS)
     cpu = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - used
     text = log.read_text(errors="replace")
     new = [path for path in findings.iterdir() if path not in before]
-    if done.returncode and not new:
+    if process.returncode and not new:
         raise SystemExit(f"{name} failed without a finding; see {log}\n{text[-2000:]}")
     executed = re.findall(r"stat::number_of_executed_units:\s*(\d+)", text)
     reached = re.findall(r"cov: (\d+) ft: (\d+)", text) or [("0", "0")]
     return Result(name, max(0, int(executed[-1]) - known) if executed else 0, int(reached[-1][0]), int(reached[-1][1]),
-                  cpu, new[0] if done.returncode else None, log)
+                  cpu, new[0] if process.returncode else None, log)
 
 
 def run_batches(name: str, program: Path, runs: int, seed: int, resume: bool, folder: Path | None = None) -> Result:
@@ -124,26 +124,26 @@ def keep(name: str, program: Path) -> tuple[int, int]:
 
     What was found stays a seed for good: the findings, and those that the seeds hold already.
     """
-    grown = corpus(name)
-    found = {path.name: path.read_bytes() for path in grown.glob("found-*")}
+    inputs = corpus(name)
+    permanent = {path.name: path.read_bytes() for path in inputs.glob("found-*")}
     findings = BUILD / "findings" / name
     for path in sorted(findings.iterdir()) if findings.is_dir() else []:
-        found[f"found-{hashlib.sha256(path.read_bytes()).hexdigest()[:12]}"] = path.read_bytes()
+        permanent[f"found-{hashlib.sha256(path.read_bytes()).hexdigest()[:12]}"] = path.read_bytes()
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([program, "-merge=1", f"-max_len={LONGEST}", f"-artifact_prefix={BUILD}/", folder, grown],
+        subprocess.run([program, "-merge=1", f"-max_len={LONGEST}", f"-artifact_prefix={BUILD}/", folder, inputs],
                        check=True, capture_output=True)
         SEEDS.mkdir(exist_ok=True)
-        kept, total = len(found), sum(len(content) + ENTRY_BYTES for content in found.values())
+        count, total = len(permanent), sum(len(content) + ENTRY_BYTES for content in permanent.values())
         with zipfile.ZipFile(SEEDS / f"{name}.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-            for path_name, content in sorted(found.items()):
+            for path_name, content in sorted(permanent.items()):
                 archive.writestr(zipfile.ZipInfo(path_name), content, zipfile.ZIP_DEFLATED)
             for path in sorted(Path(folder).iterdir(), key=lambda path: (path.stat().st_size, path.name)):
                 total += path.stat().st_size + ENTRY_BYTES
                 if total > SEED_BYTES:
                     break
                 archive.writestr(zipfile.ZipInfo(path.name[:10]), path.read_bytes(), zipfile.ZIP_DEFLATED)
-                kept += 1
-    return kept, (SEEDS / f"{name}.zip").stat().st_size
+                count += 1
+    return count, (SEEDS / f"{name}.zip").stat().st_size
 
 
 def cover(names: list[str]) -> None:
@@ -165,6 +165,7 @@ def cover(names: list[str]) -> None:
 
 
 def main() -> None:
+    """Build the targets and run, replay, keep or measure them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("targets", nargs="*", help=f"of {', '.join(targets())}; all by default")
     parser.add_argument("--runs", type=int, default=1_000_000, help="inputs of each target (1000000)")

@@ -12,11 +12,14 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-FUZZ = ROOT / "tests" / "fuzz"
-BUILD = ROOT / "build" / "fuzz"
+ROOT = Path(__file__).parents[1]  # of the checkout
+FUZZ = ROOT / "tests" / "fuzz"  # the targets' sources
+BUILD = ROOT / "build" / "fuzz"  # objects, programs, corpora, findings
+# of the C that flies; the harnesses have address alone
 SANITIZERS = "address,undefined,float-cast-overflow,float-divide-by-zero"
+# of every source
 FLAGS = ["-std=gnu11", "-O1", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-fno-sanitize-recover=all"]
+# folders of headers
 INCLUDES = ["tests/fuzz", "tests/fuzz/link", "tests/fuzz/networks", "firmware/kernels", "firmware/link",
             "firmware/app/core", "gap8/kernels", "gap8/model", "gap8/app/src"]
 XPULP = ["-DAIRTOUCH_XPULP_EMULATION"]  # the GAP8's path of the int8 kernels
@@ -25,7 +28,7 @@ VARIANTS = {"networks_xpulp": ("networks", XPULP), "gap8": ("gap8", XPULP)}
 # In long runs, the shipped network's kernels with address alone: half of the time of the targets that run it at every
 # step. `gap8` runs the same network, and `networks`, `streams` and `rolling` any other, under every sanitizer.
 ADDRESS = ("-fno-sanitize=undefined,float-cast-overflow,float-divide-by-zero",)
-SHIPPED = ("app", "stream_detector")
+SHIPPED = ("app", "stream_detector")  # these targets
 LONG = ("-O2",)  # of runs in which the inputs cost more than the compiler: a third less for those of a network
 
 
@@ -46,13 +49,14 @@ def targets() -> dict[str, Path]:
 
 
 def _works(compiler: str, *flags: str) -> bool:
+    """Whether a compiler makes a small target with these flags."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "probe.c"
         source.write_text("#include <stddef.h>\nint LLVMFuzzerTestOneInput(const char *d, size_t n);\n"
                           "int LLVMFuzzerTestOneInput(const char *d, size_t n) { return d == NULL && n > 0; }\n"
                           "#ifdef MAIN\nint main(void) { return 0; }\n#endif\n")
-        done = subprocess.run([compiler, *flags, source, "-o", Path(folder) / "probe"], capture_output=True)
-        return done.returncode == 0
+        run = subprocess.run([compiler, *flags, source, "-o", Path(folder) / "probe"], capture_output=True)
+        return run.returncode == 0
 
 
 @cache
@@ -78,6 +82,7 @@ def product_sources() -> list[Path]:
 
 @cache
 def _headers() -> bytes:
+    """Hash of all headers."""
     folders = [FUZZ, *(ROOT / name for name in INCLUDES)]
     paths = sorted({path for folder in folders for path in folder.glob("*.h")})
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).digest()
@@ -93,9 +98,9 @@ def _compile(made_by: Engine, source: Path, flags: tuple[str, ...]) -> Path:
     if not target.exists():
         target.parent.mkdir(parents=True, exist_ok=True)
         part = target.with_suffix(f".{os.getpid()}-{threading.get_ident()}")  # two threads may make one
-        done = subprocess.run([*command, "-c", source, "-o", part], capture_output=True, text=True)
-        if done.returncode:
-            raise SystemExit(f"{source}:\n{done.stderr}")
+        run = subprocess.run([*command, "-c", source, "-o", part], capture_output=True, text=True)
+        if run.returncode:
+            raise SystemExit(f"{source}:\n{run.stderr}")
         part.rename(target)
     return target
 
@@ -113,6 +118,7 @@ def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None =
     driver = [FUZZ / "standalone.c"] if made_by.name == "standalone" else []
 
     def program(name: str) -> tuple[str, Path]:
+        """A target's name and program."""
         more = (*VARIANTS.get(name, ("", []))[1], *(ADDRESS if flags == LONG and name in SHIPPED else ()))
         objects = [_compile(made_by, path, flags + more) for path in (targets()[name], *driver)]
         # From an archive only what the target needs is linked in, and counted.
@@ -120,10 +126,10 @@ def build(names: list[str], made_by: Engine, replaced: dict[Path, Path] | None =
         library.unlink(missing_ok=True)
         members = [_compile(made_by, path, counted + (more if "gap8" in path.parts else ())) for path in sources]
         subprocess.run(["ar", "rcs", library, *members], check=True)
-        made = folder / name
-        subprocess.run([made_by.compiler, *made_by.link, *flags, *objects, library, "-lm", "-o", made], check=True)
+        target = folder / name
+        subprocess.run([made_by.compiler, *made_by.link, *flags, *objects, library, "-lm", "-o", target], check=True)
         library.unlink()
-        return name, made
+        return name, target
 
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(lambda path: _compile(made_by, path, counted), sources))

@@ -24,11 +24,12 @@ from random import Random
 
 from log_fuzzing import hostile, mutations, sound, usd_mutations, usd_old_mutations, walk
 
-MOST_S, MOST_S_PER_MB = 1.0, 10.0  #: processor time for one input
-MOST_MB, MOST_MB_PER_MB = 96.0, 400.0  #: memory above what the process held before
-ADDRESS_SPACE = 6 << 30  #: a hard limit for the whole process
+#: s of processor time for one input, and for each MB of it; no source: round numbers, some times what sound files take
+MOST_S, MOST_S_PER_MB = 1.0, 10.0
+MOST_MB, MOST_MB_PER_MB = 96.0, 400.0  #: MB above what the process held before, likewise
+ADDRESS_SPACE = 6 << 30  #: bytes, a hard limit for the whole process
 MEASURED = os.access("/proc/self/clear_refs", os.W_OK)  #: Linux tells a process its memory
-COMMAND_EVERY = 50  #: inputs that also go through `airtouch logs check` and `convert`
+COMMAND_EVERY = 50  #: each so many-th input also goes through `airtouch logs check` and `convert`, which take longer
 
 
 @dataclass
@@ -58,6 +59,7 @@ def mutated(name: str, seed: int, number: int) -> tuple[bytes, Random]:
     return (mutations.packed_text if name.endswith("gz") else mutations.text)(base, r), r
 
 
+#: format -> its sound files
 _FILES: dict[str, list[bytes]] = {}
 
 
@@ -68,16 +70,18 @@ def files_of(name: str) -> list[bytes]:
     return _FILES[name]
 
 
-def one(name: str, seed: int, number: int, folder: Path, every: int = COMMAND_EVERY) -> tuple[str, float, float]:
-    """Put one input through everything: outcome, seconds of processor time, MB of memory."""
+def one(name: str, seed: int, number: int, folder: Path,
+        command_every: int = COMMAND_EVERY) -> tuple[str, float, float]:
+    """One input through readers and commands: outcome, seconds of processor time, MB of memory."""
     data, r = mutated(name, seed, number)
 
     def act(path: Path) -> str:
+        """Walk the input, and call the commands on some."""
         outcome = walk.walk(data, str(path), r)
-        if name == "thrust-stand" or number % every == 0:
+        if name == "thrust-stand" or number % command_every == 0:
             path.write_bytes(data)
-        if number % every == 0:
-            walk.command(["check", str(path), *(["--json"] if number % (2 * every) else [])], path)
+        if number % command_every == 0:
+            walk.command(["check", str(path), *(["--json"] if number % (2 * command_every) else [])], path)
             convert = ["convert", str(path), "--out", str(folder / "out"), "--force", "--format", "csv"]
             walk.command([*convert, "--rate", "100"], path)
         return walk.stand(path) if name == "thrust-stand" else outcome
@@ -139,6 +143,7 @@ def shapes(length: int, folder: Path) -> int:
         data = make(length)
 
         def act(path: Path, data: bytes = data) -> str:
+            """Walk the file."""
             return walk.walk(data, str(path), Random(0))
 
         outcome, seconds, mb = measured(act, folder / "shape", len(data))
@@ -147,7 +152,7 @@ def shapes(length: int, folder: Path) -> int:
 
 
 def main() -> int:
-    """The command."""
+    """Fuzz the formats, or run one input or the hostile files; 1 where anything failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=1000, help="inputs of each format (default 1000)")

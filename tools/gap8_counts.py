@@ -25,8 +25,9 @@ KERNELS, FIRMWARE = ROOT / "gap8" / "kernels", ROOT / "firmware" / "kernels"
 STATE_BYTES = 4096      #: room for a rolling network's or a stream's struct
 #: names of `tools.emulator.cores`
 RV32IMC, XPULP = "rv32imc", "rv32im-xpulp"
-#: sources of a network over whole windows, and of each kind of network
+#: sources of a network over whole windows
 _WINDOWED = ("conv_int8", "dense_int8", "max_pool_int8", "network_int8", "sparse_dense_int8")
+#: kind of network -> its sources
 _KERNELS = {"window": _WINDOWED, "rolling": (*_WINDOWED, "rolling_int8", "fixed_scale"),
             "stream": ("stream_int8", "dense_int8", "sparse_dense_int8")}
 

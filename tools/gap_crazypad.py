@@ -27,7 +27,7 @@ from airtouch.gap.diagnose import diagnose
 from airtouch.gap.flights.flight import ready
 from airtouch.logs import read
 from crazypad_corrections import show_corrections
-from crazypad_figures import balanced, named, show
+from crazypad_figures import balanced, exact_rotors, show
 from crazypad_labels import family, manifest
 
 VEHICLE = "crazyflie-2.1"  #: vehicle file of both drones
@@ -37,7 +37,7 @@ GRID = [hover_balance.Beliefs(own=own, worked_on=(*hover_balance.BELIEFS.worked_
         for own, yaw, hung, manner in itertools.product(
             (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),
             ({}, {"damaged": SAME}))]
-ROTOR_WEIGHT = 0.3  #: of the share of rotors named exactly beside the balanced accuracy; no source: round number
+ROTOR_WEIGHT = 0.3  #: of the share of rotors exact_rotors exactly beside the balanced accuracy; no source: round number
 
 
 def cases(folder: Path, store: Path | None) -> list[dict]:
@@ -76,7 +76,7 @@ def cross_validated(folder: Path) -> list[dict]:
     out = []
     for condition in sorted({r["condition"] for r in rows}):
         others = [[c for c in table if c["condition"] != condition] for table in tables]
-        best = max(range(len(GRID)), key=lambda i: balanced(others[i]) + ROTOR_WEIGHT * named(others[i]))
+        best = max(range(len(GRID)), key=lambda i: balanced(others[i]) + ROTOR_WEIGHT * exact_rotors(others[i]))
         out += [c for c in tables[best] if c["condition"] == condition]
     return out
 

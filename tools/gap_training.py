@@ -106,7 +106,7 @@ def scene_text(effects: Effects) -> str:
 
 
 @lru_cache(maxsize=4)
-def flown(text: str, count: int, seed: int, folder: Path) -> list[FlightLog]:
+def training_flights(text: str, count: int, seed: int, folder: Path) -> list[FlightLog]:
     """Simulated flights of a scenario's text, kept in `folder`; a built-in one by its name."""
     name = text
     if "\n" in text:
@@ -117,7 +117,7 @@ def flown(text: str, count: int, seed: int, folder: Path) -> list[FlightLog]:
 
 def trained(text: str, seed: int, options: argparse.Namespace) -> Any:
     """`best` trained on flights of that scenario: from OUT/models where these very flights were trained on."""
-    flights = flown(text, options.flights, seed, options.out)
+    flights = training_flights(text, options.flights, seed, options.out)
     key = hashlib.sha256(f"{seed} {options.steps}".encode())
     for log in flights:
         key.update(log.stack(log.columns).tobytes())
@@ -144,7 +144,8 @@ def row(texts: Sequence[str], tested: Sequence[Flights], options: argparse.Names
         for text, flights in zip(texts, tested, strict=True):
             model = trained(text, seed, options)
             run += [evaluate.evaluate_flight(f, log, best, model).score for f, log in flights.items()]
-            differences.append(apart_db(flown(text, options.flights, seed, options.out), list(flights.values())))
+            differences.append(apart_db(training_flights(text, options.flights, seed, options.out),
+                                        list(flights.values())))
         runs.append(run)
     figures = summarise(together(runs))
     each = [summarise(r, replicates=2)["mean_abs_error_m"] for r in runs]

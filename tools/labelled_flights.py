@@ -58,7 +58,7 @@ def group_of(file: FlightFile, by: str) -> str:
     return str(known) if by == "day" else "folds 0 to 2" if int(known) < FIRST_HALF else "folds 3 and up"
 
 
-def drawn(pool: Sequence[adapt.Flight], count: int, draw: int) -> list[adapt.Flight]:
+def draw_flights(pool: Sequence[adapt.Flight], count: int, draw: int) -> list[adapt.Flight]:
     """`count` flights of the pool; a draw's smaller sets lie within its larger ones."""
     if count > len(pool):
         raise AirTouchError(f"{count} labelled flights wanted, {len(pool)} are not held out; ask for fewer")
@@ -129,7 +129,7 @@ def cell(row: str, count: int, draw: int, seed: int, group: str, held: Sequence[
     path = options.out / f"{row}_{count}_draw{draw}_seed{seed}_{digest([*settings, *rounds])}.json"
     if path.is_file():
         return [FlightScore.from_dict(entry) for entry in json.loads(path.read_text())]
-    sample = drawn(pool, count, draw)
+    sample = draw_flights(pool, count, draw)
 
     def labelled() -> BestModel:
         """A detector of the sample, of the flights beside it, and of the model to start from."""

@@ -37,37 +37,41 @@ from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import Vehicle
 
-MOST = 5  #: flights that one is held against
-LEAST = 4  #: flights of a group
-SIMULATED = 4  #: groups of simulated flights
+MOST = 5  #: baseline flights of one, at most; no source: round number, for time
+LEAST = 4  #: flights of a group; no source: three baseline flights for each
+SIMULATED = 4  #: groups of simulated flights; no source: round number
+BUILD_FOLDS, BUILD_DAYS = ("0", "1", "2"), ("19", "20")  #: on which numbers may be chosen (host/docs/looks.md)
+#: a log's name, and a function that reads it
 Log = tuple[str, Callable[[], FlightLog]]
+#: class, drone, group, vehicle, logs
 Group = tuple[str, str, str, Vehicle, list[Log]]
-_EVERY: list[Group] = []  #: of this run
+_GROUPS: list[Group] = []  #: all groups of this run, for its processes
 
 
 def groups(folder: Path) -> Iterator[Group]:
     """Class, drone, group, vehicle and nominal flights, each a name and a way to its log, that belong together."""
-    made = defaultdict(list)
+    by_group = defaultdict(list)
     for r in csv.DictReader((folder / "airtouch" / "manifest.csv").open()):
-        if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in ("0", "1", "2"):
+        if r["use"] == "clean" and r["wind"] == "none" and r["fold"] in BUILD_FOLDS:
             log = _read(folder / "airtouch" / r["file"])
-            made[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(log)
-    flown = vehicles.load("crazyflie-2.1-flow")
-    for key, files in made.items():
-        yield "crazyflie, flow deck, radio log", "the authors'", " ".join(key), flown, files
+            by_group[r["file"].split("_")[2][:4], r["height"], r["angle_deg"]].append(log)
+    vehicle = vehicles.load("crazyflie-2.1-flow")
+    for key, files in by_group.items():
+        yield "crazyflie, flow deck, radio log", "the authors'", " ".join(key), vehicle, files
     swarm = folder / "neuralswarm"
-    made = defaultdict(list)
+    by_group = defaultdict(list)
     for name in ("baselines.csv", "manifest.csv"):
         for r in csv.DictReader((swarm / name).open()):
-            if r["day"] in ("19", "20") and r.get("truth", "none") == "none":
-                made[r["cf"], r["group"], r["vehicle"]].append(_read(swarm / "flights" / r["file"]))
-    for (drone, group, of), files in made.items():
+            if r["day"] in BUILD_DAYS and r.get("truth", "none") == "none":
+                by_group[r["cf"], r["group"], r["vehicle"]].append(_read(swarm / "flights" / r["file"]))
+    for (drone, group, of), files in by_group.items():
         yield f"motion capture, uSD log, {of}", drone, group, vehicles.load(swarm / f"{of}.toml"), files
-    flown = vehicles.load(blind.VEHICLE)
+    vehicle = vehicles.load(blind.VEHICLE)
     for seed in range(SIMULATED):
-        logs = blind.nominal(flown, blind.CAL_FIRST, blind.CAL, seed)
-        named: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log)) for i, log in enumerate(logs)]
-        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", flown, named
+        logs = blind.nominal(vehicle, blind.CAL_FIRST, blind.CAL, seed)
+        simulated_logs: list[Log] = [(f"simulated {seed} {i}", partial(nothing_done, log))
+                                     for i, log in enumerate(logs)]
+        yield nominal_scatter.SIMULATED, f"seed {seed}", f"seed {seed}", vehicle, simulated_logs
 
 
 def nothing_done(log: FlightLog) -> FlightLog:
@@ -80,14 +84,15 @@ def _read(path: Path) -> Log:
     return path.name, lambda: read(path)
 
 
-def held_out(logs: list[Log], flown: Vehicle, others: list[Log] | None = None) -> Iterator[tuple[str, Apparent]]:
+def held_out(logs: list[Log], vehicle: Vehicle, others: list[Log] | None = None) -> Iterator[tuple[str, Apparent]]:
     """Each flight against others of its group, or against those given."""
-    ready = _ready(logs, flown)
+    ready = _ready(logs, vehicle)
     if others is not None:
-        study, _ = calibrate.calibrated(flown, _some([f for _, f in _ready(_some(others), flown)]), scatter=False)
+        base = [f for _, f in _ready(_evenly_spaced(others), vehicle)]
+        study, _ = calibrate.calibrated(vehicle, _evenly_spaced(base), scatter=False)
     for i, (name, flight) in enumerate(ready):
         if others is None:
-            study, _ = calibrate.calibrated(flown, _some([f for k, (_, f) in enumerate(ready) if k != i]),
+            study, _ = calibrate.calibrated(vehicle, _evenly_spaced([f for k, (_, f) in enumerate(ready) if k != i]),
                                             scatter=False)
         yield name, apparent(Data(study, [flight]))
 
@@ -95,16 +100,16 @@ def held_out(logs: list[Log], flown: Vehicle, others: list[Log] | None = None) -
 def _compared(task: tuple[int, bool]) -> tuple[int, bool, list[dict]]:
     """A group's flights held against each other, or against those of other groups of the same drone; JSON-ready."""
     i, others = task
-    *_, flown, files = _EVERY[i]
-    made = held_out(files, flown, _rest(_EVERY, i) if others else None)
+    *_, vehicle, files = _GROUPS[i]
+    comparisons = held_out(files, vehicle, _rest(_GROUPS, i) if others else None)
     return i, others, [{"file": _name(name, others), "rate": one.rate, "passing": dict(one.passing),
                         "strengths": {k: v.tolist() for k, v in one.strengths.items()},
-                        "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in made]
+                        "errors": {k: v.tolist() for k, v in one.errors.items()}} for name, one in comparisons]
 
 
-def _rest(every: list[Group], i: int) -> list[Log]:
+def _rest(groups: list[Group], i: int) -> list[Log]:
     """Flights of the same drone in other groups."""
-    return [f for _, drone, group, _, some in every if drone == every[i][1] and group != every[i][2] for f in some]
+    return [f for _, drone, group, _, files in groups if drone == groups[i][1] and group != groups[i][2] for f in files]
 
 
 def _name(name: str, others: bool) -> str:
@@ -112,12 +117,12 @@ def _name(name: str, others: bool) -> str:
     return name + (", other groups" if others else "")
 
 
-def _ready(logs: list[Log], flown: Vehicle) -> list[tuple[str, Flight]]:
+def _ready(logs: list[Log], vehicle: Vehicle) -> list[tuple[str, Flight]]:
     """The flights of logs that can be used, with their names."""
-    return list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], flown, []), strict=True))
+    return list(zip([name for name, _ in logs], measure.usable([log() for _, log in logs], vehicle, []), strict=True))
 
 
-def _some(items: list) -> list:
+def _evenly_spaced(items: list) -> list:
     """At most MOST of them, evenly chosen."""
     return [items[k] for k in np.unique(np.linspace(0, len(items) - 1, MOST).astype(int))]
 
@@ -148,27 +153,28 @@ def main() -> None:
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
-    done = {}
+    row_of = {}
     if args.keep and args.keep.exists():
-        done = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
-    every = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
-    todo = [(i, others) for i, (*_, files) in enumerate(every) for others in (False, True)
-            if any(_name(name, others) not in done for name, _ in files) and (not others or len(_rest(every, i)) > 1)]
-    _EVERY[:] = every  # which the processes inherit: logs and ways to them need not travel
+        row_of = {r["file"]: r for r in map(json.loads, args.keep.read_text().splitlines())}
+    all_groups = [g for g in groups(args.flights) if len(g[4]) >= LEAST]
+    todo = [(i, others) for i, (*_, files) in enumerate(all_groups) for others in (False, True)
+            if any(_name(name, others) not in row_of for name, _ in files)
+            and (not others or len(_rest(all_groups, i)) > 1)]
+    _GROUPS[:] = all_groups  # which the processes inherit: logs and ways to them need not travel
     with ProcessPoolExecutor(args.jobs, multiprocessing.get_context("fork")) as pool:
         for i, others, rows in pool.map(_compared, todo):
-            done |= {row["file"]: row for row in rows}
+            row_of |= {row["file"]: row for row in rows}
             if args.keep:
                 with args.keep.open("a") as out:
                     out.writelines(json.dumps(row) + "\n" for row in rows)
-            print(f"{every[i][0]}, {every[i][2]}{', other groups' if others else ''}: {len(rows)} flights",
+            print(f"{all_groups[i][0]}, {all_groups[i][2]}{', other groups' if others else ''}: {len(rows)} flights",
                   file=sys.stderr, flush=True)
     cases, alike, groups_of, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
-    for of, _, group, flown, files in every:
+    for of, _, group, vehicle, files in all_groups:
         groups_of[of].add(group)
-        flown_by[of] = flown.name
+        flown_by[of] = vehicle.name
         for others in (False, True):
-            for row in (done[key] for name, _ in files if (key := _name(name, others)) in done):
+            for row in (row_of[key] for name, _ in files if (key := _name(name, others)) in row_of):
                 strengths, errors = ({k: np.array(v) for k, v in row[part].items()} for part in ("strengths", "errors"))
                 cases[of].append(Apparent(strengths, errors, row["rate"], row["passing"]))
                 if not others:

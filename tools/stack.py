@@ -12,8 +12,9 @@ import re
 from functools import cache
 from pathlib import Path
 
-#: lines of a call graph: function and bytes of its frame; caller and callee
+#: line of a call graph: function, bytes of its frame
 NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?(\d+) bytes \((\w+)')
+#: line of a call graph: caller and callee
 EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 
 

@@ -28,7 +28,7 @@ import gap_training  # noqa: E402
 def test_nothing_added_is_the_scenario_with_everything_off(tmp_path):
     own = scenario.load("paper-mixed")
     off = batch.simulate(replace(own, table={**own.table, "effects": {}}), seeds=2, seed=3)
-    made = gap_training.flown(gap_training.scene_text([]), 2, 3, tmp_path)
+    made = gap_training.training_flights(gap_training.scene_text([]), 2, 3, tmp_path)
     for one, two in zip(off, made, strict=True):
         assert two.meta["effects"] == []
         assert all(np.array_equal(one[c], two[c], equal_nan=True) for c in one.columns)
@@ -91,7 +91,7 @@ def test_trainings_are_averaged_by_edge():
 
 def test_half_the_swing_is_six_decibels_apart(tmp_path):
     text = gap_training.scene_text([("motor_noise", {"rms": 0.02})])
-    made = gap_training.flown(text, 3, 0, tmp_path)
+    made = gap_training.training_flights(text, 3, 0, tmp_path)
     half = [log.with_columns({c: 0.5 * log[c] for c in log.columns if c.startswith(("acc", "gyro")) or c in PWM})
             for log in made]
     assert gap_passes.apart_db(half, made) == pytest.approx([20 * np.log10(2)] * 2, abs=0.01)
@@ -99,7 +99,7 @@ def test_half_the_swing_is_six_decibels_apart(tmp_path):
 
 
 def test_the_pieces_of_a_pass_share_no_sample(tmp_path):
-    for log in gap_training.flown(gap_training.scene_text([]), 3, 0, tmp_path):
+    for log in gap_training.training_flights(gap_training.scene_text([]), 3, 0, tmp_path):
         entry, leave = (e.sample for e in logs.true_edges(log))
         over, before = gap_passes.pieces(log)
         assert before["t_s"][-1] < over["t_s"][0] < log["t_s"][entry] < log["t_s"][leave] < over["t_s"][-1]

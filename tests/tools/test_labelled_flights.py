@@ -147,7 +147,7 @@ def test_false_edges_are_counted_by_place():
 
 def test_smaller_draws_lie_within_larger_ones():
     pool = [made_flight(0, 500) for _ in range(9)]
-    small, large = (labelled_flights.drawn(pool, k, draw=3) for k in (2, 5))
+    small, large = (labelled_flights.draw_flights(pool, k, draw=3) for k in (2, 5))
     assert all(any(a is b for b in large) for a in small)
     with pytest.raises(AirTouchError, match="ask for fewer"):
-        labelled_flights.drawn(pool, 10, 0)
+        labelled_flights.draw_flights(pool, 10, 0)

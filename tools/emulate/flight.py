@@ -35,7 +35,9 @@ SUPERVISOR, SUPERVISOR_COMMAND, ARMS_ITSELF = 9, 1, ("cf2", "")
 PARAM, BY_NAME, UINT8, FLOAT = 2, 3, 0x08, 0x06
 #: log variables
 MOTORS = tuple(f"motor.m{i}" for i in range(1, 5))
+#: log variables of the estimate
 ESTIMATE = tuple(f"stateEstimate.{name}" for name in ("x", "y", "z", "vx", "vy", "vz", "roll", "pitch", "yaw"))
+#: log variables of the IMU
 IMU = tuple(f"{sensor}.{axis}" for sensor in ("acc", "gyro") for axis in "xyz")
 IMU_UNITS = np.repeat([9.81, np.deg2rad(1.0)], 3)  #: m/s^2 and rad/s in those of IMU
 #: log variables of each report

@@ -17,6 +17,7 @@ from tools.emulator.machine import Machine
 
 #: folders of the C
 FIRMWARE, GAP8, MODEL = ROOT / "firmware" / "kernels", ROOT / "gap8" / "kernels", ROOT / "gap8" / "model"
+#: the network's kernels
 _NETWORK = [GAP8 / f"{name}.c" for name in ("stream_int8", "dense_int8", "sparse_dense_int8")]
 #: files that are compiled
 SOURCES = [*sorted(FIRMWARE.glob("*.c")), *_NETWORK, MODEL / "airtouch_stream.c",
@@ -24,10 +25,12 @@ SOURCES = [*sorted(FIRMWARE.glob("*.c")), *_NETWORK, MODEL / "airtouch_stream.c"
 #: folders of headers
 INCLUDE = [FIRMWARE, GAP8, MODEL]
 
-#: edgeSample_t, and what a step of the pipeline and of the stream's detector gives
+#: edgeSample_t
 SAMPLE = np.dtype([("acc", "<f4", 3), ("gyro", "<f4", 3), ("pwm", "<f4", 4), ("vbat", "<f4"),
                    ("thrust_axis", "<f4", 3), ("probability", "<f4")])
+#: edgePipelineEvent_t
 EVENT = _event_dtype()
+#: event of the stream's detector
 STREAM_EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
                          "formats": [("<f4", len(LOGITS)), "u1", "u1", "u1"],
                          "offsets": [0, *(4 * len(LOGITS) + i for i in range(3))], "itemsize": 4 * len(LOGITS) + 4})
@@ -47,6 +50,7 @@ class Kernel:
 _FLOAT = np.dtype("<f4")  #: one number
 #: sources of what several kernels hold
 _BAND, _FORCE = ("band_power",), ("disturbance_force",)
+#: sources of the network of `best`
 _NET = ("stream_int8", "dense_int8", "sparse_dense_int8", "airtouch_stream")
 #: kernels by name
 KERNELS = {

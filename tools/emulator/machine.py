@@ -48,10 +48,11 @@ class _Registers:
     counter: int
 
 
-#: of the two instruction sets, by their calling conventions (AAPCS32 with float registers; ilp32)
+#: Arm, AAPCS32 with float registers
 _ARM = _Registers(tuple(getattr(arm, f"UC_ARM_REG_R{i}") for i in range(4)),
                   tuple(getattr(arm, f"UC_ARM_REG_S{i}") for i in range(16)),
                   arm.UC_ARM_REG_SP, arm.UC_ARM_REG_LR, arm.UC_ARM_REG_PC)
+#: RV32, ilp32
 _RISCV = _Registers(tuple(getattr(riscv, f"UC_RISCV_REG_A{i}") for i in range(8)), (),
                     riscv.UC_RISCV_REG_SP, riscv.UC_RISCV_REG_RA, riscv.UC_RISCV_REG_PC)
 

@@ -197,6 +197,7 @@ def zipped(data: bytes, r: Random) -> bytes:
     return any_bytes(packed, r) if kind == 5 else packed
 
 
+#: mutations of a text table, as often as they are drawn
 TEXT: tuple[Callable[[bytes, Random], bytes], ...] = (
     any_bytes, any_bytes, cut, rows, rows, columns, columns, *[numbers] * 4, header, header, encoding)
 

@@ -12,15 +12,20 @@ from pyarrow import parquet
 
 from log_fuzzing.mutations import META, any_bytes, cut, zipped
 
+#: numbers that a cell may come to hold
 EXTREMES = (float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, 4e38, -0.0, 1e19, 1e10, 1e12, 65536.0)
+#: metadata
 JSON = (
     *(b'{"%s": %s}' % tuple(line[2:].split(b": ", 1)) for line in META if b": " in line),
     b"[" * 5000, b'{"sample_period_s": 1e-300}', b'{"sample_period_s": 1e400}', b"\xff", b"9" * 5000, b"[]", b"1", b"",
     b'{"warnings": ["a\\nb", "\\ud800"]}', b'{"acc_frame": 5, "vehicle": [], "condition": NaN}', b'{"source": 1}')
+#: names of columns
 NAMES = ("t_s", "acc_x_mps2", "m1_pwm", "zrange_m", "", " ", "a\nb", "\x1b[31m", "\u00e9", "n" * 3000, "a,b",
          "__index_level_0__")
+#: types of columns
 NUMBERS = (pa.int8(), pa.uint8(), pa.int16(), pa.int32(), pa.uint32(), pa.int64(), pa.uint64(), pa.float32())
 MOST_GROUPS = 10  #: of rows in a file: writing them takes longer than reading
+#: type of a column of pairs, which no log has
 PAIR = pa.list_(pa.float64(), 2)
 
 

@@ -107,6 +107,7 @@ def si_columns(flight: Motion) -> dict[str, np.ndarray]:
                     "humidity": flight.time_s}
 
 
+#: metadata of the sound files
 META = {"vehicle": "crazyflie-2.1", "condition": {"height_m": 0.8}, "acc_frame": "body", "warnings": ["windy"],
         "sample_period_s": 0.01}
 

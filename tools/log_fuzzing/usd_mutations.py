@@ -6,11 +6,15 @@ from random import Random
 
 from log_fuzzing.mutations import any_bytes, cut, zipped
 
+#: type of a variable -> its bytes
 SIZES = {"b": 1, "B": 1, "?": 1, "h": 2, "H": 2, "i": 4, "I": 4, "l": 4, "L": 4, "q": 8, "Q": 8, "e": 2, "f": 4, "d": 8}
+#: names of variables
 NAMES = (b"acc.x", b"gyro.xRaw", b"stateEstimate.qw", b"stateEstimateZ.quat", b"range.left", b"pm.vbat", b"rpm.m1", b"",
          b"x", b"\xff\xfe", b"a\nb", b"\x1b[31m", b"n" * 3000, b"acc.x(f)", b"(", b"t_s", b"id", b"time", b"v0")
+#: bytes that a record may come to hold
 PAYLOADS = tuple(struct.pack("<d", v) for v in (float("nan"), float("inf"), 1e308, -1e308, 5e-324, -0.0)) + tuple(
     struct.pack("<f", v) for v in (float("nan"), float("-inf"), 3e38, -3e38, 1e-45)) + (b"\xff" * 8, b"\0" * 8)
+#: times that a record may come to have
 TIMES = (0, 1, 2**16, 2**31 - 1, 2**31, 2**32 - 1, 2**53, 2**62, 2**63 - 1, 2**63, 2**64 - 1)
 
 

@@ -90,6 +90,7 @@ def usd_old(data: bytes, r: Random) -> bytes:
     wrong = r.choice((0.0, 0.0, 0.0, 0.2, 1.0))
 
     def other(count: int, checksum: bytes) -> tuple[int, bytes]:
+        """A block's count and checksum, now and then wrong ones."""
         if r.random() >= wrong:
             return count, checksum
         return r.choice((count, 0, 255, count - 1)) & 255, r.choice((checksum, r.randbytes(4), b""))

@@ -26,7 +26,7 @@ importlib.import_module("scipy.signal")  # its import counts for no input
 #: Hz to which a log is resampled
 RATES = (100.0, 100.0, 50.0, 7.3, 250.0, 1000.0, 10000.0)
 LONGEST_MESSAGE = 450  #: characters of an error or warning, beside the file's name
-T = TypeVar("T")
+T = TypeVar("T")  #: of what `_or_refusal` returns
 
 
 def walk(data: bytes, source: str, r: Random) -> str:
@@ -65,13 +65,13 @@ def stand(path: Path) -> str:
 
 def command(arguments: list[str], path: Path) -> None:
     """`airtouch logs ...` on a file: exit code 0, or 2 with one line that names the file; never a traceback."""
-    done = CliRunner().invoke(airtouch, ["logs", *arguments])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    assert done.exit_code in (0, 2), done.exit_code
-    lines = done.stderr.splitlines()
-    assert len(lines) == (2 if done.exit_code else 1), done.stderr
-    if done.exit_code:
+    result = CliRunner().invoke(airtouch, ["logs", *arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code in (0, 2), result.exit_code
+    lines = result.stderr.splitlines()
+    assert len(lines) == (2 if result.exit_code else 1), result.stderr
+    if result.exit_code:
         _clear(lines[0].removeprefix("airtouch: "), str(path))
 
 
