@@ -37,7 +37,7 @@ GRID = [hover_balance.Beliefs(own=own, worked_on=(*hover_balance.BELIEFS.worked_
         for own, yaw, hung, manner in itertools.product(
             (0.5, 1.0, 3.0), (0.012, 0.02, 0.03), (0.01, 0.02, 0.04),
             ({}, {"damaged": SAME}))]
-ROTOR_WEIGHT = 0.3  #: of the share of rotors exact_rotors exactly beside the balanced accuracy; no source: round number
+ROTOR_WEIGHT = 0.3  #: of the share of rotors named exactly beside the balanced accuracy; no source: round number
 
 
 def cases(folder: Path, store: Path | None) -> list[dict]:

@@ -28,7 +28,7 @@ INCLUDE = [FIRMWARE, GAP8, MODEL]
 #: edgeSample_t
 SAMPLE = np.dtype([("acc", "<f4", 3), ("gyro", "<f4", 3), ("pwm", "<f4", 4), ("vbat", "<f4"),
                    ("thrust_axis", "<f4", 3), ("probability", "<f4")])
-#: edgePipelineEvent_t
+#: edgeEvent_t
 EVENT = _event_dtype()
 #: event of the stream's detector
 STREAM_EVENT = np.dtype({"names": ["logits", "ready", "edge", "airborne"],
