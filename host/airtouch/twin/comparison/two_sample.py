@@ -25,7 +25,7 @@ BINS = 255  #: bins of each feature, scikit-learn's maximum
 RESAMPLES = 500  #: bootstrap samples; no source: round number, for time
 CONFIDENCE = 0.95  #: probability of the intervals, by bootstrap over flights
 MIN_FLIGHTS = 4  #: least number of flights of each kind in a phase; no source: round number
-#: settings of the gradient boosting: small trees, as windows are few; no source: round numbers, not tuned
+#: settings of the gradient boosting: small trees, as windows are few; no source: round numbers
 BOOSTING = {"max_iter": 80, "learning_rate": 0.1, "max_leaf_nodes": 12, "min_samples_leaf": 10,
             "l2_regularization": 1.0, "class_weight": "balanced", "early_stopping": False}
 LISTED = 3  #: features named in `Auroc.telling`

@@ -27,7 +27,15 @@ STEP_S = 1.5  #: s, longest duration of a velocity step; no source: round number
 #: s from a velocity step to half of its speed, Crazyflie with the firmware's gains; no other source
 RISE_S = 0.35
 RATE_TOLERANCE = 0.02  #: relative difference from RATE_HZ that a log may have; no source: round number
-MEDIAN_ROWS = 5  #: samples of the median filter on the down range, against single wrong readings
+#: Samples in which readings are taken, at 100 Hz; no source: round numbers, clear of the one reading that mixes both
+#: distances (host/docs/twin-findings.md).
+MEDIAN_ROWS = 5  #: of the median filter on the down range, against single wrong readings
+CRUISE, BEFORE = slice(-150, -3), slice(-30, -4)  #: relative to the entry: level height, height just before it
+OVER = slice(20, -10)  #: relative to entry and exit: over the platform, past the answers to the edges
+CLEARANCE_STOP = -3  #: relative to the exit: end of the readings over the platform
+CLEARANCE_PART = 0.3  #: fraction of a short pass that is skipped at its beginning, at most OVER.start
+LANDING = 10  #: after the exit: where the search for the landing begins
+SPEED = slice(-50, -5)  #: relative to the entry: speed of the cruise
 #: phases of a course, in order
 PHASES = ("hover", "cruise", "entry", "over", "exit", "after")
 AROUND_S = (0.5, 1.0)  #: s before and after an edge that belong to the edge's phase; no source: round numbers
@@ -83,7 +91,7 @@ class Course:
         spans = {"hover": (self.level + settled, step),
                  "cruise": (step, self.entry - before),
                  "entry": (self.entry - before, min(self.entry + behind, self.exit)),
-                 "over": (self.entry + 20, self.exit - 10),
+                 "over": (self.entry + OVER.start, self.exit + OVER.stop),
                  "exit": (self.exit - before, min(self.exit + behind, self.landing)),
                  "after": (self.exit + behind, self.landing)}
         return {name: slice(a, max(a, b)) for name, (a, b) in spans.items()}
@@ -111,20 +119,21 @@ def course(log: FlightLog, speed_mps: float | None = None, angle_deg: float | No
                             "box's two edges, at least 12 cm higher than the floor")
     start = _last_start(flying, entry.sample)
     last = len(log) if flying[leave.sample:].all() else leave.sample + int(np.argmin(flying[leave.sample:]))
-    cruise = float(np.median(down[max(entry.sample - 150, start):entry.sample - 3]))
+    cruise = float(np.median(down[max(entry.sample + CRUISE.start, start):entry.sample + CRUISE.stop]))
     level = start + int(np.argmax(down[start:entry.sample] > LEVEL_PART * cruise))
     free_s = (entry.sample - level) / RATE_HZ - SETTLED_S - AROUND_S[0]
     if free_s < MIN_FREE_S or cruise < MIN_FREE_M:
         raise AirTouchError(f"{log.source}: {max(free_s, 0.0):.1f} s of level flight in free air before the "
                             f"platform; hover {MIN_FREE_S + 2:g} s at {MIN_FREE_M:g} m or higher first")
-    low = down[leave.sample + 10:last] < LEVEL_PART * cruise
-    landing = leave.sample + 10 + (int(np.argmax(low)) if low.any() else len(low))
+    low = down[leave.sample + LANDING:last] < LEVEL_PART * cruise
+    landing = leave.sample + LANDING + (int(np.argmax(low)) if low.any() else len(low))
     step, measured, source = _velocity_step(log, level, entry.sample)
     stop = _stop(log, step, leave.sample, landing)
     speed = speed_mps if speed_mps is not None else measured
     over = (leave.sample - entry.sample) / RATE_HZ
-    clearance = float(np.median(down[entry.sample + min(20, int(30 * over)):leave.sample - 3]))
-    before = float(np.median(down[max(entry.sample - 30, level):entry.sample - 4]))
+    skipped = min(OVER.start, int(CLEARANCE_PART * RATE_HZ * over))
+    clearance = float(np.median(down[entry.sample + skipped:leave.sample + CLEARANCE_STOP]))
+    before = float(np.median(down[max(entry.sample + BEFORE.start, level):entry.sample + BEFORE.stop]))
     return Course(log.source, cruise, clearance, before, entry.height_after_m, (level - start) / RATE_HZ,
                   (step - level) / RATE_HZ, (entry.sample - step) / RATE_HZ, over, (stop - leave.sample) / RATE_HZ,
                   (landing - leave.sample) / RATE_HZ, speed,
@@ -175,10 +184,10 @@ def _velocity_step(log: FlightLog, level: int, entry: int) -> tuple[int, float, 
     The source is the logged velocity, or without one the horizontal acceleration, less its mean in level
     flight, integrated over STEP_S; accurate to about 0.07 m/s.
     """
-    settled = min(level + int(SETTLED_S * RATE_HZ), entry - 50)
+    settled = min(level + int(SETTLED_S * RATE_HZ), entry + SPEED.start)
     if log.has(*VELOCITY[:2]):
         speed = _speed(log)
-        final = float(np.median(speed[max(entry - 50, settled):entry - 5]))
+        final = float(np.median(speed[max(entry + SPEED.start, settled):entry + SPEED.stop]))
         slow = np.flatnonzero(speed[settled:entry] < 0.5 * final)
         half = settled + (int(slow[-1]) if len(slow) else 0)
         return max(half - int(RISE_S * RATE_HZ), settled), final, "velocity"

@@ -12,9 +12,10 @@ import numpy as np
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, RATE_HZ, channels
-from airtouch.twin.recorded.course import Course
+from airtouch.twin.recorded.course import OVER, Course
 
-#: bands of spectra in free air, Hz: half octaves, from what a block resolves to half of the rate; no other source
+#: bands of spectra in free air, Hz: octaves, above 4 Hz about half ones, from what a block resolves to half of the
+#: rate; no other source
 BANDS_HZ = ((0.3, 1), (1, 2), (2, 4), (4, 6), (6, 9), (9, 13), (13, 22), (22, 35), (35, 50))
 #: bands of spectra over the platform, where blocks are short, Hz: about octaves; no other source
 OVER_BANDS_HZ = ((1.5, 4), (4, 9), (9, 20), (20, 45))
@@ -28,7 +29,6 @@ CLASSES = {"low": (0.0, 0.045), "mid": (0.045, 0.065), "high": (0.065, 0.20)}
 BINS_S = ((-0.4, -0.2), (-0.2, 0.0), (0.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 0.5), (0.5, 0.7), (0.7, 1.0))
 BASELINE_S = (-1.0, -0.4)  #: s, relative to the entry, of the level that edge-locked means are taken against
 LENGTH, OVER_LENGTH = 256, 64  #: samples of a block of a spectrum, in free air and over the platform: 2.56 and 0.64 s
-OVER = slice(20, -10)  #: samples of flight over a platform, from the entry and to the exit: past the edges' answers
 AROUND = (50, 100)  #: samples before and after an edge in `edge_locked`
 MIN_VALID = 0.6  #: fraction of a bin's samples that must be there; no source: round number
 #: lower bounds of the scatter of edge-locked means, by channel in `channels.UNITS`; no source: round numbers

@@ -88,7 +88,7 @@ def around(course: Course, x: np.ndarray) -> list[tuple[np.ndarray, ...]]:
               slice(course.entry + 2, min(course.entry + carried, course.exit - 3))),
              (slice(course.exit + guard, min(course.exit + anchor, course.landing)), course.exit + guard,
               slice(max(course.exit - carried + guard, course.entry + 2), course.exit - 3)))
-    out = []
+    out: list[tuple[np.ndarray, ...]] = []
     for floor, tie, over in spans:
         valid = down[floor] > 0.5 * course.before_m
         if valid.sum() < int(MIN_ANCHOR * anchor) or over.stop - over.start < guard:
