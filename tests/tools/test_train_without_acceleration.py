@@ -39,7 +39,7 @@ def trained(tmp_path, monkeypatch):
     monkeypatch.setattr(scenario, "load", lambda path: str(path))
     monkeypatch.setattr(tool.vehicle, "load", lambda path: load())
     monkeypatch.setattr(tool, "shorten", lambda scene, least, seed: Shortened((scene, least)))
-    monkeypatch.setattr(overlay, "responses", lambda scene, *_: asked.append(scene) or [])
+    monkeypatch.setattr(overlay, "simulate_responses", lambda scene, *_: asked.append(scene) or [])
     monkeypatch.setattr(overlay, "free_air", lambda flights: flights)
     monkeypatch.setattr(overlay, "flights", lambda *_: (laid, [evaluate.truth(log) for log in laid]))
     monkeypatch.setattr(edge_strength, "strengths", lambda flights, weak: {})

@@ -30,7 +30,7 @@ pytestmark = needs("tensorflow")
 @pytest.fixture
 def quick(monkeypatch):
     """Stages of a few seconds."""
-    for name, value in (("SIMULATED", 4), ("STEPS", {"shipped": 5, "scratch": 5}), ("FOLDS", 2)):
+    for name, value in (("TWIN_FLIGHTS", 4), ("STEPS", {"shipped": 5, "scratch": 5}), ("FOLDS", 2)):
         monkeypatch.setattr(adapt, name, value)
 
 
