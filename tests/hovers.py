@@ -31,7 +31,7 @@ EFFECT = Effect("stiff_climb", "gain of the height loop", (FACTOR,), settings=se
 '''
 
 
-def made(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
+def hover(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
     """A hover with white noise `louder` times as strong as the floor has it, and a steady force, m/s^2."""
     declared = calibrate.sensor_noise(VEHICLE)
     acc, gyro = LOUDNESS * louder * declared[:3], LOUDNESS * louder * declared[3:6]
@@ -39,13 +39,13 @@ def made(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
                   noise(length_s, 1.0, seed + 500) * gyro, **options)
 
 
-def chosen(names):
+def candidates_of(names):
     return {n: v for n, v in all_candidates().items() if n in names}
 
 
-def found(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: None):
+def select_from(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: None):
     data = Data(study, flights, slow=study.response is None)
-    return select(data, chosen(names), progress, without), data
+    return select(data, candidates_of(names), progress, without), data
 
 
 def scattered(exact=False, **rms):
@@ -59,7 +59,7 @@ def own_gain(data, terms, first=None):
     for train, test in ((0, 1), (1, 0)):
         parts = judging.halves(data)
         start = None if first is None else first[train]
-        fitted = fit(data, parts[train], terms, start).terms
-        random = any(t.kind == "spectrum" for t in fitted)
-        total += judge(data, parts[test], fitted) - judge(data, parts[test], (), random)
+        fitted_terms = fit(data, parts[train], terms, start).terms
+        random = any(t.kind == "spectrum" for t in fitted_terms)
+        total += judge(data, parts[test], fitted_terms) - judge(data, parts[test], (), random)
     return total

@@ -9,7 +9,7 @@ from airtouch.gap.evidence.fit import SETTLED, fit, judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.flights.flight import less
 from airtouch.gap.signatures.candidates import terms
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 
 
 def read(name, x, covariance, reading):
@@ -52,12 +52,12 @@ def test_a_parameter_without_a_reading_stays():
 def test_a_fit_goes_on_until_it_stands_still(study):
     """A battery's strength, charge and capacity lie along a bent valley; from its bottom nothing more is gained."""
     true = {"strength": 1.3, "charge": 0.7, "capacity": 1.0}
-    data = Data(study, [less(f, VEHICLE, ("vbat_V",)) for f in flown(1, 912, (("battery_sag", true),))])
-    whole, term = whole_of(data), terms("battery_sag")[0].refined()
-    begun = fit(data, whole, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
-    found = converged(data, whole, begun)
-    again = fit(data, whole, found.terms, found.scaled)
-    level = judge(data, whole, found.terms)
-    assert level > judge(data, whole, begun.terms) + 1.0  # else this flight tests nothing
-    assert judge(data, whole, again.terms) < level + SETTLED
-    assert level > judge(data, whole, [term.fitted(term.scaled(true))]) - SETTLED
+    data = Data(study, [less(f, VEHICLE, ("vbat_V",)) for f in fly(1, 912, (("battery_sag", true),))])
+    blocks, term = whole_of(data), terms("battery_sag")[0].refined()
+    start = fit(data, blocks, [term], term.scaled({"strength": 0.9, "charge": 0.6, "capacity": 0.6}))
+    result = converged(data, blocks, start)
+    refit = fit(data, blocks, result.terms, result.scaled)
+    level = judge(data, blocks, result.terms)
+    assert level > judge(data, blocks, start.terms) + 1.0  # else this flight tests nothing
+    assert judge(data, blocks, refit.terms) < level + SETTLED
+    assert level > judge(data, blocks, [term.fitted(term.scaled(true))]) - SETTLED

@@ -16,7 +16,7 @@ from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming.judging import LEAST_GAIN
 from airtouch.gap.signatures.nominal_scatter import size_of
 from airtouch.logs.flight_log import FlightLog
-from gap_flights import VEHICLE, flown
+from gap_flights import VEHICLE, fly
 
 SECONDS = ((7.0, 7.4), (9.2, 9.7), (13.0, 13.3))
 
@@ -37,8 +37,8 @@ def test_a_vehicle_is_overhead_where_both_logs_hold_the_time():
 
 def test_two_vehicles_overhead_one_after_another_are_two_stretches():
     low = path(0.0, (0.0, 0.0, 0.5))
-    others = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]
-    assert np.array(overhead.seconds_overhead(low, others)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
+    partners = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]
+    assert np.array(overhead.seconds_overhead(low, partners)).ravel() == pytest.approx([2.0, 3.0, 6.0, 8.0], abs=0.02)
 
 
 def test_a_partner_without_a_path_is_refused():
@@ -48,57 +48,57 @@ def test_a_partner_without_a_path_is_refused():
 
 
 @pytest.fixture(scope="module")
-def quiet():
-    return flown(1, 62)[0]
+def nominal_flight():
+    return fly(1, 62)[0]
 
 
-def evidence(study, one, nominal):
+def evidence(study, flight, nominal):
     """Size of a wake in SECONDS beyond the limit of the nominal flights, and its gain."""
-    told = overhead.with_overhead(study, one, nominal, SECONDS)
-    found = gates.gated(Data(told, [one]))[gates.TOLD]
-    size = size_of(found.gain / (len(one) * PERIOD_S), found.strength)
-    return told.scatter.unusual(found.key, size), found.gain
+    partnered = overhead.with_overhead(study, flight, nominal, SECONDS)
+    gated = gates.gated(Data(partnered, [flight]))[gates.TOLD]
+    size = size_of(gated.gain / (len(flight) * PERIOD_S), gated.strength)
+    return partnered.scatter.unusual(gated.key, size), gated.gain
 
 
-def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, quiet):
-    nominal = flown(2, 70)
-    t = np.arange(len(quiet)) * PERIOD_S
+def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, nominal_flight):
+    nominal = fly(2, 70)
+    t = np.arange(len(nominal_flight)) * PERIOD_S
     acts = np.any([(t >= a) & (t < b) for a, b in SECONDS], axis=0)
-    force = quiet.acceleration.copy()
+    force = nominal_flight.acceleration.copy()
     force[acts, 2] -= 0.06 * VEHICLE.gravity_mps2
-    over, gain = evidence(study, replace(quiet, acceleration=force), nominal)
+    over, gain = evidence(study, replace(nominal_flight, acceleration=force), nominal)
     assert over > 0.0 and gain > LEAST_GAIN
-    over, gain = evidence(study, quiet, nominal)
+    over, gain = evidence(study, nominal_flight, nominal)
     assert over < 0.0 or gain < LEAST_GAIN
 
 
-def test_a_flight_that_shakes_all_along_has_no_wake_in_told_seconds(study, quiet):
-    force = quiet.acceleration.copy()
-    force[:, 2] += 0.03 * VEHICLE.gravity_mps2 * np.random.default_rng(3).normal(size=len(quiet))
-    over, _ = evidence(study, replace(quiet, acceleration=force), flown(2, 70))
+def test_a_flight_that_shakes_all_along_has_no_wake_in_told_seconds(study, nominal_flight):
+    force = nominal_flight.acceleration.copy()
+    force[:, 2] += 0.03 * VEHICLE.gravity_mps2 * np.random.default_rng(3).normal(size=len(nominal_flight))
+    over, _ = evidence(study, replace(nominal_flight, acceleration=force), fly(2, 70))
     assert over < 0.0
 
 
 def test_the_rest_of_a_flight_is_apart_from_the_told_seconds():
-    left = overhead._outside((("f", 1.0, 4.0), ("f", 6.0, 6.2)), ((2.0, 2.5), (6.1, 6.3)))
-    assert left == (("f", 1.0, 1.75), ("f", 2.75, 4.0))
+    remainder = overhead._outside((("f", 1.0, 4.0), ("f", 6.0, 6.2)), ((2.0, 2.5), (6.1, 6.3)))
+    assert remainder == (("f", 1.0, 1.75), ("f", 2.75, 4.0))
 
 
-def test_no_seconds_change_nothing(study, quiet):
-    assert overhead.with_overhead(study, quiet, [quiet], ()) is study
+def test_no_seconds_change_nothing(study, nominal_flight):
+    assert overhead.with_overhead(study, nominal_flight, [nominal_flight], ()) is study
 
 
 def test_a_partner_belongs_to_one_flight(tmp_path):
     with pytest.raises(AirTouchError, match="one flight"):
-        diagnose([f.log for f in flown(2, 62)], VEHICLE, partner=[path(0.0, (0.0, 0.0, 0.5))])
-    told = CliRunner().invoke(airtouch, ["gap", "diagnose", "x.csv", "--each", "--partner", "y.csv"])
-    assert told.exit_code != 0 and "one flight" in str(told.exception or told.output)
+        diagnose([f.log for f in fly(2, 62)], VEHICLE, partner=[path(0.0, (0.0, 0.0, 0.5))])
+    result = CliRunner().invoke(airtouch, ["gap", "diagnose", "x.csv", "--each", "--partner", "y.csv"])
+    assert result.exit_code != 0 and "one flight" in str(result.exception or result.output)
 
 
 def test_a_short_wake_of_a_recorded_flight_is_named_with_its_seconds(flights):
     cases = [c for c in gap_real.swarm(flights, "build") if c.flight.endswith("downwash_cf102d19_008.csv.gz")]
     case, = gap_real.with_partners(cases, flights)
     assert case.partner
-    found = gap_real.answered(case)
-    assert gap_real.answer(found) == "downwash"
-    assert any(abs(s["from_s"] - 5.5) < 0.3 for s in found["effects"][0]["seconds"])
+    diagnosis = gap_real.answered(case)
+    assert gap_real.answer(diagnosis) == "downwash"
+    assert any(abs(s["from_s"] - 5.5) < 0.3 for s in diagnosis["effects"][0]["seconds"])

@@ -6,7 +6,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import GROUPS
 from airtouch.gap.naming.judging import halves
 from airtouch.gap.unnamed import generic, powers
-from gap_flights import flown
+from gap_flights import fly
 
 
 def test_power_factor_of_gaussian_values_is_their_power_and_stays_where_it_is_believed():
@@ -30,7 +30,7 @@ def test_what_may_be_there_gains_half_and_costs_log_two_at_most():
 
 def test_a_little_noise_in_every_band_shows_in_the_sensors_sum(study, monkeypatch):
     """A tenth more power in every band of every sensor: no band alone tells it from chance."""
-    data = Data(study, flown(1, 49, {"imu_noise": {"factor": 1.06}}))
-    together = sum(generic.generic_gain(data, halves(data), [(), ()]))
+    data = Data(study, fly(1, 49, {"imu_noise": {"factor": 1.06}}))
+    gain_of_sum = sum(generic.generic_gain(data, halves(data), [(), ()]))
     monkeypatch.setattr(powers, "_of_sensors", lambda powers, middle: middle)
-    assert together > 15.0 > sum(generic.generic_gain(data, halves(data), [(), ()]))
+    assert gain_of_sum > 15.0 > sum(generic.generic_gain(data, halves(data), [(), ()]))
