@@ -48,17 +48,17 @@ def test_edges_are_those_of_the_reference_pipeline(log, model):
 def test_the_filter_drops_edges_and_changes_no_probability(log, model):
     loose = easy(model)
     strict = replace(loose, metadata={**loose.metadata, "physical_filter": True})
-    without, with_it = paper.run(log, loose), paper.run(log, strict)
-    assert set(with_it.edges) <= set(without.edges)
-    assert np.array_equal(without.probability, with_it.probability, equal_nan=True)
+    unfiltered, filtered = paper.run(log, loose), paper.run(log, strict)
+    assert set(filtered.edges) <= set(unfiltered.edges)
+    assert np.array_equal(unfiltered.probability, filtered.probability, equal_nan=True)
 
 
 def test_causal(log, model):
     loose = easy(model)
-    cut = 1200
-    whole, part = paper.run(log, loose), paper.run(log.slice(0, cut), loose)
-    assert np.array_equal(whole.probability[:cut], part.probability, equal_nan=True)
-    assert part.edges == [e for e in whole.edges if e.sample < cut]
+    length = 1200
+    full, part = paper.run(log, loose), paper.run(log.slice(0, length), loose)
+    assert np.array_equal(full.probability[:length], part.probability, equal_nan=True)
+    assert part.edges == [e for e in full.edges if e.sample < length]
 
 
 def test_the_down_range_is_no_input(log, model):
@@ -84,7 +84,8 @@ def test_a_model_of_another_version_is_refused(log, model):
 def test_every_registered_detector_offers_all(log):
     for name in registry.DETECTORS:
         module = registry.get(name)
-        assert all(callable(getattr(module, what)) for what in ("run", "fit", "load", "lag_s", "parameters")), name
+        functions = ("run", "fit", "load", "lag_s", "parameters")
+        assert all(callable(getattr(module, function)) for function in functions), name
     with pytest.raises(AirTouchError, match="known: "):
         registry.get("oracle")
 
