@@ -59,8 +59,8 @@ def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):
     assert call("convert", folder / "good.csv", "--out", out).exit_code == 0
     back = logs.read(out / "good.csv.gz")
     np.testing.assert_array_equal(back["t_s"], np.arange(600) * 0.002)
-    again = call("convert", folder / "good.csv", "--out", out, "--rate", 100)
-    assert again.exit_code == 2 and "--force" in again.stderr
+    repeat = call("convert", folder / "good.csv", "--out", out, "--rate", 100)
+    assert repeat.exit_code == 2 and "--force" in repeat.stderr
     assert call("convert", folder / "good.csv", "--out", out, "--rate", 100, "--force").exit_code == 0
     assert len(logs.read(out / "good.csv.gz")) == 120
 
