@@ -21,7 +21,7 @@ def compress(q):
 
 def test_decompress_inverts_the_format():
     rotations = Rotation.random(2000, random_state=1)
-    q = decompress(np.array([compress(one) for one in rotations.as_quat()], dtype=float))
+    q = decompress(np.array([compress(quaternion) for quaternion in rotations.as_quat()], dtype=float))
     error = (Rotation.from_quat(q) * rotations.inv()).magnitude()
     assert error.max() < 0.005  # nine bits: half a step of 1/723 in three components, doubled
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1)

@@ -38,9 +38,9 @@ def test_a_last_line_of_white_space_without_its_end_is_blank(blank):
 
 
 def test_a_log_is_columns_of_one_length():
-    for wrong in (np.zeros((3, 2)), np.zeros(()), np.zeros(2)):
+    for column in (np.zeros((3, 2)), np.zeros(()), np.zeros(2)):
         with pytest.raises(AirTouchError, match="made: columns of unequal length.*; give each one value a sample"):
-            FlightLog({"t_s": np.zeros(3), "x_m": wrong}, {"source": "made"})
+            FlightLog({"t_s": np.zeros(3), "x_m": column}, {"source": "made"})
 
 
 def test_values_that_no_sensor_reads_are_missing_and_said_so():
@@ -62,9 +62,9 @@ def test_slow_logs_have_edges_without_a_warning():
 def test_names_from_a_file_can_be_printed(tmp_path, capsys):
     """Lone surrogates in stored warnings, and file names that are no UTF-8, ended `logs check` in a traceback."""
     assert printable("a\ud800\x1b[2J\u202e\n") == "a\\ud800\\x1b[2J\\u202e\\n" and len(printable("n" * 999)) == 40
-    stored = b'# warnings: ["\\ud800 \\u001b[2J", "a\\nb"]\n# condition: "\\ud800"\n'
+    header = b'# warnings: ["\\ud800 \\u001b[2J", "a\\nb"]\n# condition: "\\ud800"\n'
     path = tmp_path / os.fsdecode(b"flight\xff.csv")
-    path.write_bytes(stored + flying())
+    path.write_bytes(header + flying())
     for arguments in (["check"], ["check", "--json"], ["info"]):
         assert _command(arguments[0], path, *arguments[1:]) == 0
         out, err = capsys.readouterr()
@@ -117,13 +117,13 @@ def test_damaged_usd_headers_are_refused_with_the_remedy():
     twice = packed(2, [(1, "fixedFrequency", variables), (1, "other", variables[:1])], [])
     with pytest.raises(AirTouchError, match="two events have the number 1; copy it from the card again"):
         parse(twice, "log00")
-    many = packed(2, [(1, "fixedFrequency", variables * 100)], [])
+    oversized = packed(2, [(1, "fixedFrequency", variables * 100)], [])
     with pytest.raises(AirTouchError, match="300 variables in one event.*; copy it"):
-        parse(many, "log00")
+        parse(oversized, "log00")
     odd = packed(2, [(1, "fixedFrequency", [("a\nb" * 3000, "f")])], [(1, 0, [0.0])])
-    with pytest.raises(AirTouchError, match="none of its variables is known") as caught:
+    with pytest.raises(AirTouchError, match="none of its variables is known") as error:
         parse(odd, "log00")
-    assert str(caught.value).isprintable() and len(str(caught.value)) < 200
+    assert str(error.value).isprintable() and len(str(error.value)) < 200
 
 
 # Parquet
@@ -136,8 +136,8 @@ def _parquet(meta=b"{}", **columns):
     from pyarrow import parquet as writer
 
     sink = io.BytesIO()
-    made = pyarrow.table({"t_s": [0.0, 0.01], **columns}).replace_schema_metadata({b"airtouch": meta})
-    writer.write_table(made, sink)
+    table = pyarrow.table({"t_s": [0.0, 0.01], **columns}).replace_schema_metadata({b"airtouch": meta})
+    writer.write_table(table, sink)
     return sink.getvalue()
 
 
@@ -187,8 +187,8 @@ def test_damaged_packed_data_in_the_public_flights_are_no_traceback(tmp_path):
 def test_recovery_leaves_out_rows_without_a_time_and_keeps_a_file_without_any(tmp_path):
     (tmp_path / "a_0001.csv.gz.part").write_bytes(b"t_s,zrange_m\n0,1\n,1\n0.01,1\n1e300,1\n0.02,1\n")
     (tmp_path / "b_0001.csv.gz.part").write_bytes(b"t_s,zrange_m\n,1\n,1\n")
-    (found,), (unreadable,) = recover(tmp_path)
-    assert logs.read(found)["t_s"].tolist() == [0, 0.01, 0.02]
+    (recovered,), (unreadable,) = recover(tmp_path)
+    assert logs.read(recovered)["t_s"].tolist() == [0, 0.01, 0.02]
     assert "b_0001.csv.gz.part: no row has a time" in unreadable and (tmp_path / "b_0001.csv.gz.part").exists()
 
 

@@ -39,8 +39,8 @@ def assert_same(back, log):
     assert set(back.columns) == set(log.columns)
     for name, values in log.columns.items():
         np.testing.assert_array_equal(back[name], values)
-        known = ~np.isnan(values)
-        np.testing.assert_array_equal(np.signbit(back[name])[known], np.signbit(values)[known])
+        finite = ~np.isnan(values)
+        np.testing.assert_array_equal(np.signbit(back[name])[finite], np.signbit(values)[finite])
     for key, value in log.meta.items():
         if key not in ("source", "format"):
             assert back.meta[key] == value

@@ -57,8 +57,8 @@ def test_checksum_is_checked():
 
 def test_cut_log_keeps_whole_records():
     data = usd_log()
-    for cut in range(len(data) - 400, len(data) - 5):
-        log = parse(data[:cut], "log00")
+    for length in range(len(data) - 400, len(data) - 5):
+        log = parse(data[:length], "log00")
         assert 30 < len(log) <= 50 and any("checksum" in w for w in log.meta["warnings"])
         np.testing.assert_array_equal(log["m1_pwm"], np.arange(len(log)))
 

@@ -65,11 +65,11 @@ def test_a_damaged_block_is_left_out_and_a_cut_one_gives_its_whole_rows():
     data[-size - 30] ^= 1  # in the last of three blocks
     log = parse(bytes(data), "log00")
     assert len(log) == 14 and "1 blocks with a wrong checksum" in log.meta["warnings"][0]
-    whole = old_log(flight(21))
-    for cut in (1, 4, 5, size, 3 * size + 4):
-        log = parse(whole[:-cut], "log00")
-        lost = -(-max(cut - 4, 0) // size)
-        np.testing.assert_array_equal(log["m1_pwm"], np.arange(21 - lost))
+    contents = old_log(flight(21))
+    for missing_bytes in (1, 4, 5, size, 3 * size + 4):
+        log = parse(contents[:-missing_bytes], "log00")
+        missing_rows = -(-max(missing_bytes - 4, 0) // size)
+        np.testing.assert_array_equal(log["m1_pwm"], np.arange(21 - missing_rows))
         assert "cut off" in log.meta["warnings"][0]
 
 
