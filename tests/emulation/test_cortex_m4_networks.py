@@ -29,8 +29,8 @@ def test_golden_windows(compiler, optimise):
     outputs, counts = [], []
     for start in range(inputs, inputs + sizes["airtouchGoldenInputs"], 300):
         machine.write(source, machine.read(start, 300))
-        run = machine.call("networkInt8Run", network, source, arena)
-        outputs.append(np.frombuffer(machine.read(run.value, 2), np.int8))
-        counts.append(run.instructions)
+        inference = machine.call("networkInt8Run", network, source, arena)
+        outputs.append(np.frombuffer(machine.read(inference.value, 2), np.int8))
+        counts.append(inference.instructions)
     np.testing.assert_array_equal(np.concatenate(outputs), expected)
     print(f"\nthe paper's network on a Cortex-M4, {compiler} {optimise}: {max(counts):,} instructions a window")

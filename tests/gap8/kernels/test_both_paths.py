@@ -105,10 +105,10 @@ class TestBothPaths:
         x, usable = samples((400, 3), 2), np.ones(400, bool)
         usable[[5, 150, 151]] = False
         out, valid = rolling.run_rolling(net, x, 4, usable)
-        fresh, known = rolling.run_rolling(net, x[152:], 4)
+        outputs, answered = rolling.run_rolling(net, x[152:], 4)
         assert not valid[:6 + 97].any() and not valid[150:152 + 97].any() and valid[103:150].any()
-        np.testing.assert_array_equal(valid[152:], known)
-        np.testing.assert_array_equal(out[152:], fresh)
+        np.testing.assert_array_equal(valid[152:], answered)
+        np.testing.assert_array_equal(out[152:], outputs)
 
 
 def test_networks_that_cannot_roll_are_refused() -> None:
@@ -126,14 +126,14 @@ def test_networks_that_cannot_roll_are_refused() -> None:
 def test_the_fixed_scale_is_a_logarithm(values: list[float]) -> None:
     features = np.array(values[:len(values) // 3 * 3], np.float32).reshape(-1, 3)
     scale = FixedScale(np.array([10, -5, 3], np.float32), np.array([40, 2, 0.5], np.float32))
-    found = rolling.fixed_scale(scale.mean, scale.deviation, features)
-    np.testing.assert_allclose(found, scale.apply(features), rtol=0, atol=3e-5)
+    scaled = rolling.fixed_scale(scale.mean, scale.deviation, features)
+    np.testing.assert_allclose(scaled, scale.apply(features), rtol=0, atol=3e-5)
 
 
 def test_the_fixed_scale_takes_what_is_no_number_for_the_smallest() -> None:
     scale = FixedScale(np.zeros(3, np.float32), np.full(3, 20, np.float32))
-    found = rolling.fixed_scale(scale.mean, scale.deviation, np.array([[np.nan, -1.0, np.inf]], np.float32))
-    np.testing.assert_allclose(found, [[-2.0, -2.0, 4.0]])
+    scaled = rolling.fixed_scale(scale.mean, scale.deviation, np.array([[np.nan, -1.0, np.inf]], np.float32))
+    np.testing.assert_allclose(scaled, [[-2.0, -2.0, 4.0]])
 
 
 def test_inputs_are_held_between_answers_and_unknown_after_a_gap() -> None:
@@ -144,8 +144,8 @@ def test_inputs_are_held_between_answers_and_unknown_after_a_gap() -> None:
     features = np.random.default_rng(0).gamma(1.0, 1e6, size=(500, 3)).astype(np.float32)
     features[:40] = np.nan
     features[300, 2] = np.inf
-    every, held = (rolling.probability_of_samples(model, features, stride) for stride in (1, 4))
-    assert np.isnan(every[:137]).all() and np.isfinite(every[137:300]).all() and np.isnan(every[300:398]).all()
-    answers = np.flatnonzero(np.isfinite(held))[0] + 4 * np.arange(30)
-    np.testing.assert_array_equal(held[answers], every[answers])
-    np.testing.assert_array_equal(held[answers + 3], held[answers])
+    each, fourth = (rolling.probability_of_samples(model, features, stride) for stride in (1, 4))
+    assert np.isnan(each[:137]).all() and np.isfinite(each[137:300]).all() and np.isnan(each[300:398]).all()
+    answers = np.flatnonzero(np.isfinite(fourth))[0] + 4 * np.arange(30)
+    np.testing.assert_array_equal(fourth[answers], each[answers])
+    np.testing.assert_array_equal(fourth[answers + 3], fourth[answers])
