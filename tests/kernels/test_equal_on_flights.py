@@ -88,11 +88,11 @@ def test_normalisation(real_signals):
     assert per_window <= RELATIVE and streaming <= RELATIVE
 
 
-@pytest.mark.parametrize("cfar_input, every", [("deviation", 1), ("norm", 8)])
-def test_edge_pipeline(real_signals, cfar_input, every):
+@pytest.mark.parametrize("cfar_input, step", [("deviation", 1), ("norm", 8)])
+def test_edge_pipeline(real_signals, cfar_input, step):
     config = reference.EdgePipelineConfig(cfar_input=cfar_input)
     edges = alerts = 0
-    for flight in real_signals[::every]:
+    for flight in real_signals[::step]:
         probability = np.float32(np.sin(np.arange(len(flight.acc)) / 80.0) / 2 + 0.5)
         ours, truth = (
             pipeline(flight.acc, flight.gyro, flight.pwm, VEHICLE, thrust_axis=flight.thrust_axis,
@@ -107,7 +107,7 @@ def test_edge_pipeline(real_signals, cfar_input, every):
         for name in ("ready", "edge", "filtered", "armed", "non_finite", "alert_recent"):
             np.testing.assert_array_equal(getattr(ours, name), getattr(truth, name), err_msg=f"{flight.name}: {name}")
         edges, alerts = edges + np.count_nonzero(ours.edge), alerts + ours.alert.sum()
-    print(f"\npipeline, {cfar_input}: {edges} edges and {alerts} alerts agree on {len(real_signals[::every])} flights")
+    print(f"\npipeline, {cfar_input}: {edges} edges and {alerts} alerts agree on {len(real_signals[::step])} flights")
 
 
 def _terms(flight):

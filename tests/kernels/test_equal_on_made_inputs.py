@@ -50,14 +50,14 @@ def test_band_power(x, setting, hop):
     ours = kernels.band_power(x, window=window, band_hz=band, hop=hop)
     truth = reference.band_power(x, window=window, band_hz=band, hop=hop)
     assert ours.shape == truth.shape
-    every = reference.band_power(x, window=window, band_hz=band)
+    each_sample = reference.band_power(x, window=window, band_hz=band)
     full = kernels.band_power(x, window=window, band_hz=band)
-    assert (np.isnan(full) == np.isnan(every)).all()
+    assert (np.isnan(full) == np.isnan(each_sample)).all()
     if len(x) >= window:
         np.testing.assert_array_equal(full[reference.window_ends(len(x), window, hop)],
                                       ours[np.isfinite(ours).all(axis=1)])
         clean, _ = reference.hold_finite(x)
-        assert band_power_excess(full[window - 1:], every[window - 1:], clean, window).max() <= 16.0
+        assert band_power_excess(full[window - 1:], each_sample[window - 1:], clean, window).max() <= 16.0
 
 
 @checks
@@ -70,15 +70,15 @@ def test_cascaded_cross_spectrum(power, groups):
 
 @checks
 @given(signals(10), signals(4), st.booleans())
-def test_disturbance_force(sensors, others, bare):
+def test_disturbance_force(sensors, others, plain):
     n = min(len(sensors), len(others))
     acc, pwm = sensors[:n, :3], sensors[:n, 3:7]
-    options = {} if bare else {"vbat_v": others[:n, 3], "thrust_axis": others[:n, :3]}
+    options = {} if plain else {"vbat_v": others[:n, 3], "thrust_axis": others[:n, :3]}
     truth = reference.disturbance_force(acc, pwm, VEHICLE, **options)
     ours = kernels.disturbance_force(acc, pwm, VEHICLE, **options)
     held_acc, _ = reference.hold_finite(acc)
     axis, _ = reference.hold_finite(others[:n, :3], initial=[0.0, 0.0, 1.0])
-    thrust = reference.total_thrust(pwm, VEHICLE, options.get("vbat_v"))[:, None] * (1.0 if bare else np.abs(axis))
+    thrust = reference.total_thrust(pwm, VEHICLE, options.get("vbat_v"))[:, None] * (1.0 if plain else np.abs(axis))
     scale = VEHICLE.mass_kg * np.abs(held_acc) + thrust + 1e-30  # products of denormals round coarsely
     with np.errstate(over="ignore"):
         representable = np.isfinite(np.float32(scale)) & np.isfinite(ours)
