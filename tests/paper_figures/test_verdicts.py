@@ -18,17 +18,17 @@ def flights(error_m, missed=0.0, count=20, seed=0, balanced=0.9, **condition):
     """Scores of flights with two edges each: errors around +-error_m, a share of the edges missed."""
     rng = np.random.default_rng(seed)
     speed = condition.setdefault("speed_mps", 0.3)
-    found = []
+    scores = []
     for number in range(count):
         edges = []
         for kind in ("entry", "exit"):
             error = error_m * rng.choice([-1, 1]) * rng.uniform(0.9, 1.1)
             edges.append(EdgeScore(kind, 100) if rng.uniform() < missed else
                          EdgeScore(kind, 100, 110, kind, error / speed, error))
-        right = round(1000 * balanced)
-        found.append(FlightScore(f"f{number}", Condition(**condition), tuple(edges), (), 2, 30.0,
-                                 (right, 1000, right, 1000)))
-    return found
+        hits = round(1000 * balanced)
+        scores.append(FlightScore(f"f{number}", Condition(**condition), tuple(edges), (), 2, 30.0,
+                                  (hits, 1000, hits, 1000)))
+    return scores
 
 
 @pytest.fixture
@@ -73,11 +73,11 @@ def test_errors_by_height(job, monkeypatch):
     assert verdict(figure, "height-4cm") == verdict(figure, "height-9cm") == NOT_REPRODUCED
 
 
-@pytest.mark.parametrize(("at_20", "left", "trend", "sides"), [(0.08, 0.08, REPRODUCED, REPRODUCED),
-                                                               (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
-                                                               (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
-def test_errors_by_angle(job, monkeypatch, at_20, left, trend, sides):
-    some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, left))
+@pytest.mark.parametrize(("at_20", "at_minus_20", "trend", "sides"), [(0.08, 0.08, REPRODUCED, REPRODUCED),
+                                                                      (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
+                                                                      (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
+def test_errors_by_angle(job, monkeypatch, at_20, at_minus_20, trend, sides):
+    some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, at_minus_20))
             for s in flights(error, height="low", angle_deg=angle)]
     monkeypatch.setattr(recorded, "scores", lambda _, name: (some, folds()))
     figure = conditions.by_angle(job)
@@ -94,20 +94,20 @@ def test_wind(job, monkeypatch, calm, windy, answer):
 
 
 def test_materials_are_shown_and_never_judged(job, monkeypatch):
-    found = {(name, scene): flights(0.05) for name in materials.DETECTORS for scene in materials.PAIRS}
-    monkeypatch.setattr(materials, "pair_scores", lambda _: found)
+    scores = {(name, scene): flights(0.05) for name in materials.DETECTORS for scene in materials.PAIRS}
+    monkeypatch.setattr(materials, "pair_scores", lambda _: scores)
     assert verdict(materials.overall(job), "material-error") == UNTESTABLE
     figure = materials.by_pair(job)
     assert {verdict(figure, claim) for claim in of_figure("fig8f")} == {UNTESTABLE}
     assert figure.rows[0]["median_error_m"] == pytest.approx(0.05, rel=0.1)
 
 
-@pytest.mark.parametrize(("without", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
+@pytest.mark.parametrize(("without_error_m", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
                                                                   (0.10, 3, NOT_REPRODUCED, NOT_REPRODUCED)])
-def test_the_loss(job, monkeypatch, without, epochs, loss, sooner):
+def test_the_loss(job, monkeypatch, without_error_m, epochs, loss, sooner):
     def variant_scores(_, name, *__):
-        bare = "no-df" in name
-        return flights(without if bare else 0.10), folds(converged_after_epochs=epochs if bare else 3)
+        no_loss = "no-df" in name
+        return flights(without_error_m if no_loss else 0.10), folds(converged_after_epochs=epochs if no_loss else 3)
 
     monkeypatch.setattr(recorded, "files", lambda _: [])
     monkeypatch.setattr(recorded, "variant_scores", variant_scores)
@@ -129,15 +129,15 @@ def test_a_caption_names_the_flights_that_are_missing(tmp_path):
     names = [f"f{i}.csv" for i in range(5)]
     (tmp_path / "manifest.csv").write_text("file,fold,speed_mps\n" + "".join(f"{n},{i},0.3\n" for i, n in
                                                                            enumerate(names)))
-    told = recorded.sample_sentence(Job(tmp_path, tmp_path / "work"), 87, 174)
-    assert "in 5 folds. Left out: " in told and all(str(tmp_path / n) in told for n in names[:3])
-    assert told.endswith("; and 2 more.") and "f3.csv" not in told
+    sentence = recorded.sample_sentence(Job(tmp_path, tmp_path / "work"), 87, 174)
+    assert "in 5 folds. Left out: " in sentence and all(str(tmp_path / n) in sentence for n in names[:3])
+    assert sentence.endswith("; and 2 more.") and "f3.csv" not in sentence
 
 
 def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
-    every = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
-    monkeypatch.setattr(recorded.dataset, "collect", lambda _: every)
-    assert recorded.files(Job(tmp_path, tmp_path)) == every
+    collection = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
+    monkeypatch.setattr(recorded.dataset, "collect", lambda _: collection)
+    assert recorded.files(Job(tmp_path, tmp_path)) == collection
     some = recorded.files(Job(tmp_path, tmp_path, quick=True))
     count = [sum(f.condition.fold == fold for f in some) for fold in range(5)]
     assert count == [9, 6, 6, 6, 6] and len({f.path for f in some}) == 33
@@ -189,11 +189,11 @@ def crossings(monkeypatch, camera_m, airtouch_m):
     there = {(way, lux): crossed(camera_m(way, lux)) for way in ways for lux in films.LUX}
     monkeypatch.setattr(vision, "crossings", lambda _: films.Crossings(
         shots, there, {n: crossed(airtouch_m) for n in ("best", "paper")}))
-    monkeypatch.setattr(vision, "film_scores", lambda shots, found: [
+    monkeypatch.setattr(vision, "film_scores", lambda shots, detections: [
         FlightScore("f", Condition(speed_mps=0.3), tuple(EdgeScore(
             e.kind, e.sample, d.sample, "edge", (e.sample - d.sample) * 0.01, (e.sample - d.sample) * 0.003)
             for e, d in zip(film.edges, some, strict=True)), (), 2, 10.0) for film,
-                                                                         some in zip(shots, found, strict=True)])
+                                                                         some in zip(shots, detections, strict=True)])
 
 
 def test_light_as_in_the_paper(job, monkeypatch):

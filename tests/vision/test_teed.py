@@ -19,8 +19,8 @@ def test_three_colours_give_the_published_number_of_parameters():
 
 def test_multiplications_of_one_layer_at_a_time():
     """The first layer: 9 x 16 of one colour, at half the rows and columns."""
-    less = teed.multiplications(320, 320, colours=3) - teed.multiplications(320, 320, colours=1)
-    assert less == 2 * 9 * 16 * 160 * 160
+    difference = teed.multiplications(320, 320, colours=3) - teed.multiplications(320, 320, colours=1)
+    assert difference == 2 * 9 * 16 * 160 * 160
 
 
 def test_smish_is_its_definition():
