@@ -43,9 +43,9 @@ def link(parts: Sequence[tuple[list[str], Sequence[Path]]], program: Path) -> Pa
             pytest.skip(f"{compiler} has no sanitizers")
         assert not error, error
         made += objects
-    done = subprocess.run([compiler, *SANITIZERS, *made, "-pthread", "-lm", "-o", program], capture_output=True,
-                          text=True)
-    if "cannot find -lasan" in done.stderr or "libclang_rt" in done.stderr:
+    process = subprocess.run([compiler, *SANITIZERS, *made, "-pthread", "-lm", "-o", program], capture_output=True,
+                             text=True)
+    if "cannot find -lasan" in process.stderr or "libclang_rt" in process.stderr:
         pytest.skip(f"{compiler} has no sanitizers")
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
     return program
