@@ -6,6 +6,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, judge
+from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming import judging
 from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
@@ -17,6 +18,10 @@ ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and go
 LOUDNESS = np.sqrt(2.0)  #: the floor of a study without flights is twice the declared power
 DOWN = 0.5  #: m/s^2, pushed where a test pushes
 FLOOR = calibrate.declared(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise
+PWM = 40000.0  #: of the made hovers
+LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
+#: front and left (+1) of each rotor; 1 and 3 turn to the left, and without their drag the vehicle yaws that way
+PLACE = {1: (1, -1, 1), 2: (-1, -1, -1), 3: (-1, 1, 1), 4: (1, 1, -1)}
 #: a user's effect, as a file
 STIFF = '''"""A height loop tuned otherwise: nothing of it is in what the logged commands lead to expect."""
 from airtouch.simulation.effects import Effect, Parameter
@@ -37,6 +42,26 @@ def hover(seed, force=(0.0, 0.0, 0.0), louder=1.0, length_s=30.0, **options):
     acc, gyro = LOUDNESS * louder * declared[:3], LOUDNESS * louder * declared[3:6]
     return flight(length_s, noise(length_s, 1.0, seed) * acc + np.array(force),
                   noise(length_s, 1.0, seed + 500) * gyro, **options)
+
+
+def weak(louder=1.0, **losses):
+    """A hover in which rotors (`r1` to `r4`) have lost a share of their lift: what is missing turns it, by hand."""
+    lost_n = {int(name[1]): share * LIFT_N for name, share in losses.items()}
+    flight = hover(11, (0.0, 0.0, -sum(lost_n.values()) / VEHICLE.mass_kg), louder, length_s=20.0)
+    arm = VEHICLE.arm_m / np.sqrt(2.0)  # it sinks on that side: x to the front, y to the left, z up
+    torque = sum(n * np.array([-left * arm, front * arm, yaw * VEHICLE.yaw_torque_over_thrust_m])
+                 for n, (front, left, yaw) in ((n, PLACE[r]) for r, n in lost_n.items()))
+    turning = torque / np.array(VEHICLE.inertia_kg_m2)
+    return replace(flight, rates=flight.rates + np.arange(len(flight))[:, None] * 0.01 * turning)
+
+
+def with_a_push(since_s, until_s, seed=6, mps2=1.0):
+    """A hover that something pushes down for some seconds."""
+    flight = hover(seed)
+    t = np.arange(len(flight)) * PERIOD_S
+    force = flight.acceleration.copy()
+    force[(t >= since_s) & (t < until_s), 2] -= mps2
+    return replace(flight, acceleration=force, name="pushed")
 
 
 def candidates_of(names):

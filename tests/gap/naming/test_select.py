@@ -11,7 +11,6 @@ from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
 from airtouch.gap.evidence.problem import GROUPS, Part, whole_of
-from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
 from airtouch.gap.naming.selection import Judged, probabilities
@@ -20,7 +19,7 @@ from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from gap_flights import VEHICLE
-from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from
+from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, with_a_push
 
 
 @pytest.fixture(scope="module")
@@ -134,11 +133,7 @@ def test_no_more_than_so_many_effects_are_named(monkeypatch):
 
 
 def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
-    flight = hover(6)
-    t = np.arange(len(flight)) * PERIOD_S
-    force = flight.acceleration.copy()
-    force[(t >= 9.0) & (t < 15.0), 2] -= 1.0
-    pushed = [replace(flight, acceleration=force, name="pushed")]
+    pushed = [with_a_push(9.0, 15.0)]
     selection, data = select_from(pushed, ("mass",), scattered(), ())
     assert [s.name for s in selection.named] == ["downwash"]
     ((name, since, until),) = selection.steps[0].terms[0].gate

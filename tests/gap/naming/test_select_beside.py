@@ -15,7 +15,7 @@ from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, fly, noise
-from hovers import DOWN, FLOOR, STIFF, candidates_of, hover, own_gain, scattered, select_from
+from hovers import DOWN, FLOOR, LIFT_N, STIFF, candidates_of, hover, own_gain, scattered, select_from, weak
 
 
 @pytest.fixture(scope="module")
@@ -107,25 +107,6 @@ def test_a_thorough_look_has_the_strength_of_each_parameter_alone(flying):
         assert together.strength[i] == single.strength[i] and together.variance[i] == single.variance[i]
         assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.strength, i).any()
     assert together.gain < judging.FIRST_GAIN, "a nominal flight"
-
-
-PWM = 40000.0  #: of the made hovers
-LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
-
-
-#: front and left (+1) of each rotor; 1 and 3 turn to the left, and without their drag the vehicle yaws that way
-PLACE = {1: (1, -1, 1), 2: (-1, -1, -1), 3: (-1, 1, 1), 4: (1, 1, -1)}
-
-
-def weak(louder=1.0, **losses):
-    """A hover in which rotors (`r1` to `r4`) have lost a share of their lift: what is missing turns it, by hand."""
-    lost_n = {int(name[1]): share * LIFT_N for name, share in losses.items()}
-    flight = hover(11, (0.0, 0.0, -sum(lost_n.values()) / VEHICLE.mass_kg), louder, length_s=20.0)
-    arm = VEHICLE.arm_m / np.sqrt(2.0)  # it sinks on that side: x to the front, y to the left, z up
-    torque = sum(n * np.array([-left * arm, front * arm, yaw * VEHICLE.yaw_torque_over_thrust_m])
-                 for n, (front, left, yaw) in ((n, PLACE[r]) for r, n in lost_n.items()))
-    turning = torque / np.array(VEHICLE.inertia_kg_m2)
-    return replace(flight, rates=flight.rates + np.arange(len(flight))[:, None] * 0.01 * turning)
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
