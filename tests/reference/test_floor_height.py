@@ -1,9 +1,12 @@
 """Height over a platform, worked out by hand: what a step of the floor, a climb, a tilt and a gap in time do."""
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 
+from airtouch.reference import floor_height
 from airtouch.reference.floor_height import FADE_MPS, GAP_MS, HOME_M, MOST_M, STEP_M, TRUST_M, FloorHeight
 
 SLANT = 0.9  #: cosine of a tilt that is still believed
@@ -33,6 +36,36 @@ def test_a_step_of_the_floor_is_taken_off_and_a_climb_is_not():
                                                (-1.1 * STEP_M, 1)])
 def test_only_a_change_of_more_than_a_step_is_the_floors(change, steps):
     assert after((0.8, 0, 1.0, 0.0, 0.8), (0.8 + change, 25, 1.0, 0.0, 0.8))[0].steps == steps
+
+
+def test_the_thresholds_are_those_of_the_header_that_flies():
+    header = (Path(__file__).parents[2] / "firmware/app/core/floor_height.h").read_text("utf-8")
+    thresholds = {name: float(value) for name, value in re.findall(r"#define FLOOR_(\w+) ([\d.]+)[fu]", header)}
+    assert len(thresholds) == 9 and thresholds == {name: getattr(floor_height, name) for name in thresholds}
+
+
+@pytest.mark.parametrize(("step", "steps"), [(STEP_M, 0), (math.nextafter(STEP_M, 1.0), 1)])
+def test_a_change_of_a_step_to_the_bit_is_no_step(step, steps):
+    """From the ground, where a distance of 0 is a reading as well."""
+    assert after((0.0, 0, 1.0, 0.0, 0.0), (step, 25, 1.0, 0.0, 0.0))[0].steps == steps
+
+
+@pytest.mark.parametrize(("floor", "agrees"), [(TRUST_M, True), (math.nextafter(TRUST_M, 1.0), False)])
+def test_a_floor_that_is_off_by_the_trusted_height_to_the_bit_is_kept(floor, agrees):
+    """On the ground, over a floor that was taken for `floor`, after a gap: the estimator says 0."""
+    estimator, _ = after((floor, 0, 1.0, 0.0, floor), (0.0, 25, 1.0, 0.0, floor), (0.0, 500, 1.0, 0.0, 0.0))
+    assert estimator.floor == (floor if agrees else 0.0)
+
+
+@pytest.mark.parametrize(("floor", "fades"), [(HOME_M, True), (math.nextafter(HOME_M, 1.0), False)])
+def test_a_floor_about_home_fades_up_to_its_limit_to_the_bit(floor, fades):
+    estimator, _ = after((floor, 0, 1.0, 0.0, floor), (0.0, 100, 1.0, 0.0, floor))
+    assert estimator.floor == pytest.approx(floor - 0.1 * FADE_MPS if fades else floor, abs=1e-12)
+
+
+@pytest.mark.parametrize(("floor", "kept"), [(MOST_M, True), (math.nextafter(MOST_M, 3.0), False)])
+def test_the_highest_floor_is_still_one(floor, kept):
+    assert after((floor, 0, 1.0, 0.0, floor), (0.0, 25, 1.0, 0.0, floor))[0].floor == (floor if kept else 0.0)
 
 
 @pytest.mark.parametrize("order", [(1.0, 1.1), (1.1, 1.0)])
