@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import fit, judge
@@ -12,12 +13,14 @@ from airtouch.gap.naming.select import select
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.simulation import signals
 from gap_flights import VEHICLE, flight, noise
 
 ALWAYS = ("wind", "gust", "downwash")  #: left out, so that nothing comes and goes
 LOUDNESS = np.sqrt(2.0)  #: the floor of a study without flights is twice the declared power
 DOWN = 0.5  #: m/s^2, pushed where a test pushes
 FLOOR = calibrate.declared(VEHICLE, ())  #: no loop, no calibration, a floor of sensor noise
+CORRELATION_S = 0.5  #: of the made gusts, which is that of one of the variants
 PWM = 40000.0  #: of the made hovers
 LIFT_N = float(VEHICLE.thrust(np.full(1, PWM))[0])  #: of one motor
 #: front and left (+1) of each rotor; 1 and 3 turn to the left, and without their drag the vehicle yaws that way
@@ -53,6 +56,18 @@ def weak(louder=1.0, **losses):
                  for n, (front, left, yaw) in ((n, PLACE[r]) for r, n in lost_n.items()))
     turning = torque / np.array(VEHICLE.inertia_kg_m2)
     return replace(flight, rates=flight.rates + np.arange(len(flight))[:, None] * 0.01 * turning)
+
+
+def swaying(drag=0.0, gust_mps2=0.0):
+    """A flight back and forth at up to 1 m/s, against a drag, N/(m/s), and in gusts of this rms."""
+    flight = hover(1)
+    speed = np.sin(2.0 * np.pi * 0.4 * 0.01 * np.arange(len(flight)))
+    force = -drag * speed[:, None] * [1.0, 0.0, 0.0] / VEHICLE.mass_kg
+    decay = np.exp(-0.01 / CORRELATION_S)
+    gusts = gust_mps2 * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], noise(30.0, 1.0, 10), axis=0)
+    flown = flight.signals.copy()
+    flown[:, signals.VELOCITY] = speed
+    return replace(flight, signals=flown, acceleration=flight.acceleration + force + gusts)
 
 
 def with_a_push(since_s, until_s, seed=6, mps2=1.0):

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, select
@@ -13,27 +12,12 @@ from airtouch.gap.naming.judging import LEAST_GAIN, covariance_among_all, crosse
 from airtouch.gap.naming.rounds import HOPELESS, round_of
 from airtouch.gap.naming.selection import Judged
 from airtouch.gap.signatures.candidates import all_candidates, terms
-from airtouch.simulation import signals
-from gap_flights import VEHICLE, noise
-from hovers import DOWN, FLOOR, candidates_of, hover, scattered, weak, with_a_push
-
-CORRELATION_S = 0.5  #: of the made gusts, which is that of one of the variants
+from gap_flights import VEHICLE
+from hovers import DOWN, FLOOR, candidates_of, hover, scattered, swaying, weak, with_a_push
 
 
 def trial(*flights):
     return judging.trial_of(Data(FLOOR, list(flights), slow=True))
-
-
-def swaying(drag=0.0, gust_mps2=0.0):
-    """A flight back and forth at up to 1 m/s, against a drag, N/(m/s), and in gusts of this rms."""
-    flight = hover(1)
-    speed = np.sin(2.0 * np.pi * 0.4 * 0.01 * np.arange(len(flight)))
-    force = -drag * speed[:, None] * [1.0, 0.0, 0.0] / VEHICLE.mass_kg
-    decay = np.exp(-0.01 / CORRELATION_S)
-    gusts = gust_mps2 * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], noise(30.0, 1.0, 10), axis=0)
-    flown = flight.signals.copy()
-    flown[:, signals.VELOCITY] = speed
-    return replace(flight, signals=flown, acceleration=flight.acceleration + force + gusts)
 
 
 def test_of_variants_with_as_many_terms_the_best_is_taken():

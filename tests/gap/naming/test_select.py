@@ -10,6 +10,7 @@ from airtouch.gap.answer.unexplained import fails
 from airtouch.gap.evidence.clock import clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import judge
+from airtouch.gap.evidence.gates import TOLD
 from airtouch.gap.evidence.problem import GROUPS, Part, whole_of
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.select import MOST_EFFECTS, contradicted, losses, seconds
@@ -17,7 +18,7 @@ from airtouch.gap.naming.selection import Judged, probabilities
 from airtouch.gap.signals.channels import COUNT
 from airtouch.gap.signals.spectra import AIR, REST
 from airtouch.gap.signatures.candidates import all_candidates
-from airtouch.gap.signatures.nominal_scatter import Scatter
+from airtouch.gap.signatures.nominal_scatter import Scatter, size_of
 from gap_flights import VEHICLE
 from hovers import ALWAYS, DOWN, FLOOR, LOUDNESS, candidates_of, hover, own_gain, scattered, select_from, with_a_push
 
@@ -146,6 +147,33 @@ def test_what_comes_and_goes_is_found_with_its_seconds_unless_it_is_left_out():
     for study, without in ((scattered(), ALWAYS), (FLOOR, ())):
         other, _ = select_from(pushed, ("mass",), study, without)
         assert "downwash" not in other.singles
+
+
+@pytest.mark.parametrize(("size", "named"), [((0.0, 0.0), True), ((0.5, 0.1), True), ((3.0, 0.5), False)])
+def test_what_comes_and_goes_is_named_where_it_is_more_than_nominal_flights_have(size, named):
+    """size: mean and standard deviation of `size_of` in nominal flights."""
+    study = scattered()
+    study = replace(study, scatter=replace(study.scatter, passing={"downwash": size}))
+    selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
+    assert [s.name for s in selection.named] == ["downwash"] * named and ("downwash" in selection.singles) == named
+    for step in selection.steps:
+        beyond = study.scatter.unusual("downwash", size_of(step.gain / seconds(data), step.strength))
+        assert step.evidence == pytest.approx(judging.LEAST_GAIN + beyond, rel=0.01)
+
+
+def test_what_acts_nearly_all_along_is_no_more_than_one_that_always_acts():
+    selection, _ = select_from([with_a_push(2.0, 28.0, mps2=0.5)], ("mass",), scattered(), ())
+    assert [s.name for s in selection.named] == ["mass"] and "downwash" not in selection.singles
+
+
+@pytest.mark.parametrize(("overhead", "key", "since_s"), [((9.0, 12.0), TOLD, 9.0), ((20.0, 22.0), "downwash", 9.04)])
+def test_seconds_in_which_another_vehicle_is_known_to_be_overhead_go_before_likely_ones(overhead, key, since_s):
+    """A push from 9 to 15 s: the known half of it gains less than all of it, and pays for no search."""
+    study = replace(scattered(), overhead=(("pushed", *overhead),))
+    selection, _ = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
+    (step,) = selection.named
+    assert step.key == key and step.terms[0].gate[0][1] == pytest.approx(since_s, abs=1e-9)
+    assert (step.choice == 0.0) == (key == TOLD)
 
 
 def test_a_look_that_is_thorough_fits_what_promises_nothing():

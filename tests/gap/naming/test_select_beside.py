@@ -15,7 +15,7 @@ from airtouch.gap.signatures.candidates import all_candidates
 from airtouch.gap.signatures.nominal_scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, fly, noise
-from hovers import DOWN, FLOOR, LIFT_N, STIFF, candidates_of, hover, own_gain, scattered, select_from, weak
+from hovers import DOWN, FLOOR, LIFT_N, STIFF, candidates_of, hover, own_gain, scattered, select_from, swaying, weak
 
 
 @pytest.fixture(scope="module")
@@ -207,6 +207,53 @@ def test_what_one_of_several_adds_pays_for_the_choice_of_its_variant(louder, los
     assert shares["weak_motor"] == pytest.approx(selection.whole.gain - own_gain(data, [of["imu_noise"]]), abs=0.3)
     rotor_alone = own_gain(data, [of["weak_motor"]]) - np.log(4.0)
     assert shares["imu_noise"] == pytest.approx(selection.whole.gain - rotor_alone, abs=0.3)
+
+
+def test_what_an_effect_adds_includes_its_companion():
+    """Gusts with drag, and a push: without the gusts their drag goes as well, without the push both stay."""
+    flight = swaying(drag=0.02, gust_mps2=0.1)
+    pushed = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN])
+    selection, data = select_from([pushed], ("gust", "mass"), scattered(exact=True))
+    shares, (gust, drag, mass) = {s.name: s.share for s in selection.named}, selection.whole.terms
+    assert (gust.name, drag.name, mass.name) == ("gust", "rotor_drag", "mass") and drag.companion
+    assert shares["gust"] == pytest.approx(selection.whole.gain - own_gain(data, [mass]), abs=0.3)
+    of_gust = own_gain(data, [gust, drag]) - judging.PRICE - np.log(3.0)  # a second axis of drag, one of three lengths
+    assert shares["mass"] == pytest.approx(selection.whole.gain - of_gust, abs=0.3)
+
+
+def test_what_a_push_adds_to_lost_rows_is_what_it_gains_alone():
+    """The log's times and its forces are judged apart."""
+    lost = np.random.default_rng(0).random(3000) < 0.1
+    selection, data = select_from([replace(hover(2, (0.0, 0.0, -DOWN)), lost=lost)], ("mass", "packet_loss"),
+                                  scattered(exact=True))
+    shares = {s.name: s.share for s in selection.named}
+    mass = [t for t in selection.whole.terms if t.name == "mass"]
+    assert shares == {"mass": pytest.approx(own_gain(data, mass)), "packet_loss": pytest.approx(loss(data)[1])}
+
+
+@pytest.mark.parametrize(("louder", "named"), [(1.2, False), (1.25, True)])
+def test_noise_beside_a_push_is_named_where_it_gains_a_quarter_as_much(louder, named):
+    """A model that is wrong looks random: noise that gains less stands there without a name."""
+    selection, _ = select_from([hover(2, (0.0, 0.0, -DOWN), louder=louder)], ("mass", "imu_noise"), scattered())
+    added = gains(selection)
+    assert [(s.name, s.named) for s in selection.steps] == [("mass", True), ("imu_noise", named)]
+    assert (added["imu_noise"] > 0.25 * added["mass"]) == named and added["imu_noise"] > 0.1 * added["mass"]
+
+
+@pytest.mark.parametrize("nominal_loss", [True, False])
+def test_three_deviations_of_nominal_flights_are_added_and_then_only_what_is_evident(nominal_loss):
+    """Four effects: lost rows, which gain least, where nominal flights lose as many as well, and where none does."""
+    flight = weak(r2=0.004, louder=1.3)
+    flight = replace(flight, acceleration=flight.acceleration - [0.0, 0.0, DOWN],
+                     lost=np.random.default_rng(0).random(2000) < 0.02)
+    rms = {"mass": [3.0], "weak_motor": [30.0], "imu_noise": [30.0], "packet_loss": [30.0]}
+    study = scattered(**{n: r for n, r in rms.items() if n != "packet_loss" or nominal_loss})
+    selection, _ = select_from([flight], tuple(rms), study)
+    names = ["weak_motor", "mass", "imu_noise"] + ["packet_loss"] * (not nominal_loss)
+    assert [(s.name, s.named) for s in selection.steps] == [(n, n == "packet_loss") for n in names]
+    beside = {n: [t.name for t in j.terms] for n, j in selection.singles.items()}
+    assert beside["weak_motor"] == names[:1] and beside["mass"] == names[:2] and beside["imu_noise"] == names[:3]
+    assert beside["packet_loss"] == [*names[:2 if nominal_loss else 3], "packet_loss"], "as judged before the last step"
 
 
 def test_halves_that_disagree_make_a_strength_uncertain_and_less_news():
