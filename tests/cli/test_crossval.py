@@ -39,7 +39,7 @@ def test_every_flight_is_scored_by_a_model_that_never_saw_it(generated, tmp_path
     assert [s.as_dict() for s in repeat] == [s.as_dict() for s in scores]
 
 
-def test_command_with_ledger(generated, tmp_path):
+def test_the_command_writes_scores_and_a_line_of_the_ledger_for_each_look(generated, tmp_path):
     out, ledger = tmp_path / "cv.json", tmp_path / "looks.md"
     call = (generated, "--detector", "baseline", "--out", tmp_path / "folds", "--json", out, "--ledger", ledger)
     result = run(*call)

@@ -23,7 +23,7 @@ def no_constant(name):
     raise ValueError(name)
 
 
-def test_folder_of_flights(generated, tmp_path):
+def test_the_scores_of_a_folder_are_those_of_its_edges(generated, tmp_path):
     out = tmp_path / "out.json"
     result = run(generated, "--detector", "baseline", "--json", out)
     assert result.exit_code == 0, result.output
@@ -120,7 +120,7 @@ def test_nothing_is_overwritten_without_force(generated, tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [("none.csv",), ("--detector", "oracle", "."), ()])
-def test_wrong_calls(arguments):
+def test_a_wrong_call_is_refused_in_one_line(arguments):
     result = run(*arguments)
     assert isinstance(result.exception, AirTouchError) or result.exit_code == 2
     assert "\n" not in str(result.exception)

@@ -43,7 +43,7 @@ def test_info_goes_on_past_bad_files_and_sums_up(folder):
     assert call("info", folder / "good.csv").exit_code == 0
 
 
-def test_check_as_json(folder):
+def test_a_check_as_json_holds_rate_edges_and_files_left_out(folder):
     result = call("check", folder, "--json")
     assert result.exit_code == 2
     report = json.loads(result.stdout)

@@ -48,7 +48,7 @@ def test_nothing_is_replaced_unasked(tmp_path):
     assert list(tmp_path.iterdir()) == []  # a flight without a row leaves nothing
 
 
-def test_numbers_go_on(tmp_path):
+def test_the_next_number_is_above_those_in_the_folder(tmp_path):
     assert recorder.next_number(tmp_path, "edge") == 1
     for name in ("edge_0003.csv.gz", "edge_0007.csv.gz.part", "edge_x_0009.csv.gz", "manifest.csv"):
         (tmp_path / name).write_text("x")

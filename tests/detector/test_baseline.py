@@ -55,7 +55,7 @@ def test_a_bump_in_the_derivative_is_one_edge_one_sample_late(centre, sign):
     assert extrema(slope, 11.0).tolist() == []
 
 
-def test_run_is_causal():
+def test_edges_do_not_depend_on_later_samples():
     log = noisy_log(5)
     model = Baseline(threshold=2.0)
     edges = run(log, model).edges

@@ -100,7 +100,7 @@ def test_faults_say_what_and_where(machine, name, words):
     assert machine.call("bump").value == 7
 
 
-def test_stack_high_water(machine):
+def test_the_stack_used_is_that_of_the_deepest_call(machine):
     machine.call("bump")
     shallow = machine.stack_used()
     machine.call("fill", 1000)
@@ -123,7 +123,7 @@ def test_what_does_not_compile_says_why(tmp_path):
         build([source], "z80")
 
 
-def test_not_an_elf(tmp_path):
+def test_a_file_that_is_no_elf_is_refused(tmp_path):
     (tmp_path / "x").write_bytes(b"no")
     with pytest.raises(ValueError, match="not a 32-bit"):
         Elf(tmp_path / "x")

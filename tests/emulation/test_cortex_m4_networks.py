@@ -15,7 +15,7 @@ KERNELS = [GAP8 / f"{name}.c" for name in ("network_int8", "conv_int8", "dense_i
 
 
 @pytest.mark.parametrize("compiler, optimise", [("zig", "-O2"), ("gcc", "-Os")])
-def test_golden_windows(compiler, optimise):
+def test_golden_windows_have_their_golden_outputs(compiler, optimise):
     if compiler not in compilers("cortex-m4"):
         pytest.skip(f"no {compiler} for cortex-m4 on this machine")
     program = build([*KERNELS, MODEL / "airtouch_model.c", MODEL / "airtouch_golden.c"], "cortex-m4",

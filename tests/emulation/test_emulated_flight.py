@@ -59,7 +59,7 @@ def test_a_vehicle_at_rest_reads_gravity_and_stays(plant):
     assert plant.readings[at.ACC + 2] == pytest.approx(9.81, abs=1.0) and 0.0 <= plant.readings[at.RANGE] < 0.03
 
 
-def test_motors_lift_it(plant):
+def test_full_thrust_lifts_the_drone_and_the_range_sees_it(plant):
     for _ in range(500):
         plant.step(np.full(4, 60_000.0))
     assert plant.place[2] > 0.5 and plant.readings[at.RANGE] == pytest.approx(plant.place[2], abs=0.2)

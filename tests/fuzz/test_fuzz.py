@@ -41,7 +41,7 @@ def programs(engine):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_is_found(programs, name, tmp_path):
+def test_fuzzing_finds_no_defect(programs, name, tmp_path):
     result = fuzz.run(name, programs[name], MUTATIONS, folder=tmp_path)
     assert result.finding is None, result.log.read_text(errors="replace")[-3000:]
     assert result.inputs >= MUTATIONS

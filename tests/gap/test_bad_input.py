@@ -66,7 +66,7 @@ def test_one_bad_flight_does_not_stop_the_others(sweeps):
         measure([sweeps[0].slice(0, 100), sweeps[1].slice(0, 100)], VEHICLE)
 
 
-def test_nothing_at_all():
+def test_a_measurement_of_no_flight_is_refused():
     with pytest.raises(AirTouchError, match="no flight that can be used"):
         measure([], VEHICLE)
 
@@ -197,6 +197,6 @@ def test_a_flight_that_is_too_short_is_refused(sweeps):
         diagnose([sweeps[0].slice(0, 420)], VEHICLE, without=OTHERS)
 
 
-def test_nothing_to_diagnose():
+def test_a_diagnosis_of_no_flight_is_refused():
     with pytest.raises(AirTouchError, match="no flight to diagnose"):
         diagnose([], VEHICLE)

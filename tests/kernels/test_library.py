@@ -34,7 +34,7 @@ def test_names_mirror_the_reference():
     assert names <= set(kernels.__all__) and names <= set(reference.__all__)
 
 
-def test_threshold_factor():
+def test_the_threshold_factor_is_the_references():
     for p_fa in (1e-6, 1e-2, 0.9, 0.999999):
         assert kernels.threshold_factor(50, p_fa) == pytest.approx(reference.threshold_factor(50, np.float32(p_fa)),
                                                                    rel=1e-6)

@@ -44,7 +44,7 @@ def network(seed, *, width=8, channels=4, taps=3, dilations=(1, 2, 4), stride=2,
        stride=st.integers(1, 3), first_skip=st.integers(0, 2), sparsity=st.sampled_from([0.0, 0.7, 1.0]),
        outputs=st.integers(1, 6), dilations=st.lists(st.integers(1, 9), min_size=1, max_size=4),
        samples=st.integers(0, 120))
-def test_c_equals_numpy(seed, width, taps, stride, first_skip, sparsity, dilations, samples, outputs):
+def test_c_has_the_bits_of_numpy(seed, width, taps, stride, first_skip, sparsity, dilations, samples, outputs):
     first_skip = min(first_skip, len(dilations))
     net = network(seed, width=width, taps=taps, dilations=tuple(dilations), stride=stride,
                   first_skip=first_skip, sparsity=sparsity, outputs=outputs)

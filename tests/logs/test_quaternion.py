@@ -28,7 +28,7 @@ def test_decompress_inverts_the_format():
 
 
 @given(st.lists(st.floats(allow_nan=True), min_size=1, max_size=20))
-def test_decompress_takes_anything(values):
+def test_what_is_no_32_bit_number_decompresses_to_nan(values):
     q = decompress(np.array(values))
     valid = [0 <= v < 2**32 and v == int(v) for v in np.nan_to_num(values, nan=-1, posinf=-1, neginf=-1)]
     assert np.isfinite(q).all(axis=1).tolist() == valid

@@ -79,7 +79,7 @@ def test_bad_names_are_refused(header, message):
         check_names(names_of(header), "a.csv:1")
 
 
-def test_named_columns():
+def test_columns_have_the_headers_names_and_empty_cells_are_nan():
     table = named_table(sheet(b"# c\nx, y\n1,2\n3,\n"), "a.csv", [])
     assert list(table) == ["x", "y"]
     np.testing.assert_array_equal(table["x"], [1, 3])

@@ -53,7 +53,7 @@ def folds(**parameters):
 
 @pytest.mark.parametrize(("paper_m", "missed", "answer"), [(0.028, 0.0, REPRODUCED), (0.028, 0.5, NOT_REPRODUCED),
                                                            (0.06, 0.0, NOT_REPRODUCED)])
-def test_overall_errors(job, monkeypatch, paper_m, missed, answer):
+def test_overall_errors_are_judged_by_height_and_against_the_baseline(job, monkeypatch, paper_m, missed, answer):
     scores = {"best": flights(0.018), "paper": flights(paper_m, missed), "baseline": flights(0.364)}
     monkeypatch.setattr(recorded, "scores", lambda _, name: (scores[name], folds()))
     assert verdict(overall.heights(job), "height-error") == answer
@@ -61,7 +61,7 @@ def test_overall_errors(job, monkeypatch, paper_m, missed, answer):
     assert gains == (REPRODUCED if missed == 0.0 and paper_m < 0.051 else NOT_REPRODUCED)
 
 
-def test_errors_by_height(job, monkeypatch):
+def test_an_edge_at_9_cm_must_be_harder_than_at_4_cm(job, monkeypatch):
     near, far = flights(0.03), flights(0.03, missed=0.9)
     monkeypatch.setattr(simulated, "flights", lambda scene, count: scene)
     monkeypatch.setattr(simulated, "scores", lambda scene, name: near if scene == "paper-4cm" else far)
@@ -87,7 +87,7 @@ def test_errors_by_angle(job, monkeypatch, at_20, at_minus_20, trend, sides):
 @pytest.mark.parametrize(("calm", "windy", "answer"), [((0.03, 0.0), (0.03, 0.0), REPRODUCED),
                                                        ((0.03, 0.0), (0.09, 0.0), NOT_REPRODUCED),
                                                        ((0.03, 0.0), (0.03, 0.5), NOT_REPRODUCED)])
-def test_wind(job, monkeypatch, calm, windy, answer):
+def test_wind_must_change_neither_errors_nor_misses(job, monkeypatch, calm, windy, answer):
     monkeypatch.setattr(simulated, "flights", lambda scene, count, blown=(): ["windy" if blown else "calm"] * count)
     monkeypatch.setattr(simulated, "scores", lambda some, name: flights(*(windy if some[0] == "windy" else calm)))
     assert verdict(conditions.wind(job), "wind") == answer
@@ -104,7 +104,7 @@ def test_materials_are_shown_and_never_judged(job, monkeypatch):
 
 @pytest.mark.parametrize(("without_error_m", "epochs", "loss", "sooner"), [(0.18, 9, REPRODUCED, REPRODUCED),
                                                                   (0.10, 3, NOT_REPRODUCED, NOT_REPRODUCED)])
-def test_the_loss(job, monkeypatch, without_error_m, epochs, loss, sooner):
+def test_the_force_loss_is_judged_by_error_and_by_epochs(job, monkeypatch, without_error_m, epochs, loss, sooner):
     def variant_scores(_, name, *__):
         no_loss = "no-df" in name
         return flights(without_error_m if no_loss else 0.10), folds(converged_after_epochs=epochs if no_loss else 3)
@@ -145,7 +145,7 @@ def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("shortest", "resolution"),
                          [(0.05, REPRODUCED), (0.10, NOT_REPRODUCED), (0.2, NOT_REPRODUCED)])
-def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
+def test_windows_are_judged_by_error_and_inputs_by_misses(job, monkeypatch, shortest, resolution):
     monkeypatch.setattr(recorded, "files", lambda _: [])
     monkeypatch.setattr(recorded, "variant_scores", lambda _, name, *__: (
         flights(shortest if name == "stft-50" else 0.10, missed=0.5 if name in ("input-50", "input-250") else 0.2),
@@ -155,7 +155,7 @@ def test_windows_and_inputs(job, monkeypatch, shortest, resolution):
 
 
 @pytest.mark.parametrize(("exact", "int8", "answer"), [(0.97, 0.86, REPRODUCED), (0.71, 0.70, NOT_REPRODUCED)])
-def test_sizes(job, monkeypatch, exact, int8, answer):
+def test_sizes_are_judged_by_the_accuracy_that_int8_keeps(job, monkeypatch, exact, int8, answer):
     monkeypatch.setattr(recorded, "variant_scores", lambda *_: (flights(0.05, balanced=int8), folds()))
     monkeypatch.setattr(recorded, "in_float", lambda *_: flights(0.05, balanced=exact))
     figure = sizes.sizes(job)
@@ -163,7 +163,7 @@ def test_sizes(job, monkeypatch, exact, int8, answer):
     assert figure.rows[0]["bytes"] == 4 * (36944 + 66)  # weights and biases of the paper's network
 
 
-def test_resources(job, monkeypatch):
+def test_multiplications_are_those_counted_by_hand(job, monkeypatch):
     monkeypatch.setattr(recorded, "scores", lambda _, name: (flights(0.05), folds()))
     figure = resources.resources(job)
     assert verdict(figure, "flops") == NOT_REPRODUCED and verdict(figure, "parameters") == REPRODUCED
@@ -220,7 +220,7 @@ def test_size_of_the_networks(job, monkeypatch, small_m, answer):
 
 
 @pytest.mark.parametrize(("joined_m", "answer"), [(0.012, REPRODUCED), (0.2, NOT_REPRODUCED)])
-def test_both_together(job, monkeypatch, joined_m, answer):
+def test_fusion_is_a_backup_where_it_is_no_worse_than_the_better_one(job, monkeypatch, joined_m, answer):
     crossings(monkeypatch, lambda way, lux: joined_m if way == "fusion" else 0.015, 0.033)
     figure = vision.fusion(job)
     assert verdict(figure, "backup") == answer

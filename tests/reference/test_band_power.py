@@ -44,7 +44,7 @@ def test_sines_outside_leave_nothing():
     assert band_power(np.sin(2 * np.pi * 3.0 * t) + np.sin(2 * np.pi * 12.0 * t))[199:].max() < 1e-20
 
 
-def test_is_causal():
+def test_power_does_not_depend_on_later_samples():
     x = np.random.default_rng(1).normal(size=600)
     another_future = x.copy()
     another_future[400:] = 1e3

@@ -41,7 +41,7 @@ def over(n, start, stop):
     return p
 
 
-def test_hysteresis_and_dwell():
+def test_an_edge_needs_its_threshold_and_the_dwell_since_the_last():
     p = np.array([0.1, 0.59, 0.6, 0.5, 0.41, 0.4, 0.9, 0.1, 0.7, 0.0])
     armed = np.ones(10, dtype=bool)
     edges = decode(p, armed, replace(DEFAULT, dwell_samples=0))

@@ -30,7 +30,7 @@ def trace(name):
 
 
 @pytest.mark.parametrize("name", ["step", "cruise", "turning"])
-def test_estimator(name):
+def test_the_estimator_follows_the_firmwares_trace(name):
     t = trace(f"estimator_{name}")
     plant, est = from_vehicle(vehicles.load("crazyflie-2.1"))[0], np.zeros(1, kalman.STATE)[0]
     plant["firmware"], plant["gravity"] = settings.load("2026.08")[0], G
@@ -70,7 +70,7 @@ def test_estimator(name):
 @pytest.mark.parametrize(("name", "firmware"), [
     ("position", "2026.08"), ("velocity", "2026.08"), ("attitude", "2026.08"), ("saturation", "2026.08"),
     ("fork_position", "authors-2024-01"), ("fork_velocity", "authors-2024-01")])
-def test_controller_and_mixer(name, firmware):
+def test_the_controller_and_mixer_follow_the_firmwares_trace(name, firmware):
     t = trace(f"controller_{name}")
     release, plant = settings.load(firmware)[0], from_vehicle(vehicles.load("crazyflie-2.1"))[0]
     state, setpoints = np.zeros(1, controller.STATE)[0], np.zeros(1, controller.SETPOINT)
@@ -118,7 +118,7 @@ HEAD = {"threshold_m": 0.30, "height_m": 0.70}  #: in force from 2024-06-26
 
 @pytest.mark.parametrize("case", ["exact", "low", "off", "soft", "drift", "slow", "fast"])
 @pytest.mark.parametrize("release", ["jan", "head"])
-def test_range_module(release, case):
+def test_the_range_module_follows_the_firmwares_trace(release, case):
     t = trace(f"authors_range_{release}_{case}")
     firmware, state = settings.load("authors-2024-01")[0], np.zeros(1, range_module.STATE)[0]
     if release == "head":

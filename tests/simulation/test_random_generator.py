@@ -6,7 +6,7 @@ from scipy import stats
 from airtouch.simulation.random_generator import generator, normal, normals, uniform
 
 
-def test_distributions():
+def test_draws_are_uniform_and_normal_out_to_the_tail():
     state = generator(1, 2, "imu")
     u = np.array([uniform(state) for _ in range(50_000)])
     assert u.min() > 0.0 and u.max() <= 1.0

@@ -114,7 +114,7 @@ def test_clients_come_and_go(cflib, tmp_path):
             assert "Can fly" in cf.supervisor.read_state_list()
 
 
-def test_scan_finds_it(cflib, monkeypatch):
+def test_cflibs_scan_finds_the_virtual_drone(cflib, monkeypatch):
     from cflib.crtp import udpdriver
 
     with serve("hover", port=0) as virtual:

@@ -129,7 +129,7 @@ def test_a_fall_from_high_up_is_a_crash_that_can_be_recovered_from(bench):
 
 
 @pytest.mark.parametrize("port, channel, data", [(SUPERVISOR, 1, [3]), (LOCALIZATION, 1, [3])])
-def test_emergency_stop(bench, port, channel, data):
+def test_an_emergency_stop_drops_the_drone(bench, port, channel, data):
     craft = bench(**QUIET)
     craft.take_off(0.3)
     craft.take(port, channel, data)
@@ -137,7 +137,7 @@ def test_emergency_stop(bench, port, channel, data):
     assert not craft.drone.motors_on and craft.height < 0.05 and not bits(craft) & 1
 
 
-def test_versions(bench):
+def test_protocol_and_platform_are_those_of_a_crazyflie(bench):
     craft = bench()
     assert craft.take(PLATFORM, 1, [0])[0].data == bytes([0, 12, 0, 0, 0])
     assert craft.take(PLATFORM, 1, [2])[0].data == b"\2CF21"

@@ -19,7 +19,7 @@ from simulated_link import simulated
     ("loss=0.3", Fault("loss", amount=0.3)), ("loss=0.3,all", Fault("loss", amount=0.3, all_packets=True)),
     ("late=50ms", Fault("late", amount=0.05)), ("disconnect=3,5s", Fault("disconnect", 3.0, 5.0)),
     ("gap8-reset=2.5s", Fault("gap8-reset", 2.5)), ("low-battery=start", Fault("low-battery"))])
-def test_written_faults(text, fault):
+def test_a_fault_is_parsed_from_its_text(text, fault):
     assert parse(text) == fault
 
 
@@ -116,7 +116,7 @@ def test_without_an_ai_deck_the_stm32_does_it(bench):
     assert craft.firmware.param.values["deck.bcAI"] == 0
 
 
-def test_low_battery(bench):
+def test_a_low_battery_warns_before_the_drone_falls(bench):
     craft, pass_ = flying(bench, "low-battery=3")
     before = craft.drone.row[16]
     pass_(1.0)

@@ -88,7 +88,7 @@ def test_commands_that_make_no_sense_are_refused(data):
     assert planner.state == IDLE
 
 
-def test_groups():
+def test_a_command_for_another_group_is_not_flown():
     planner = Planner()
     planner.command(bytes([0, 2]), 0.0)
     planner.command(struct.pack("<BBff?f", 7, 4, 0.5, 0.0, False, 1.0), 0.0)  # for others

@@ -31,7 +31,7 @@ def constant(seconds=5.0, volts=3.8, milliamperes=20.0, rate=200):
 
 
 @given(st.floats(0.1, 20.0), st.floats(-300.0, 300.0))
-def test_constant_power(volts, milliamperes):
+def test_constant_power_is_measured_to_a_thousandth(volts, milliamperes):
     power = ina219.power(ina219.parse(text(*constant(3.0, volts, milliamperes)), "f"))
     assert power.mw == pytest.approx(volts * milliamperes, abs=0.01 + 1e-3 * abs(volts * milliamperes))
     assert power.mj == pytest.approx(power.mw * power.seconds) and power.seconds == pytest.approx(2.995)

@@ -9,7 +9,7 @@ from airtouch.crazyflie.connection.ticks import WRAP_MS, Restarted, Ticks, gaps,
 
 
 @given(st.integers(0, WRAP_MS - 1), st.lists(st.integers(1, 5_000_000), min_size=1, max_size=30))
-def test_wraps_vanish(start, steps):
+def test_ticks_go_on_where_the_counter_wraps(start, steps):
     true = start + np.cumsum([0, *steps])
     ticks = Ticks()
     assert [ticks.unwrap(int(t) % WRAP_MS) for t in true] == list(true)

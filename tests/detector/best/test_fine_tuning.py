@@ -82,7 +82,7 @@ def test_free_air_is_drawn_and_has_no_goals():
     assert np.mean(with_free_air) == pytest.approx(0.5 * np.mean(sweeps_only), abs=0.12)
 
 
-def test_free_air_folders(tmp_path):
+def test_free_air_is_read_from_folders_and_a_bad_file_is_told(tmp_path):
     calm = made_flight(0)
     calm.columns["zrange_m"] = np.full(len(calm), 0.8)
     logs.write(calm, tmp_path / "calm.csv")

@@ -15,7 +15,7 @@ def folder(tmp_path, text):
     return tmp_path
 
 
-def test_conditions_by_name(tmp_path):
+def test_files_have_the_conditions_of_their_manifest(tmp_path):
     place = folder(tmp_path, HEADER + "a.csv,clean,3,h79,-10,none,0.35\nb.csv,messy,,,,,\n")
     assert read_manifest(place / "manifest.csv")["a.csv"] == Condition("clean", 3, "h79", -10.0, "none", 0.35)
     assert [f.path.name for f in collect([place])] == ["a.csv"]
@@ -46,13 +46,13 @@ def test_bad_manifest_says_where(tmp_path, text, message):
     assert message in str(error.value) and "\n" not in str(error.value)
 
 
-def test_binary_manifest(tmp_path):
+def test_a_manifest_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "manifest.csv").write_bytes(b"\xff\xfe\x00file")
     with pytest.raises(AirTouchError, match="cannot be read"):
         collect([tmp_path])
 
 
-def test_missing_and_empty(tmp_path):
+def test_a_missing_file_and_an_empty_folder_are_refused(tmp_path):
     with pytest.raises(AirTouchError, match="no such file"):
         collect([tmp_path / "none"])
     with pytest.raises(AirTouchError, match="no flights"):

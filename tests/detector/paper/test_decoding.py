@@ -38,7 +38,7 @@ def test_edges_are_those_of_the_reference_that_steps_through_the_samples(flight)
 
 
 @given(flights(), st.integers(0, 100))
-def test_causal(flight, length):
+def test_edges_do_not_depend_on_later_samples(flight, length):
     p, armed, alert, settings = flight
     full = decode(p, armed, alert, settings)
     length = min(length, len(p))

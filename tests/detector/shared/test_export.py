@@ -58,6 +58,7 @@ int main(void) {
 
 
 def test_the_generated_sources_are_those_of_the_shipped_models() -> None:
+    """`check` raises where a file is stale, edited or foreign."""
     export.check(model_file.load(), MODEL)
     export.check(best.load(None), MODEL)
     export.check(rolling.load(None), MODEL)

@@ -120,7 +120,7 @@ def test_a_slow_ramp_is_followed_as_the_firmware_does(drone):
 
 
 @pytest.mark.parametrize("degrees", [5, 15, 25])
-def test_edges_under_tilt(drone, degrees):
+def test_edges_under_a_tilt_leave_the_height_as_it_is(drone, degrees):
     tilt = np.deg2rad(degrees)
     tops = profile((0.0, 40), (TOP, 60), (0.0, 60))
     got = np.array([drone.read((0.8 - top) / np.cos(tilt), 0.8, tilt=tilt) * np.cos(tilt) for top in tops])

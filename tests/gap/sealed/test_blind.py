@@ -123,7 +123,7 @@ def test_flights_say_nothing_of_their_effect(blind_check):
     assert not any(name in public for name in CLEAR)
 
 
-def test_the_seal(blind_check, tmp_path):
+def test_a_sealed_set_is_scored_for_one_set_of_answers_by_its_own_key(blind_check, tmp_path):
     folder, *_ = blind_check
     key = blind.key_of(folder)
     rescored = blind.score(folder, folder / "answers")  # the same answers may be scored once more
@@ -232,12 +232,13 @@ def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():
     assert blind_severity.SEEN == pytest.approx(0.5 * chi2.isf(2.0 * 0.02 / len(KINDS), 1))  # one-sided
 
 
-def test_severities_and_strengths():
+def test_severities_are_in_equal_ratios_and_strengths_within_bounds():
     assert severities(0.1, 1.0) == pytest.approx((0.1, 0.2, 0.4))
     assert severities(0.1, 0.2) == pytest.approx((0.1, np.sqrt(0.02), 0.2))
     for kind in KINDS.values():
         rng = np.random.default_rng(0)
-        kind.active(kind.highest, rng)  # within the registry's bounds
+        active = kind.active(kind.highest, rng)
+        assert all(p.low <= active.values[p.name] <= p.high for p in active.effect.parameters), kind
 
 
 def test_a_set_is_balanced():

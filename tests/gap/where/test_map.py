@@ -37,7 +37,7 @@ def test_white_noise_has_its_rms_in_every_band(rms):
             assert c.low < expected < c.high and c.unit == "m/s^2" and c.blocks == 47 and c.flights == 1
 
 
-def test_intervals_cover():
+def test_intervals_hold_the_true_rms_in_85_of_100_cells():
     inside = []
     for seed in range(30):
         gap_map = maps.gap_map(study(), [flight(30.0, noise(30.0, 1.0, seed))])

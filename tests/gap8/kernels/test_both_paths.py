@@ -50,7 +50,7 @@ class TestBothPaths:
     @given(seed=st.integers(0, 2**31), rows=st.integers(4, 20), columns=st.integers(1, 4),
            channels=st.sampled_from([1, 2, 3, 4, 8]), stages=STAGES,
            dense=st.lists(st.integers(1, 9), min_size=1, max_size=2), sparsity=st.sampled_from([0.0, 0.6, 0.95, 1.0]))
-    def test_any_network(self, seed, rows, columns, channels, stages, dense, sparsity):
+    def test_any_network_has_the_bits_of_numpy(self, seed, rows, columns, channels, stages, dense, sparsity):
         if not fits(rows, columns, channels, stages):
             return
         net = made(seed, rows, columns, channels, stages, dense, sparsity)
@@ -58,7 +58,7 @@ class TestBothPaths:
         np.testing.assert_array_equal(c_network.run_int8(net, x), int8_network.run(net, x))
 
     @pytest.mark.parametrize("sparsity", [0.0, 0.8])
-    def test_extreme_inputs(self, sparsity):
+    def test_extreme_inputs_give_the_bits_of_numpy(self, sparsity):
         net = random_model(seed=5, sparsity=sparsity).int8
         x = np.array([[-128] * 300, [127] * 300, [-128, 127] * 150, [0] * 300], dtype=np.int8)
         np.testing.assert_array_equal(c_network.run_int8(net, x), int8_network.run(net, x))
@@ -100,7 +100,7 @@ class TestBothPaths:
         windows = np.stack([x[end - rows + 1:end + 1] for end in chosen])
         np.testing.assert_array_equal(out[chosen - size.ahead], int8_network.run(net, windows))
 
-    def test_a_reset_forgets(self):
+    def test_a_reset_forgets_the_samples_before(self):
         net = random_model(seed=7, sparsity=0.9).int8
         x, usable = samples((400, 3), 2), np.ones(400, bool)
         usable[[5, 150, 151]] = False

@@ -83,7 +83,7 @@ def test_segments_of_a_made_flight():
                      "ground"]
 
 
-def test_real_flights(flights):
+def test_known_faults_of_recorded_flights_are_reported(flights):
     folder = flights / "airtouch"
     report = logs.check(logs.read(folder / "imu_data_0102-2131.csv.gz"))  # gyro duplicates acc
     assert len(report.duplicated) == 3

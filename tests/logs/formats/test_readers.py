@@ -51,7 +51,7 @@ def test_authors_13_columns_give_attitude_and_body_acceleration():
     assert np.isnan(log["zrange_m"][0])
 
 
-def test_authors_other_widths():
+def test_the_authors_files_of_other_widths_have_their_columns():
     log = parse(lines([0, 0, 9810, 0, 0, 0, 1, 2, 3, 4, 0, 1500, 0.5, 0]), "f")  # 14
     assert np.isnan(log["range_left_m"][0]) and log["range_right_m"][0] == 1.5
     assert log["zrange_m"][0] == 0.0  # too near to measure is a reading

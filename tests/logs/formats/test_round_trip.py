@@ -49,13 +49,13 @@ def assert_same(back, log):
 
 @settings(deadline=None)
 @given(flight_logs(), st.booleans())
-def test_canonical_round_trip(log, compress):
+def test_a_canonical_file_gives_the_log_back(log, compress):
     assert_same(parse(canonical.to_bytes(log, compress), "b.csv"), log)
 
 
 @settings(deadline=None, max_examples=50)
 @given(flight_logs())
-def test_parquet_round_trip(log):
+def test_a_parquet_file_gives_the_log_back(log):
     pytest.importorskip("pyarrow")
     assert_same(parse(parquet.to_bytes(log), "b.parquet"), log)
 

@@ -37,7 +37,7 @@ def _time(version, i):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_both_versions(version):
+def test_files_of_both_versions_give_columns_in_si_units(version):
     log = parse(usd_log(version), "log00")
     assert len(log) == 50 and log.meta["format"] == f"usd-{version}" and not log.meta["warnings"]
     np.testing.assert_allclose(log["t_s"], 0.1 + 0.001 * np.arange(50))
@@ -77,5 +77,5 @@ def test_logs_without_the_usual_event_and_unusable_ones():
 
 @settings(max_examples=150, deadline=None)
 @given(st.data())
-def test_damaged_logs_never_crash(data):
+def test_a_damaged_log_is_read_or_refused_in_one_line(data):
     damaged.is_read_or_refused(usd_log(rows=5), data)

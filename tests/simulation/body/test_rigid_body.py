@@ -101,7 +101,7 @@ def test_each_rotor_turns_the_body_the_documented_way(plant, rotor, roll, pitch,
     assert tuple(np.sign(rigid_body.rotor_wrench(plant[0], speed, np.ones(4)))) == (1, roll, pitch, yaw)
 
 
-def test_fourth_order_convergence(plant):
+def test_the_error_falls_with_the_fourth_power_of_the_step(plant):
     plant["rotor_inertia"] = 2e-8
     state, speed = at_rest(), np.full(4, 1000.0)
     state[10:] = (4.0, -3.0, 5.0)

@@ -101,7 +101,7 @@ def test_bad_effects_get_one_clear_line(text, message):
     assert "\n" not in str(error.value)
 
 
-def test_command_line_form():
+def test_an_effect_on_the_command_line_is_its_name_and_values():
     assert effects.parse("wind:x=0.3m/s, y=-1 m/s")[1] == {"x": 0.3, "y": -1.0, "z": 0.0, "drag": 0.0147,
                                                              "lever": 0.0}
     assert effects.parse("weak_motor:rotor=2,thrust_loss=0.1") == ("weak_motor", {"rotor": 2.0,

@@ -16,7 +16,7 @@ VALUES = {"a": 3.0, "height": 0.04}
     ("1 + 2 * 3", 7.0), ("(1 + 2) * 3", 9.0), ("-a / 2", -1.5), ("a - -a", 6.0), ("height * 100", 4.0),
     ("sin(30)", 0.5), ("a * cos(60)", 1.5), ("max(a, 2, 5)", 5.0), ("min(a, height)", 0.04),
     ("sin(a + 42)", math.sqrt(0.5))])
-def test_arithmetic(text, true):
+def test_an_expression_has_the_value_of_its_arithmetic(text, true):
     assert evaluate(text, VALUES, "here") == pytest.approx(true)
 
 

@@ -74,7 +74,7 @@ def test_the_best_round_is_the_one_with_the_least_misfit(fit_result):
     assert total(entry) == min(map(total, fit_result.history)) < total(fit_result.history[0])
 
 
-def test_misfit_falls(fit_result):
+def test_a_fit_lowers_the_misfit_of_spectra_and_coherency(fit_result):
     first, last = fit_result.history[0]["misfit"], fit_result.history[-1]["misfit"]
     assert last["spectrum"] < 0.6 * first["spectrum"]
     assert last["coherency"] < 0.6 * first["coherency"]
