@@ -65,9 +65,9 @@ def swaying(drag=0.0, gust_mps2=0.0):
     force = -drag * speed[:, None] * [1.0, 0.0, 0.0] / VEHICLE.mass_kg
     decay = np.exp(-0.01 / CORRELATION_S)
     gusts = gust_mps2 * lfilter([np.sqrt(1.0 - decay ** 2)], [1.0, -decay], noise(30.0, 1.0, 10), axis=0)
-    flown = flight.signals.copy()
-    flown[:, signals.VELOCITY] = speed
-    return replace(flight, signals=flown, acceleration=flight.acceleration + force + gusts)
+    motion = flight.signals.copy()
+    motion[:, signals.VELOCITY] = speed
+    return replace(flight, signals=motion, acceleration=flight.acceleration + force + gusts)
 
 
 def with_a_push(since_s, until_s, seed=6, mps2=1.0):

@@ -81,7 +81,7 @@ def test_it_does_not_overwrite_and_it_goes_on(twin, folder, tmp_path, monkeypatc
 
 
 def test_bad_input_is_one_line_with_what_to_fly(sweeps, folder, tmp_path):
-    def refused(name, sweeps):
+    def refusal(name, sweeps):
         place = tmp_path / name
         place.mkdir()
         for i, log in enumerate(sweeps):
@@ -93,12 +93,12 @@ def test_bad_input_is_one_line_with_what_to_fly(sweeps, folder, tmp_path):
         return message
 
     some = [log for _, log, _ in sweeps[:5]]
-    assert "4 are needed: fly straight over" in refused("few", some[:2])
+    assert "4 are needed: fly straight over" in refusal("few", some[:2])
     blind = [FlightLog({k: v for k, v in log.columns.items() if k != "zrange_m"}, log.meta) for log in some]
-    assert "no down range in this log; log range.zrange" in refused("blind", blind)
-    assert "hover 5 s" in refused("hurried", [log.slice(course(log).entry - 100, len(log)) for log in some])
+    assert "no down range in this log; log range.zrange" in refusal("blind", blind)
+    assert "hover 5 s" in refusal("hurried", [log.slice(course(log).entry - 100, len(log)) for log in some])
     other = FlightLog(some[0].columns, {**some[0].meta, "vehicle": "quadrotor-450"})
-    assert "two vehicles" in refused("two", [*some, other])
+    assert "two vehicles" in refusal("two", [*some, other])
 
 
 def test_help_teaches():

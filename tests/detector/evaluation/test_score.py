@@ -45,8 +45,8 @@ def test_lag_is_taken_off_before_matching():
 
 
 def test_a_detection_serves_one_edge_and_the_rest_are_false():
-    near, far = Detection(1010, "entry"), Detection(1020, "entry")
-    score = flight([near, far, Detection(100, "exit")])
+    near, later = Detection(1010, "entry"), Detection(1020, "entry")
+    score = flight([near, later, Detection(100, "exit")])
     assert score.edges[0].detected_sample == 1010
     assert score.edges[1].detected_sample is None
     assert score.false == (1020, 100)

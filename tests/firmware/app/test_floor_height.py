@@ -37,7 +37,7 @@ def library(tmp_path_factory):
     return floor
 
 
-class Flown:
+class Crossing:
     """The C and the reference over the same readings; both must say the same."""
 
     def __init__(self, library):
@@ -66,7 +66,7 @@ class Flown:
 
 @pytest.fixture
 def drone(library):
-    return Flown(library)
+    return Crossing(library)
 
 
 def profile(*parts):
@@ -85,7 +85,7 @@ def test_noise_of_the_range_leaves_a_centimetre_that_fades(library):
     """Twenty flights with 4 mm of noise: what is left at the exit is gone within a second."""
     ends = []
     for seed in range(20):
-        drone = Flown(library)
+        drone = Crossing(library)
         off = drone.fly(profile((0.0, 40), (TOP, 80), (0.0, 80)), noise=0.004, seed=seed)
         assert np.abs(off[:120]).max() < 0.03
         assert drone.state.floor == 0.0 and drone.state.steps == 2
@@ -123,8 +123,8 @@ def test_a_slow_ramp_is_followed_as_the_firmware_does(drone):
 def test_edges_under_a_tilt_leave_the_height_as_it_is(drone, degrees):
     tilt = np.deg2rad(degrees)
     tops = profile((0.0, 40), (TOP, 60), (0.0, 60))
-    got = np.array([drone.read((0.8 - top) / np.cos(tilt), 0.8, tilt=tilt) * np.cos(tilt) for top in tops])
-    assert np.abs(got - 0.8).max() < 0.003 and drone.state.floor == 0.0
+    heights = np.array([drone.read((0.8 - top) / np.cos(tilt), 0.8, tilt=tilt) * np.cos(tilt) for top in tops])
+    assert np.abs(heights - 0.8).max() < 0.003 and drone.state.floor == 0.0
 
 
 def test_coming_out_of_a_tilt_is_no_step(drone):
@@ -171,8 +171,8 @@ def test_from_a_table_to_the_floor(drone):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
 def test_what_is_no_number_is_passed_on(drone, value):
     drone.fly(profile((0.0, 20)))
-    got = drone.read(value, 0.8)
-    assert got == value or np.isnan(got)
+    height = drone.read(value, 0.8)
+    assert height == value or np.isnan(height)
     assert drone.state.steps == 0
     assert drone.read(0.8, np.nan) == pytest.approx(0.8) and drone.read(0.8, 0.8, climb=np.inf) == pytest.approx(0.8)
 
@@ -187,7 +187,7 @@ def test_a_sum_beyond_belief_ends(drone):
 
 def test_any_readings_leave_finite_numbers(library):
     rng = np.random.default_rng(5)
-    drone = Flown(library)
+    drone = Crossing(library)
     for _ in range(3000):
         drone.read(rng.choice([0.0, 0.08, 0.8, 4.0, 1e30, np.nan, rng.uniform(0, 4)]),
                    rng.choice([0.8, 1e30, rng.uniform(-1, 3)]),

@@ -12,7 +12,7 @@ from airtouch.gap.signatures.candidates import terms
 from gap_flights import VEHICLE, fly
 
 
-def read(name, x, covariance, reading):
+def combined(name, x, covariance, reading):
     """Values and 90 % intervals of an effect's parameters with a reading, from scaled ones."""
     term = next(t for t in terms(name) if len(t.free) == len(x))
     return term.quantities(*with_reading(term, np.array(x), np.array(covariance), reading))
@@ -20,7 +20,7 @@ def read(name, x, covariance, reading):
 
 def mass(value, deviation, reading):
     step = terms("mass")[0].step("fraction")
-    return read("mass", [value / step], [[(deviation / step) ** 2]], reading)["fraction"]
+    return combined("mass", [value / step], [[(deviation / step) ** 2]], reading)["fraction"]
 
 
 def test_a_reading_is_weighted_by_its_precision():
@@ -39,8 +39,8 @@ def test_an_interval_is_wider_where_replay_and_reading_disagree():
 def test_what_the_replay_knows_as_a_sum_stays_a_sum():
     """Of x + y the replay is sure, of either alone it is not: a reading of x moves y by as much the other way."""
     term = terms("com_offset")[0]
-    both = read("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
-                {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
+    both = combined("com_offset", [1.0, 1.0], [[1.0, -0.9999], [-0.9999, 1.0]],
+                    {"x": (0.5 * term.step("x"), 0.01 * term.step("x"))})
     assert both["x"].value == pytest.approx(0.5 * term.step("x"), rel=0.01)
     assert both["y"].value == pytest.approx(1.5 * term.step("y"), rel=0.01)
 

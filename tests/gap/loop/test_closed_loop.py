@@ -170,7 +170,7 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
     plant, f = prepare(VEHICLE, ())[0].copy(), np.array([0.7, 2.0, 9.0, 31.0])
     row, strengths = plant[0], np.ones(5)
 
-    def seen(axis):
+    def spectra_of(axis):
         c = controller.firmware(row, axis)
         spectra = [noise_spectra.noise_power(c, row, axis, f), loop_model.excess_phase(c, row, axis)]
         if axis != "thrust":
@@ -178,13 +178,13 @@ def test_rows_alike_in_their_loop_have_the_same_spectra():
                         loop_model.torque_per_command(row, axis, f)]
         return (c, loop_model.of_loop(row, axis)), np.concatenate([np.ravel(x) for x in spectra])
 
-    before, different = {axis: seen(axis) for axis in controller.AXES}, 0
+    before, different = {axis: spectra_of(axis) for axis in controller.AXES}, 0
     for number in leaves(plant):
         original = number.copy()
         another = 1.07 * original + 1e-3 if number.dtype.kind == "f" else original + 1
         number[...] = ~original if number.dtype == bool else another
         for axis, (key, earlier) in before.items():
-            group, now = seen(axis)
+            group, now = spectra_of(axis)
             different += group != key
             if group == key:
                 np.testing.assert_array_equal(now, earlier)

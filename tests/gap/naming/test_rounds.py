@@ -43,19 +43,19 @@ def test_a_companion_must_earn_its_place_beside_the_effect(drag, names):
 
 def test_where_its_companion_alone_gains_as_much_it_is_that_which_gains():
     on = trial(swaying(drag=0.005))
-    judged = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
-    assert judged["rotor_drag"].terms[0].values["horizontal"] == pytest.approx(0.005, rel=0.1)
-    assert len(judged["gust"].terms) == 2 and judged["gust"].gain == judged["rotor_drag"].gain - LEAST_GAIN
+    best = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
+    assert best["rotor_drag"].terms[0].values["horizontal"] == pytest.approx(0.005, rel=0.1)
+    assert len(best["gust"].terms) == 2 and best["gust"].gain == best["rotor_drag"].gain - LEAST_GAIN
 
 
 def test_where_gusts_blow_as_well_their_companion_leaves_them_their_gain():
     on = trial(swaying(drag=0.02, gust_mps2=0.1))
-    judged = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
-    (gust, drag), most = judged["gust"].terms, judged["rotor_drag"].gain
+    best = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
+    (gust, drag), most = best["gust"].terms, best["rotor_drag"].gain
     assert drag.values["horizontal"] == pytest.approx(0.02, rel=0.1) and gust.values["rms"] > 0.0
     # the ready model: drag 0.0147 N/(m/s) of a gust's speed
     assert gust.values["rms"] * gust.values["drag"] / VEHICLE.mass_kg == pytest.approx(0.1, rel=0.35)
-    assert judged["gust"].gain > most + LEAST_GAIN
+    assert best["gust"].gain > most + LEAST_GAIN
 
 
 def test_a_first_look_has_the_mean_of_both_halves_and_their_spread():
@@ -70,8 +70,8 @@ def test_a_first_look_has_the_mean_of_both_halves_and_their_spread():
 def test_the_rotor_that_is_chosen_already_is_not_tried_again_and_the_others_are():
     on = trial(weak(r3=0.005))
     third = round_of(on, candidates_of(["weak_motor"]), None)["weak_motor"]
-    again = [variant for variant in all_candidates()["weak_motor"] if variant[0].values["rotor"] == 3.0]
-    assert round_of(on, {"weak_motor": again}, third) == {}
+    same_rotor = [variant for variant in all_candidates()["weak_motor"] if variant[0].values["rotor"] == 3.0]
+    assert round_of(on, {"weak_motor": same_rotor}, third) == {}
     beside = round_of(on, candidates_of(["weak_motor"]), third)["weak_motor"]
     assert beside.terms[0].values["rotor"] == 3.0 != beside.terms[1].values["rotor"]
 
@@ -93,8 +93,8 @@ def test_a_random_effect_that_promises_little_is_looked_at_and_not_fitted(louder
 
 
 def test_the_covariance_of_some_parameters_says_nothing_of_the_others():
-    _, *alone = all_candidates()["controller_gain"]
-    (attitude,) = next(t for t in alone if t[0].free == ("attitude",))
+    _, *variants = all_candidates()["controller_gain"]
+    (attitude,) = next(t for t in variants if t[0].free == ("attitude",))
     expected = np.diag([np.inf, 2.0, np.inf, np.inf])
     np.testing.assert_array_equal(covariance_among_all(attitude, np.array([[2.0]])), expected)
     offset = terms("com_offset")[0]
@@ -122,8 +122,8 @@ def test_where_the_relations_of_signals_hold_their_effects_are_chosen(monkeypatc
     answer, judgements = by_relations(monkeypatch, explained)
     data = Data(FLOOR, [hover(1, (0.0, 0.0, -DOWN))], slow=True)
     assert select.select(data, candidates_of(["mass"])) is answer
-    (alone,) = judgements
-    assert isinstance(alone["mass"], Judged) and alone["mass"].gain > 100.0
+    (judged_alone,) = judgements
+    assert isinstance(judged_alone["mass"], Judged) and judged_alone["mass"].gain > 100.0
 
 
 def test_a_wake_that_the_relations_of_signals_leave_unexplained_is_selected_by_the_spectra(monkeypatch):

@@ -20,15 +20,15 @@ def test_nine_intervals_in_ten_hold_the_amount(scatter):
     """The strength of a flight lies off by a normal error of the logarithm: its deviation is that of the amount."""
     rng = np.random.default_rng(1)
 
-    def drawn(count):
+    def draw(count):
         amount = np.exp(rng.uniform(np.log(0.01), np.log(1.0), count))
         return 50.0 * amount * np.exp(scatter * rng.normal(size=count)), amount
 
     covered = []
     for _ in range(10):
-        strength, amount = drawn(80)
+        strength, amount = draw(80)
         readout = Readout(("fraction",), strength[:, None], amount[:, None])
-        for s, true in zip(*drawn(60), strict=True):
+        for s, true in zip(*draw(60), strict=True):
             (value,), (deviation,) = readout(np.array([s]))
             covered.append(abs(value - true) <= 1.645 * deviation)
     assert 0.84 < np.mean(covered) < 0.96

@@ -171,12 +171,12 @@ def answer(name, verdict, ranking, effects=(), withheld=(), before=2.0, after=1.
 
 
 def test_scores_in_closed_form():
-    def one(name, value, level=0):
+    def truth(name, value, level=0):
         return {"effects": [{"name": name, "kind": name, "level": level, "values": value}], "nats": 3.0 + 6.0 * level}
 
     key = {"answers": {
-        "a": one("mass", {"fraction": 0.1}), "b": one("inertia", {"fraction": 0.5}, 1), "c": {"effects": []},
-        "d": {"effects": one("mass", {})["effects"] + one("inertia", {})["effects"]}, "e": {"effects": []}}}
+        "a": truth("mass", {"fraction": 0.1}), "b": truth("inertia", {"fraction": 0.5}, 1), "c": {"effects": []},
+        "d": {"effects": truth("mass", {})["effects"] + truth("inertia", {})["effects"]}, "e": {"effects": []}}}
     quantity = {"fraction": {"value": 0.6, "low": 0.4, "high": 0.8, "unit": "1"}}
     cases = [
         answer("a", "effect", [("thrust_coefficient", 0.9), ("none", 0.1)], [("thrust_coefficient", {})]),

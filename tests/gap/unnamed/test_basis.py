@@ -13,9 +13,9 @@ REST_S, TILT = 1.0, 0.3
 WEIGHT_N = VEHICLE.mass_kg * VEHICLE.gravity_mps2
 
 
-def columns(flown):
+def columns(hover):
     """Each signal by its name, (n, 3)."""
-    return dict(zip(BASIS, basis(flown, VEHICLE).transpose(1, 0, 2), strict=True))
+    return dict(zip(BASIS, basis(hover, VEHICLE).transpose(1, 0, 2), strict=True))
 
 
 @pytest.fixture(scope="module")

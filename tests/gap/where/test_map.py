@@ -104,10 +104,10 @@ def test_without_baseline_the_floor_is_sensor_noise_and_spread():
 
 
 def test_no_gap_is_rarely_called_one():
-    def quiet(seed):
+    def nominal(seed):
         return flight(20.0, noise(20.0, 0.06, seed), noise(20.0, 0.006, seed + 100))
     hits = [maps.significant(c) for s in range(8) for c in maps.gap_map(
-        study(), [quiet(s)], [quiet(50 + s), quiet(70 + s)]).cells if c.regime == "all"]
+        study(), [nominal(s)], [nominal(50 + s), nominal(70 + s)]).cells if c.regime == "all"]
     assert np.mean(hits) < 0.02
 
 

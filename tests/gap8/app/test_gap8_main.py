@@ -141,9 +141,9 @@ def test_without_a_cluster_the_stm32_is_told_so_and_computes(start, fault, words
 def test_a_cluster_that_fails_in_flight_repeats_no_reply(start):
     requests, _ = conversation("best-gap8", 300)
     chip = start("later")  # its first task sets up, its second one fails
-    packets = chip.exchange([packet(one) for one in requests])
+    packets = chip.exchange([packet(item) for item in requests])
     assert sum("takes no task" in line for line in chip.lines) == 1
-    assert len(packets) == len(requests) - 1 + 1 and {one[1] for one in packets[:-1]} == {RESULT}
+    assert len(packets) == len(requests) - 1 + 1 and {item[1] for item in packets[:-1]} == {RESULT}
 
 
 def test_a_clock_that_is_refused_is_said_and_the_safe_one_stays(start):

@@ -46,13 +46,13 @@ def test_torque_free_precession_keeps_energy_and_angular_momentum(plant):
     state[10:] = (3.0, 8.0, 2.0)
     inertia = plant[0]["inertia"]
 
-    def kept(x):
+    def energy_and_momentum(x):
         momentum = np.array(rotate(x[6:10], *(inertia * x[10:])))
         return 0.5 * np.sum(inertia * x[10:] ** 2), momentum
 
-    energy, momentum = kept(state)
+    energy, momentum = energy_and_momentum(state)
     later, _ = integrate(plant, state, np.zeros(4), np.zeros(4), 0.002, 5000)
-    energy_later, momentum_later = kept(later)
+    energy_later, momentum_later = energy_and_momentum(later)
     assert energy_later == pytest.approx(energy, rel=1e-6)
     np.testing.assert_allclose(momentum_later, momentum, atol=1e-6 * np.linalg.norm(momentum))
 

@@ -55,9 +55,9 @@ def test_two_weak_motors_are_two_entries(steady, vehicle):
 def test_centre_of_mass_is_carried_by_the_rotors_nearer_to_it(steady, vehicle):
     half = vehicle.arm_m / np.sqrt(2)
     thrust = thrusts(steady({"com_offset": {"x": 0.002, "y": -0.001}}), vehicle)
-    front, right = thrust[[0, 3]].sum() / thrust.sum(), thrust[[0, 1]].sum() / thrust.sum()
-    assert front == pytest.approx(0.5 + 0.5 * 0.002 / half, rel=3e-3)
-    assert right == pytest.approx(0.5 + 0.5 * 0.001 / half, rel=3e-3)
+    front_share, right_share = thrust[[0, 3]].sum() / thrust.sum(), thrust[[0, 1]].sum() / thrust.sum()
+    assert front_share == pytest.approx(0.5 + 0.5 * 0.002 / half, rel=3e-3)
+    assert right_share == pytest.approx(0.5 + 0.5 * 0.001 / half, rel=3e-3)
 
 
 def test_inertia_slows_the_turn(vehicle):
