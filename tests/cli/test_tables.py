@@ -46,7 +46,7 @@ def diagnosis():
 
 
 @pytest.mark.parametrize("width", [80, 100, 170])
-def test_a_diagnosis_fits(diagnosis, width):
+def test_a_diagnosis_fits_the_width_of_the_terminal(diagnosis, width):
     text = printed(width, lambda screen: show.diagnosis(screen, diagnosis))
     command, = (step.command for step in diagnosis.next if step.command)
     assert "\u2026" not in text and command in text

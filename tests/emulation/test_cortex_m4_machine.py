@@ -107,7 +107,7 @@ def test_the_stack_used_is_that_of_the_deepest_call(machine):
     assert shallow < 64 and 1000 <= machine.stack_used() < 1064
 
 
-def test_instructions_are_counted(machine):
+def test_each_round_of_a_loop_counts_the_same_instructions(machine):
     ten_rounds, more_rounds = machine.call("loop", 10).instructions, machine.call("loop", 1010).instructions
     per_round = (more_rounds - ten_rounds) / 1000
     assert 3 <= per_round <= 8 and (2 * per_round).is_integer()

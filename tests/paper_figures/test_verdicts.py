@@ -76,7 +76,7 @@ def test_an_edge_at_9_cm_must_be_harder_than_at_4_cm(job, monkeypatch):
 @pytest.mark.parametrize(("at_20", "at_minus_20", "trend", "sides"), [(0.08, 0.08, REPRODUCED, REPRODUCED),
                                                                       (0.02, 0.02, NOT_REPRODUCED, REPRODUCED),
                                                                       (0.02, 0.09, REPRODUCED, NOT_REPRODUCED)])
-def test_errors_by_angle(job, monkeypatch, at_20, at_minus_20, trend, sides):
+def test_errors_by_angle_are_judged_by_their_trend_and_by_side(job, monkeypatch, at_20, at_minus_20, trend, sides):
     some = [s for angle, error in ((0.0, 0.02), (20.0, at_20), (-20.0, at_minus_20))
             for s in flights(error, height="low", angle_deg=angle)]
     monkeypatch.setattr(recorded, "scores", lambda _, name: (some, folds()))

@@ -101,7 +101,7 @@ def test_bad_input_is_one_line_with_what_to_fly(sweeps, folder, tmp_path):
     assert "two vehicles" in refusal("two", [*some, other])
 
 
-def test_help_teaches():
+def test_the_help_of_twin_says_what_to_fly_and_how_to_go_on():
     output = run("twin", "--help").output
     for text in ("What to fly", "airtouch simulate twin/scenario.toml", "0.5 is closed"):
         assert text in output

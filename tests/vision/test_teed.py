@@ -30,7 +30,7 @@ def test_smish_is_its_definition():
 
 @needs("keras")
 @needs("tensorflow")
-def test_numpy_equals_keras():
+def test_the_network_in_numpy_has_keras_outputs():
     model = teed.build_keras((4, 8, 12))
     assert model.count_params() == teed.parameters((4, 8, 12))
     rng = np.random.default_rng(3)

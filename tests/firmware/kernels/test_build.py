@@ -40,7 +40,7 @@ def test_compiles_with_the_firmwares_flags(compiler, source, tmp_path):
 
 
 @pytest.mark.parametrize("header", sorted(KERNELS.glob("*.h")), ids=lambda path: path.name)
-def test_headers_stand_alone(compiler, header, tmp_path):
+def test_each_header_compiles_by_itself(compiler, header, tmp_path):
     unit = tmp_path / "unit.c"
     unit.write_text(f'#include "{header.name}"\n#include "{header.name}"\nint unused;\n')
     process = subprocess.run([compiler, *FIRMWARE_FLAGS, "-Wno-unused-function", *INCLUDES, "-fsyntax-only", unit],

@@ -33,7 +33,7 @@ def test_any_number_of_cores_gives_the_golden_answers(programs, cores):
 
 @pytest.mark.parametrize("cores", [2, 3, 8])
 @pytest.mark.parametrize("sanitizer", ["thread", "address,undefined"])
-def test_sanitizers_find_nothing(programs, sanitizer, cores):
+def test_sanitizers_find_no_race_and_no_fault_of_memory(programs, sanitizer, cores):
     if sanitizer not in programs:
         pytest.skip(f"the C compiler has no {sanitizer} sanitizer that runs here")
     process = subprocess.run([programs[sanitizer], str(cores), "1"], capture_output=True, text=True, timeout=HANG_S)

@@ -48,7 +48,7 @@ def test_files_of_both_versions_give_columns_in_si_units(version):
     assert log["roll_rad"][0] == 0
 
 
-def test_checksum_is_checked():
+def test_a_wrong_checksum_is_told():
     data = bytearray(usd_log())
     data[-20] ^= 1
     log = parse(bytes(data), "log00")
